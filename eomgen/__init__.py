@@ -1,0 +1,52 @@
+"""eomgen: symbolic equations of motion of mechanisms, emitted as compiled modules.
+
+Model -> Equations -> Module -> Trajectory.  ``import eomgen`` costs almost nothing: every name loads on first use, and
+SymPy, SciPy and the compiler tools only where a call needs them.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .describe import Model as Model
+    from .describe import load as load
+    from .runtime import load_trajectory as load_trajectory
+
+__version__ = "0.1.0"
+
+_HOMES = {"Model": "describe", "load": "describe", "load_trajectory": "runtime"}
+_ERRORS = (
+    "AssemblyError",
+    "EomgenError",
+    "EvaluationError",
+    "MissingDependencyError",
+    "ModelError",
+    "NonFiniteError",
+    "PartitionError",
+    "ProjectionError",
+    "SimulationError",
+    "SingularMassMatrixError",
+    "ToolchainError",
+    "UsageError",
+)
+_HOMES |= dict.fromkeys(_ERRORS, "errors")
+
+__all__ = ["Model", "__version__", "errors", "load", "load_trajectory", *_ERRORS]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use (PEP 562)."""
+    if name == "errors":
+        return import_module(".errors", __name__)
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{home}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,29 @@
+"""Stage cli, check: model file -> mechanism report, or every fault of the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .failures import reports_failures
+from .options import json_option, load_model, model_argument
+from .screen import print_json
+
+
+@click.command()
+@model_argument
+@json_option
+@reports_failures
+def check(model: Path, as_json: bool) -> None:
+    """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
+
+    Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
+    """
+    from .. import pipeline
+
+    report = pipeline.check(load_model(model))
+    if as_json:
+        print_json(report.to_dict())
+    else:
+        click.echo(str(report))

@@ -1,0 +1,88 @@
+"""Stage cli, the group: the first word of the command line -> the verb of that name, imported only now."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+from .failures import USAGE
+
+#: verb -> what it does; the file of the same name in this folder holds the command of the same name.
+VERBS = {
+    "run": "Derive, compile and simulate a model.",
+    "check": "Report a model's topology, mobility and faults.",
+    "derive": "Derive the equations of motion and count their operations.",
+    "generate": "Write a package that stands alone.",
+    "examples": "List the example models, or copy one here.",
+    "doctor": "Say whether this installation can derive, compile and simulate.",
+    "cache": "List, prune or clear the compiled modules.",
+}
+
+
+class Verbs(click.Group):
+    """The group of all verbs, none of which is imported before it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = getattr(import_module(f".{cmd_name}", __package__), cmd_name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args[0] not in VERBS:
+            near = difflib.get_close_matches(args[0], VERBS, 1)
+            ctx.fail(
+                f"no verb {args[0]!r}; " + (f"did you mean {near[0]}?" if near else f"there are: {', '.join(VERBS)}")
+            )
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Verbs"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        from .. import __version__
+
+        click.echo(f"eomgen {__version__}")
+        ctx.exit()
+
+
+@click.group(
+    cls=Verbs,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="`eomgen VERB --help` explains a verb.  Exit codes: 0 fine; 1 the model is at fault; 2 usage or file not "
+    "found; 3 compiler or package missing; 4 the integration failed.",
+)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Show it.")
+def eomgen() -> None:
+    """Equations of motion of mechanisms: derived, compiled, simulated."""
+
+
+def run_command(arguments: Sequence[str] | None = None) -> int:
+    """Parse and run a command line; returns the exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
+        sys.stdout.flush()
+    except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
+        error.show()
+        return USAGE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return 130
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return code if isinstance(code, int) else 0

@@ -1,0 +1,79 @@
+"""Stage cli, examples: the models shipped with eomgen -> a list, or a copy of one in the current folder."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import re
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+import click
+
+from ..errors import UsageError
+from .failures import reports_failures
+from .options import json_option
+from .screen import print_json, print_table
+
+
+def example_files() -> dict[str, Traversable]:
+    """Every example by what to call it: a model file by its name alone, a Python script with its suffix."""
+    found = {}
+    for file in sorted(files("eomgen.examples").iterdir(), key=lambda f: f.name):
+        if file.name.endswith(".yaml"):
+            found[file.name.removesuffix(".yaml")] = file
+        elif file.name.endswith(".py") and not file.name.startswith("_"):
+            found[file.name] = file
+    return found
+
+
+def example_names() -> list[str]:
+    """What the examples are called."""
+    return list(example_files())
+
+
+def describe_example(file: Traversable) -> str:
+    """The ``doc:`` line of a model file, or the first line of a script's docstring."""
+    text = file.read_text(encoding="utf-8")
+    if file.name.endswith(".py"):
+        return (ast.get_docstring(ast.parse(text)) or "").split("\n", 1)[0]
+    found = re.search(r"^doc:\s*(.+)$", text, re.MULTILINE)
+    return found.group(1).strip().strip('"') if found else ""
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--force", is_flag=True, help="Overwrite a file of that name.")
+@json_option
+@reports_failures
+def examples(name: str | None, force: bool, as_json: bool) -> None:
+    """List the example models, or copy NAME into the current folder."""
+    found = example_files()
+    if name is None:
+        rows = [(key, file.name, describe_example(file)) for key, file in found.items()]
+        if as_json:
+            print_json({"examples": [{"name": key, "file": file, "doc": doc} for key, file, doc in rows]})
+            return
+        print_table(["example", "what it is"], [[key, doc] for key, _, doc in rows])
+        click.echo("copy one here:  eomgen examples NAME")
+        return
+    target = _copy(name, found, force)
+    if as_json:
+        print_json({"file": str(target)})
+        return
+    click.echo(str(target))
+    click.echo(f"next:  {'python' if target.suffix == '.py' else 'eomgen run'} {target}", err=True)
+
+
+def _copy(name: str, found: dict[str, Traversable], force: bool) -> Path:
+    file = found.get(name) or found.get(name.removesuffix(".yaml"))
+    if file is None:
+        near = difflib.get_close_matches(name, found, 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(found)}"
+        raise UsageError(f"no example {name!r}; {hint}")
+    target = Path(file.name)
+    if target.exists() and not force:
+        raise UsageError(f"{target} exists; add --force to overwrite it")
+    target.write_bytes(file.read_bytes())
+    return target

@@ -1,0 +1,77 @@
+"""Stage cli, failures: an exception of eomgen -> plain lines on stderr, an object if --json, and the exit code."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from ..errors import EomgenError, MissingDependencyError, ModelError, SimulationError, ToolchainError, UsageError
+
+MODEL, USAGE, TOOLCHAIN, INTEGRATION = 1, 2, 3, 4
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+
+
+def exit_code(error: BaseException) -> int:
+    """The exit code that says which kind of failure this is."""
+    if isinstance(error, UsageError | OSError):
+        return USAGE
+    if isinstance(error, ToolchainError | MissingDependencyError):
+        return TOOLCHAIN
+    if isinstance(error, SimulationError):
+        return INTEGRATION
+    return MODEL
+
+
+def lines_of(error: BaseException, file: str = "") -> list[str]:
+    """What to print: one line a fault, ``FILE:LINE: path: ...`` where a place in a model file is known."""
+    if isinstance(error, ModelError):
+        prefix = f"{file}: " if file else ""
+        return [str(p) if p.file else f"{prefix}{p}" for p in error.problems]
+    if isinstance(error, OSError) and error.strerror:
+        return [f"{error.filename}: {error.strerror}" if error.filename else error.strerror]
+    text = str(error)
+    if isinstance(error, ToolchainError):
+        extra = [part for part in (error.command, error.output.strip()) if part and part not in text]
+        return "\n".join([text, *extra]).splitlines()
+    if file and isinstance(error, EomgenError) and not isinstance(error, UsageError | MissingDependencyError):
+        text = text if text.startswith(file) else f"{file}: {text}"
+    return text.splitlines() or [type(error).__name__]
+
+
+def to_dict(error: BaseException) -> dict[str, Any]:
+    """The failure as plain values, for --json."""
+    problems = [p._asdict() for p in error.problems] if isinstance(error, ModelError) else []
+    return {
+        "error": {
+            "type": type(error).__name__,
+            "exit_code": exit_code(error),
+            "message": str(error),
+            "problems": problems,
+        }
+    }
+
+
+def reports_failures(verb: Verb) -> Verb:
+    """Make a verb leave with lines and an exit code instead of a traceback, when eomgen raised the error on purpose."""
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return verb(*args, **kwargs)
+        except BrokenPipeError:
+            raise
+        except (EomgenError, OSError) as error:
+            if kwargs.get("as_json"):
+                from .screen import print_json
+
+                print_json(to_dict(error))
+            for line in lines_of(error, str(kwargs.get("model") or "")):
+                click.echo(line, err=True)
+            sys.exit(exit_code(error))
+
+    return wrapped  # type: ignore[return-value]

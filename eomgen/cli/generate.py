@@ -1,0 +1,42 @@
+"""Stage cli, generate: model file -> a package folder that needs neither eomgen nor SymPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .failures import reports_failures
+from .options import independent_option, json_option, load_model, method_option, model_argument
+from .screen import print_json, stage
+
+
+@click.command()
+@model_argument
+@click.option(
+    "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
+)
+@method_option
+@independent_option
+@click.option(
+    "--target",
+    type=click.Choice(["c", "cython", "numpy"]),
+    default="cython",
+    show_default=True,
+    help="C library, extension module, or Python that imports NumPy alone.",
+)
+@json_option
+@reports_failures
+def generate(model: Path, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool) -> None:
+    """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
+    from .. import pipeline
+
+    with stage("generate"):
+        folder = pipeline.generate(load_model(model), out, method, target, independent or None)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    if as_json:
+        print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})
+        return
+    click.echo(str(folder))
+    for name in files:
+        click.echo(f"  {name}")

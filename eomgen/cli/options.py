@@ -1,0 +1,97 @@
+"""Stage cli, options: what several verbs accept -> checked values."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from ..describe import Model
+
+model_argument = click.argument("model", metavar="MODEL", type=click.Path(path_type=Path))
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+method_option = click.option(
+    "--method", default="auto", show_default=True, metavar="M", help="Method of derivation: auto, embedding, lagrange."
+)
+
+
+def _split(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
+
+
+independent_option = click.option(
+    "--independent",
+    multiple=True,
+    callback=_split,
+    metavar="NAME",
+    help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
+)
+
+
+def load_model(path: Path) -> Model:
+    """The model of a file.
+
+    Raises
+    ------
+    UsageError
+        There is no such file; the message names what is near.
+    ModelError
+        The file is no model.
+    """
+    if not path.is_file():
+        raise UsageError(_missing(path))
+    from ..describe import load
+
+    return load(path)
+
+
+def _missing(path: Path) -> str:
+    if path.is_dir():
+        return f"{path} is a folder; name a model file in it"
+    from .examples import example_names
+
+    if path.stem in example_names():
+        return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
+    here = path.parent if path.parent.is_dir() else Path()
+    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml")]
+    near = difflib.get_close_matches(path.name, names, 1)
+    return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
+
+
+def parse_settings(settings: tuple[str, ...]) -> dict[str, float]:
+    """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
+
+    Raises
+    ------
+    UsageError
+    """
+    return dict(_parse_setting(word) for word in settings)
+
+
+def _parse_setting(word: str) -> tuple[str, float]:
+    name, equals, text = (part.strip() for part in word.partition("="))
+    if not equals or not name or not text:
+        raise UsageError(f"--set {word}: write name=value, for example --set r=0.12")
+    try:
+        return name, float(text)
+    except ValueError:
+        pass
+    from ..describe.expressions import parse
+    from ..errors import ExpressionError
+    from ..graph.core import Graph
+
+    def resolve(unknown: str) -> Any:
+        raise ExpressionError(f"{unknown!r} is not a number", 1, "numbers and pi are known here", text)
+
+    try:
+        value = parse(text, Graph(), resolve).value
+    except ExpressionError as error:
+        raise UsageError(f"--set {word}: {error.message}; {error.remedy}") from None
+    if value is None:
+        raise UsageError(f"--set {word}: not a number")
+    return name, value

@@ -1,0 +1,197 @@
+"""Building: the source texts of a model -> Artifact, its compiled extension module or C library in the cache."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import ToolchainError, UsageError
+from .cache import Cache, CacheEntry, cache_directory, compute_key
+from .compiler import CompilerInfo, describe_native, find_compiler, run
+from .cython_layer import HEADER, SOURCE, build_layer, describe_interpreter, describe_layer, read_layer
+from .options import Options, compile_flags, link_flags, machine_flags
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Artifact:
+    """A compiled model.
+
+    Attributes
+    ----------
+    path : Path
+        The extension module or shared library.
+    key : str
+        SHA-256 of everything it depends on.
+    directory : Path
+        Its directory in the cache; ``sources/`` in it holds the texts it was made from.
+    seconds : float
+        Time the call took.
+    from_cache : bool
+        Whether it was there already.
+    name : str
+        Name of the model.
+    """
+
+    path: Path
+    key: str
+    directory: Path
+    seconds: float
+    from_cache: bool
+    name: str
+
+
+def compile_sources(
+    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
+) -> Artifact:
+    """Compile a model into an extension module, or find it in the cache.
+
+    Parameters
+    ----------
+    sources : mapping of str to str
+        Texts by file name: the C files and headers, ``eomgen.h`` among them, and perhaps ``_core.pyx``; without it, the
+        layer that comes with eomgen is used.
+    name : str
+        Name of the model.
+    options : Options, optional
+        How to compile.
+    progress : callable, optional
+        Told what is being done, a line at a time; not called when the module is in the cache.
+
+    Raises
+    ------
+    ToolchainError
+        If there is no compiler, no Python.h, the compiler fails, or the cache cannot be used.
+    MissingDependencyError
+        If the layer must be built and Cython is not installed.
+    """
+    start = time.perf_counter()
+    options = options or Options()
+    sources = dict(sources)
+    layer = sources.pop(SOURCE, None) or read_layer()
+    _check(sources, name)
+    if HEADER not in sources:
+        raise UsageError(f"the sources of {name!r} lack {HEADER}; there are {', '.join(sources)}")
+    compiler = find_compiler(options.compiler)
+    flags = _plan(sources, options, compiler, extension=True)
+    parts = {
+        "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
+        "layer": describe_layer(layer, sources[HEADER], compiler),
+    }  # fmt: skip
+    cache, key = Cache(cache_directory()), compute_key(parts)
+    entry = cache.find(key)
+    if entry is not None:
+        return _artifact(entry, start, from_cache=True)
+    layer_object = build_layer(cache, layer, sources[HEADER], compiler, progress).product
+    product = f"_core{describe_interpreter()['suffix']}"
+    entry = _build(cache, key, "extension", name, sources, flags, product, [str(layer_object)], options, compiler, progress)
+    return _artifact(entry, start, from_cache=False)
+
+
+def compile_c_library(
+    sources: Mapping[str, str], name: str, options: Options | None = None, progress: Progress | None = None
+) -> Artifact:
+    """Compile a model into a plain shared library for C programs or ctypes; needs neither Python.h nor Cython.
+
+    Parameters and errors are those of :func:`compile_sources`. Every function that is not static can be called.
+    """
+    start = time.perf_counter()
+    options = options or Options()
+    sources = {file: text for file, text in sources.items() if file != SOURCE}
+    _check(sources, name)
+    compiler = find_compiler(options.compiler)
+    flags = _plan(sources, options, compiler, extension=False)
+    parts = {
+        "kind": "library", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
+        "compiler": [*compiler.command, compiler.version], "platform": describe_interpreter()["platform"],
+    }  # fmt: skip
+    cache, key = Cache(cache_directory()), compute_key(parts)
+    entry = cache.find(key)
+    if entry is not None:
+        return _artifact(entry, start, from_cache=True)
+    product = f"lib{name}.dylib" if sys.platform == "darwin" else f"lib{name}.so"
+    entry = _build(cache, key, "library", name, sources, flags, product, [], options, compiler, progress)
+    return _artifact(entry, start, from_cache=False)
+
+
+def _check(sources: Mapping[str, str], name: str) -> None:
+    """Names become file and module names, so they must be plain."""
+    for file in sources:
+        if not re.fullmatch(r"\w[\w.-]*", file):
+            raise UsageError(f"the source name {file!r} is not a plain file name")
+    if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
+        raise UsageError(f"the model name {name!r} is not a C identifier")
+    if not any(file.endswith(".c") for file in sources):
+        raise UsageError(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
+
+
+def _plan(sources: Mapping[str, str], options: Options, compiler: CompilerInfo, *, extension: bool) -> dict[str, list[str]]:
+    """Flags of every C file, and under "" those of the linker."""
+    flags = {
+        file: compile_flags(options, compiler, len(text), hidden=extension)
+        for file, text in sources.items()
+        if file.endswith(".c")
+    }
+    return {**flags, "": link_flags(options, compiler, extension=extension)}
+
+
+def _native(options: Options, compiler: CompilerInfo) -> str:
+    return describe_native(compiler, tuple(machine_flags(options, compiler))) if options.native else ""
+
+
+def _artifact(entry: CacheEntry, start: float, *, from_cache: bool) -> Artifact:
+    seconds = time.perf_counter() - start
+    return Artifact(entry.product, entry.key, entry.directory, seconds, from_cache, entry.name)
+
+
+def _build(
+    cache: Cache, key: str, kind: str, name: str, sources: Mapping[str, str], flags: Mapping[str, Sequence[str]],
+    product: str, objects: Sequence[str], options: Options, compiler: CompilerInfo, progress: Progress | None,
+) -> CacheEntry:  # fmt: skip
+    """Compile every file, link, publish."""
+    tell: Callable[[str], Any] = progress or (lambda line: None)
+    with cache.attempt(key) as directory:
+        folder = directory / "sources"
+        folder.mkdir(mode=0o700)
+        for file, text in sources.items():
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+        files = [file for file in flags if file]
+        compiled = [f"{file}.o" for file in files]
+
+        def compile_one(file: str) -> None:
+            tell(f"compiling {file}")
+            _command([*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"], directory, folder / file)
+
+        with ThreadPoolExecutor(options.jobs or os.cpu_count()) as pool:
+            try:
+                list(pool.map(compile_one, files))
+            except BaseException:
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
+        tell(f"linking {name}")
+        _command([*compiler.command, *compiled, *objects, "-o", product, *flags[""]], directory, directory / product)
+        for file in compiled:
+            (directory / file).unlink()
+        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags)}
+        return cache.publish(directory, key, kind, name, product, recipe)
+
+
+def _command(command: Sequence[str], directory: Path, source: Path) -> None:
+    result = run(command, directory)
+    if result.returncode != 0:
+        said = (result.stderr + result.stdout).strip()
+        raise ToolchainError(
+            f"compiling {source} failed (exit status {result.returncode}):\n{said}\ncommand, run in {directory}:\n"
+            f"{shlex.join(command)}",
+            shlex.join(command),
+            said,
+        )

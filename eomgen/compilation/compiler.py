@@ -1,0 +1,154 @@
+"""Compiler: environment -> CompilerInfo, the C compiler that builds a model, and the running of its commands."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import ToolchainError
+
+REMEDIES = """\
+Install one of these:
+  Debian, Ubuntu: apt install gcc python3-dev
+  Fedora: dnf install gcc python3-devel
+  macOS: xcode-select --install
+  anywhere, with pip: pip install ziglang
+or set CC to the command of your compiler, or use target="numpy", which needs no compiler and runs slower."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompilerInfo:
+    """A C compiler that has answered.
+
+    Attributes
+    ----------
+    path : str
+        The executable.
+    command : tuple of str
+        Words that start every command line; the first is ``path``.
+    kind : str
+        ``gcc``, ``clang``, ``zig`` or ``other``; it decides which flags are understood.
+    version : str
+        What it says of itself.
+    """
+
+    path: str
+    command: tuple[str, ...]
+    kind: str
+    version: str
+
+
+def find_compiler(command: str | None = None) -> CompilerInfo:
+    """Find the C compiler.
+
+    Tried in this order: `command`, the environment variable CC, the compiler Python was built with, gcc, clang, cc, zig
+    on the path and zig from the package ziglang. The first two are wishes: when one does not work, no other is tried.
+
+    Parameters
+    ----------
+    command : str, optional
+        Command line of a compiler, e.g. ``"clang-18"`` or ``"ccache gcc"``.
+
+    Raises
+    ------
+    ToolchainError
+        If none works; the message lists what was tried and what to install.
+    """
+    return _find(command, os.environ.get("CC", ""), os.environ.get("PATH", ""))
+
+
+@functools.lru_cache(maxsize=16)
+def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
+    wish = command or variable
+    tried = []
+    for words in [tuple(shlex.split(wish))] if wish else _candidates():
+        found = _identify(words, search_path)
+        if isinstance(found, CompilerInfo):
+            return found
+        tried.append(f"{shlex.join(words)}: {found}")
+    origin = "the option compiler" if command else "the environment variable CC"
+    heading = f"The C compiler named by {origin} does not work." if wish else "No C compiler was found."
+    raise ToolchainError(f"{heading} Tried:\n  " + "\n  ".join(tried) + f"\n{REMEDIES}")
+
+
+def _candidates() -> Iterator[tuple[str, ...]]:
+    import sysconfig
+
+    # Only the program: the flags that follow it there were for building Python.
+    yield from ((word,) for word in str(sysconfig.get_config_var("CC") or "").split()[:1])
+    yield from (("gcc",), ("clang",), ("cc",), ("zig", "cc"))
+    import importlib.util
+
+    spec = importlib.util.find_spec("ziglang")
+    if spec is not None and spec.origin is not None:
+        yield str(Path(spec.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")), "cc"
+
+
+def _identify(words: tuple[str, ...], search_path: str) -> CompilerInfo | str:
+    """The compiler behind a command, or why there is none."""
+    path = shutil.which(words[0], path=search_path)
+    if path is None:
+        return "not found"
+    command = (path, *words[1:])
+    try:
+        result = run([*command, "--version"])
+    except OSError as error:
+        return str(error)
+    if result.returncode != 0:
+        return (result.stderr or result.stdout).strip() or f"exit status {result.returncode}"
+    version = result.stdout.strip()
+    if any(Path(word).stem in ("zig", "ziglang") for word in command):
+        kind = "zig"
+    elif "clang" in version:
+        kind = "clang"
+    elif "Free Software Foundation" in version:
+        kind = "gcc"
+    else:
+        kind = "other"
+    return CompilerInfo(path, command, kind, version)
+
+
+@functools.lru_cache(maxsize=16)
+def describe_native(compiler: CompilerInfo, flags: tuple[str, ...]) -> str:
+    """What the compiler knows of this processor: its predefined macros under the flags that say "native"."""
+    result = run([*compiler.command, *flags, "-dM", "-E", "-x", "c", os.devnull])
+    if result.returncode != 0:
+        raise ToolchainError(
+            f"{compiler.path} does not accept {shlex.join(flags)}; use native=False",
+            shlex.join(map(str, result.args)),
+            result.stderr,
+        )
+    return result.stdout
+
+
+def run(command: Sequence[str], directory: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command and collect what it says, in English.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Program and arguments.
+    directory : Path, optional
+        Working directory, also for temporary files, so that a killed compiler leaves nothing elsewhere.
+    """
+    environment = {**os.environ, "LC_ALL": "C"}
+    if directory is not None:
+        environment["TMPDIR"] = str(directory)
+    return subprocess.run(
+        command,
+        cwd=directory,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+    )

@@ -1,0 +1,55 @@
+"""Loading: a compiled extension -> its core module."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import sys
+import threading
+from types import ModuleType
+
+from ..errors import ToolchainError
+from .build import Artifact
+
+_lock = threading.Lock()
+
+
+def load_core(artifact: Artifact) -> ModuleType:
+    """Import a built extension from its file.
+
+    The module is named after the model and the key of the build, so different models, and different builds of one
+    model, live side by side; loading one build again returns the same module.
+
+    Parameters
+    ----------
+    artifact : Artifact
+        From :func:`eomgen.compilation.compile_sources`.
+
+    Returns
+    -------
+    module
+        The core, with ``metadata``, ``names``, ``context``, ``timed``, ``state``, ``motion``, ``address``, ``capsule``.
+
+    Raises
+    ------
+    ToolchainError
+        If the file cannot be loaded.
+    """
+    # The last part of the name decides which initialiser Python looks for in the file.
+    name = f"eomgen_models.{artifact.name}_{artifact.key[:16]}._core"
+    with _lock:
+        if name in sys.modules:
+            return sys.modules[name]
+        loader = importlib.machinery.ExtensionFileLoader(name, str(artifact.path))
+        spec = importlib.util.spec_from_file_location(name, artifact.path, loader=loader)
+        assert spec is not None
+        try:
+            module = importlib.util.module_from_spec(spec)
+            loader.exec_module(module)
+        except ImportError as error:
+            raise ToolchainError(
+                f"the compiled model {artifact.path} cannot be loaded: {error}. If the file has gone, compile again; else "
+                "remove it with `eomgen cache clear` and compile again"
+            ) from error
+        sys.modules[name] = module
+        return module

@@ -1,0 +1,196 @@
+"""What ``Model.derive`` returns: the derived equations, to read, to count and to compile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from .equations import TreeEquations
+from .equations.reduction import reduce_to_independent
+from .graph.core import Expr
+from .graph.count import Operations, count
+from .kinematics import Kinematics
+from .kinematics.mobility import Mobility
+from .kinematics.report import MechanismReport, report
+
+if TYPE_CHECKING:
+    from .runtime.module import Module
+
+READABLE = 400  #: operations up to which equations are shown written out
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The derived equations of motion of a model.
+
+    Attributes
+    ----------
+    method : str
+        How they were derived: ``embedding`` or ``lagrange``.
+    report : MechanismReport
+        Bodies, joints, loops, rank, degrees of freedom, partition.
+    q, v, parameters : tuple of sympy.Symbol
+        Coordinates of the spanning tree, their velocities, and the parameters.
+    mass_matrix, force : sympy.Matrix
+        ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being the
+        accelerations of ``independent``.  Large ones are written with ``intermediates``.
+    operations : dict of str to Operations
+        Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree.
+    """
+
+    kinematics: Kinematics = field(repr=False)
+    mobility: Mobility = field(repr=False)
+    tree: TreeEquations = field(repr=False)
+    seconds: dict[str, float] = field(default_factory=dict, repr=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.kinematics.mechanism.name
+
+    @property
+    def method(self) -> str:
+        """Name of the method of derivation."""
+        return self.tree.method
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent coordinates."""
+        return self.mobility.independent
+
+    @cached_property
+    def report(self) -> MechanismReport:
+        """Bodies, joints, loops, rank, degrees of freedom, partition."""
+        return report(self.kinematics, self.mobility)
+
+    @cached_property
+    def operations(self) -> dict[str, Operations]:
+        """Operations of each part, counted on the graph; work that depends on parameters only is included."""
+        tree, c = self.tree, self.kinematics.constraints
+        lower = [x for i, row in enumerate(tree.mass_matrix) for x in row[: i + 1]]
+        parts: dict[str, Sequence[Expr]] = {
+            "mass_matrix": lower,
+            "bias": tree.bias,
+            "mass_matrix and bias": [*lower, *tree.bias],
+            "inverse_dynamics": tree.inverse_dynamics,
+            "energy": [tree.kinetic_energy, tree.potential_energy],
+        }
+        if c.values:
+            rows = [x for row in c.jacobian for x in row]
+            parts["constraints"] = [*c.values, *rows, *c.gamma]
+        return {name: count(list(part)) for name, part in parts.items()}
+
+    # -- SymPy's side -------------------------------------------------------------------------------------------------
+    def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
+        import sympy
+
+        return tuple(sympy.Symbol(name) for name in names)
+
+    @property
+    def q(self) -> tuple[Any, ...]:
+        """Coordinates of the spanning tree, SymPy symbols."""
+        return self._symbols(self.kinematics.names)
+
+    @property
+    def v(self) -> tuple[Any, ...]:
+        """Velocities of the spanning tree, SymPy symbols."""
+        return self._symbols([n + "_dot" for n in self.kinematics.names])
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """Parameters, SymPy symbols."""
+        return self._symbols(self.kinematics.parameter_names)
+
+    @cached_property
+    def _embedded(self) -> tuple[tuple[tuple[Expr, ...], ...], tuple[Expr, ...]]:
+        m = self.kinematics.mechanism
+        values = {p.name: 1.0 + 0.1 * k if p.value is None else p.value for k, p in enumerate(m.parameters)}
+        values |= {u.name: u.value for u in m.inputs} | {"t": 0.0}
+        return reduce_to_independent(self.kinematics, self.mobility, self.tree, values)
+
+    @cached_property
+    def _raised(self) -> tuple[list[tuple[Any, Any]], Any, Any]:
+        import sympy
+
+        from .graph.sympy_raise import inlined_size, raise_inline, raise_named
+
+        matrix, force = self._embedded
+        flat = [*(x for row in matrix for x in row), *force]
+        if inlined_size(flat) <= READABLE * len(flat):
+            named: list[tuple[Any, Any]] = []
+            raised = raise_inline(flat)
+        else:
+            named, raised = raise_named(flat)
+        n = len(force)
+        return named, sympy.Matrix(n, n, raised[: n * n]), sympy.Matrix(n, 1, raised[n * n :])
+
+    @property
+    def mass_matrix(self) -> Any:
+        """sympy.Matrix (n, n), n the degrees of freedom."""
+        return self._raised[1]
+
+    @property
+    def force(self) -> Any:
+        """sympy.Matrix (n, 1): ``mass_matrix * v' = force``."""
+        return self._raised[2]
+
+    @property
+    def intermediates(self) -> list[tuple[Any, Any]]:
+        """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
+        return self._raised[0]
+
+    # -- on the road ----------------------------------------------------------------------------------------------------
+    def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
+        """Generate code, compile it and load it.
+
+        Parameters
+        ----------
+        target : {'cython', 'numpy'}
+            ``numpy`` needs no compiler and is slower.
+        kernels : names of kernels, optional
+            Only these (see the README's table of calls); all by default.
+        **options
+            Fields of :class:`eomgen.compilation.Options`, such as ``optimize`` or ``native``.
+
+        Returns
+        -------
+        Module
+
+        Raises
+        ------
+        ModelError
+            A parameter has no value, or a coordinate has no inertia behind it.
+        ToolchainError
+            No compiler, or it failed.
+        """
+        from . import pipeline
+
+        return pipeline.compile_equations(self, target=target, kernels=kernels, **options)
+
+    def __str__(self) -> str:
+        lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
+        for name, operations in self.operations.items():
+            lines.append(f"  {name:<22}{operations.total:>7} operations")
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(str(self))}</pre>"
+
+    def _repr_latex_(self) -> str | None:
+        from .graph.sympy_raise import inlined_size
+
+        matrix, force = self._embedded
+        flat = [*(x for row in matrix for x in row), *force]
+        if inlined_size(flat) > READABLE:
+            return None
+        import sympy
+
+        rates = [sympy.Symbol(n + "_ddot") for n in self.independent]
+        left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
+        return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"

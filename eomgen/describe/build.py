@@ -1,0 +1,243 @@
+"""Stage describe, the check: Description (raw) -> Mechanism, or ModelError with every problem at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import ModelError
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from .build_forces import build_forces
+from .build_joints import build_joints, declare_coordinates
+from .build_lagrangian import build_lagrangian, declare_lagrangian
+from .checks import check_bodies, check_connected, check_keys, check_names
+from .description import GROUND_NAME, Description, Entry, Faults, items
+from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import GROUND as GROUND_FIELDS
+from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
+from .names import fault_of_name, nearest
+from .reading import Reader
+from .scope import Namespace
+from .sympy_face import name_of
+
+
+def build(description: Description) -> Mechanism:
+    """Check a description and lower it to one graph.
+
+    Parameters
+    ----------
+    description : Description
+        What the user said.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    ModelError
+        The description has faults; all of them are listed.
+    """
+    faults = Faults(description)
+    names = Namespace(faults)
+    graph = Graph()
+    reader = Reader(graph, names, faults, description)
+    values, sections = description.values, description.sections
+
+    name = values.get("name")
+    fault = ("is missing", "give the model a name") if name is None else fault_of_name(name, symbol=True)
+    if fault:
+        faults.add("name", *fault)
+    parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
+    inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    specs = declare_coordinates(reader, sections["joints"])
+    lagrangian_values = declare_lagrangian(
+        reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
+    )
+
+    bodies = _bodies(reader, sections["bodies"])
+    joints = build_joints(reader, specs)
+    forces = build_forces(reader, sections["forces"], specs)
+    lagrangian = build_lagrangian(reader, lagrangian_values)
+    gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
+    outputs = _outputs(reader, sections["outputs"])
+    initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
+    guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
+    independent = _independent(reader, values.get("independent", ()))
+    simulation = _simulation(reader, values.get("simulation", {}))
+    doc = reader.text("doc", values.get("doc", ""))
+
+    if lagrangian_values is None and not bodies and not faults.under("bodies"):
+        faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
+    check_bodies(bodies, {p.name: p.value for p in parameters if p.value is not None}, faults)
+    if len(joints) == len(sections["joints"]):
+        check_connected(bodies, joints, faults)
+    if faults:
+        raise ModelError(faults.sorted())
+    return Mechanism(
+        name=str(name),
+        graph=graph,
+        parameters=parameters,
+        inputs=inputs,
+        gravity=gravity,
+        bodies=bodies,
+        joints=joints,
+        forces=forces,
+        outputs=outputs,
+        quantities=dict(reader.quantities),
+        initial=initial,
+        guess=guess,
+        independent=independent,
+        simulation=simulation,
+        lagrangian=lagrangian,
+        lines=dict(description.lines),
+        doc=doc,
+    )
+
+
+def _described(reader: Reader, entry: Entry, fields: Fields) -> tuple[str, str]:
+    """Unit and doc of an entry, its keys checked."""
+    check_keys(entry.path, entry.values, fields, reader.faults)
+    unit, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
+    return unit, doc
+
+
+def _parameter(reader: Reader, entry: Entry) -> Parameter:
+    reader.names.declare("parameter", entry.name, entry.path)
+    unit, doc = _described(reader, entry, PARAMETER)
+    given = entry.values.get("value")
+    value = None if given is None else reader.number(f"{entry.path}.value", given)
+    return Parameter(str(entry.name), value, unit, doc)
+
+
+def _input(reader: Reader, entry: Entry) -> Input:
+    reader.names.declare("input", entry.name, entry.path)
+    unit, doc = _described(reader, entry, INPUT)
+    given = entry.values.get("value")
+    value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
+    return Input(str(entry.name), value or 0.0, unit, doc)
+
+
+def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
+    """Bodies, with all markers taken in before anything refers to them."""
+    faults, graph = reader.faults, reader.graph
+    ground = [entry for entry in entries if entry.name == GROUND_NAME]
+    usable = check_names([entry for entry in entries if entry.name != GROUND_NAME], "body", faults)
+    for k, entry in enumerate(usable):
+        reader.bodies[entry.name] = k
+    for entry in usable + ground:
+        if not faults.under(entry.path):
+            check_keys(entry.path, entry.values, GROUND_FIELDS if entry.name == GROUND_NAME else BODY, faults)
+    origin = Frame(reader.identity, vec.zero(graph))
+    for name, index in reader.bodies.items():
+        reader.markers[name] = Marker(index, origin, name)
+    for entry in usable + ground:
+        index = GROUND if entry.name == GROUND_NAME else reader.bodies[entry.name]
+        for marker in check_names(_marker_entries(reader, entry), "marker", faults):
+            label = f"{entry.name}.{marker.name}"
+            reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
+    return tuple(_body(reader, entry) for entry in usable)
+
+
+def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
+    """Markers of a body: a mapping from a file, a list of (name, placement) from Python."""
+    path = f"{entry.path}.markers"
+    given: Any = entry.values.get("markers", ())
+    if isinstance(given, Mapping):
+        given = list(given.items())
+    if not isinstance(given, list | tuple):
+        reader.wrong(path, given, "markers")
+        return []
+    return [Entry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+
+
+def _body(reader: Reader, entry: Entry) -> Body:
+    graph, path, values = reader.graph, entry.path, entry.values
+    o = vec.zero(graph)
+    mass = reader.expression(f"{path}.mass", values["mass"]) if "mass" in values else graph.zero
+    com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o
+    inertia = reader.inertia(f"{path}.inertia", values["inertia"]) if "inertia" in values else (o, o, o)
+    return Body(entry.name, mass, com, inertia)
+
+
+def _outputs(reader: Reader, entries: list[Entry]) -> tuple[Output, ...]:
+    made = [_output(reader, entry) for entry in entries]
+    seen: set[str] = set()
+    for entry, output in zip(entries, made, strict=True):
+        if output.name in seen:
+            reader.faults.add(entry.path, "the name is given to two outputs", "rename one")
+        seen.add(output.name)
+    return tuple(made)
+
+
+def _output(reader: Reader, entry: Entry) -> Output:
+    faults, path = reader.faults, entry.path
+    unit, doc = _described(reader, entry, OUTPUT_FIELDS)
+    expression: Expr = reader.stand_in
+    if "expression" in entry.values:
+        expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
+    kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
+    if kind in ("coordinate", "velocity", "acceleration"):
+        if expression != reader.graph.symbol(entry.name):
+            faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
+    elif kind != "output":
+        reader.names.declare("output", entry.name, path)
+    return Output(str(entry.name), expression, unit, doc)
+
+
+def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
+    """Values by coordinate (or rate): expressions in parameters."""
+    if not isinstance(given, Mapping):
+        reader.wrong(section, given, "table")
+        return {}
+    known = list(reader.names.of(*kinds))
+    result: dict[str, Expr] = {}
+    for key, value in given.items():
+        name = name_of(key)
+        path = f"{section}.{name}"
+        if name in known:
+            result[name] = reader.expression(path, value)
+        else:
+            remedy = nearest(str(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
+            reader.faults.add(path, f"no {' or '.join(kinds)} {name!r}", remedy)
+    return result
+
+
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities"}
+
+
+def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong("independent", given, "names")
+        return ()
+    known = list(reader.names.of("coordinate"))
+    result: list[str] = []
+    for k, item in enumerate(listed):
+        name = name_of(item)
+        if name not in known:
+            reader.faults.add(f"independent[{k}]", f"no coordinate {name!r}", nearest(str(name), known, "coordinates"))
+        elif name in result:
+            reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
+        else:
+            result.append(name)
+    return tuple(result)
+
+
+def _simulation(reader: Reader, given: Any) -> Simulation:
+    if not isinstance(given, Mapping):
+        reader.wrong("simulation", given, "table")
+        return Simulation()
+    check_keys("simulation", given, SIMULATION, reader.faults)
+    settings: dict[str, Any] = {}
+    for key, field in SIMULATION.items():
+        if key not in given:
+            continue
+        path = f"simulation.{key}"
+        if field.kind == "choice":
+            settings[key] = reader.choice(path, given[key], field)
+        else:
+            settings[key] = reader.number(path, given[key], positive=True)
+    return Simulation(**settings)

@@ -1,0 +1,130 @@
+"""Stage describe, joints: entries of the joints section -> coordinate names in the namespace, then JointSpecs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.vectors import Mat3
+from ..joints import JOINTS, Joint
+from .checks import check_names, unknown_key
+from .description import Entry, items
+from .fields import JOINT, JOINT_OPTIONS, KINDS, Field, joint_fields
+from .mechanism import JointSpec
+from .names import nearest
+from .placement import TURNS, turn_matrix
+from .reading import Reader
+from .sympy_face import name_of
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A joint whose type and coordinates are known, before its markers are looked up."""
+
+    entry: Entry
+    joint: Joint
+    coordinates: tuple[str, ...]
+    named: bool
+
+
+def coordinate_names(type_name: str, name: str, values: dict[str, Any]) -> tuple[tuple[Any, ...], bool]:
+    """Names of a joint's coordinates as given or by default, and whether they were given."""
+    if "coordinate" in values:
+        return (name_of(values["coordinate"]),), True
+    if "coordinates" in values:
+        given = values["coordinates"]
+        listed = [given] if isinstance(given, str) else items(given)
+        return tuple(name_of(x) for x in listed or ()), True
+    return tuple(name + c.suffix for c in JOINTS[type_name].coordinates), False
+
+
+def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
+    """Check types, keys and coordinates of all joints and take the coordinates into the namespace."""
+    result = []
+    for entry in check_names(entries, "joint", reader.faults):
+        type_name = _type(reader, entry)
+        if type_name is None:  # its coordinates are known all the same, so that their users are not at fault too
+            for key in ("coordinate", "coordinates"):
+                if key in entry.values:
+                    for name in coordinate_names("", entry.name, {key: entry.values[key]})[0]:
+                        reader.names.declare("coordinate", name, f"{entry.path}.{key}")
+            continue
+        joint = _joint(reader, entry, type_name)
+        names, named = coordinate_names(type_name, entry.name, entry.values)
+        count = len(joint.coordinates)
+        path = entry.path
+        if named:
+            path += ".coordinate" if "coordinate" in entry.values else ".coordinates"
+        if len(names) != count:
+            remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
+            plural = "" if len(names) == 1 else "s"
+            reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy)
+        for name in names:
+            reader.names.declare("coordinate", name, path)
+        if len(names) == count:
+            result.append(Declared(entry, joint, tuple(str(n) for n in names), named))
+    return result
+
+
+def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, ...]:
+    """Look up the markers of joints and turn them so that the axis is their z; joints with faults are left out."""
+    result = []
+    for joint in declared:
+        path, values = joint.entry.path, joint.entry.values
+        pair = reader.pair(f"{path}.between", values["between"]) if "between" in values else None
+        columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
+        if pair is None:
+            continue
+        if pair[0].body == pair[1].body:
+            reader.faults.add(
+                f"{path}.between",
+                f"{pair[0].label} and {pair[1].label} are on the same body",
+                "a joint connects two bodies, or a body and ground",
+            )
+            continue
+        if columns != TURNS["z"]:
+            turn = turn_matrix(reader.graph, columns)
+            pair = (_turned(pair[0], turn), _turned(pair[1], turn))
+        result.append(JointSpec(joint.entry.name, joint.joint, *pair, joint.coordinates, joint.named))
+    return tuple(result)
+
+
+def _turned(marker: Marker, turn: Mat3) -> Marker:
+    return Marker(marker.body, Frame(vec.product(marker.frame.rotation, turn), marker.frame.position), marker.label)
+
+
+def _type(reader: Reader, entry: Entry) -> str | None:
+    path, given = f"{entry.path}.type", entry.values.get("type")
+    if reader.faults.under(entry.path):
+        return None
+    if isinstance(given, str) and given in JOINTS:
+        return given
+    if given is None:
+        reader.faults.add(path, "is missing", f"give one of {', '.join(JOINTS)}")
+    else:
+        reader.faults.add(path, f"no joint of type {given!r}", nearest(str(given), JOINTS, "types"))
+    return None
+
+
+def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
+    """The joint itself, with its options; keys are checked."""
+    fields = joint_fields(type_name)
+    for key in entry.values:
+        if key not in fields:
+            elsewhere = key in JOINT or key in JOINT_OPTIONS or key in ("axis", "coordinate", "coordinates")
+            message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
+            reader.faults.add(f"{entry.path}.{key}", message, unknown_key(key, fields))
+    if "between" not in entry.values:
+        reader.faults.add(f"{entry.path}.between", "is missing", f"give {KINDS['pair']}")
+    kind = JOINTS[type_name]
+    options = {}
+    for option in kind.options:
+        if option in entry.values:
+            options[option] = _option(reader, f"{entry.path}.{option}", entry.values[option], fields[option])
+    return kind(**options)
+
+
+def _option(reader: Reader, path: str, value: Any, field: Field) -> str:
+    return reader.choice(path, value, field) if field.kind == "choice" else reader.text(path, value)

@@ -1,0 +1,84 @@
+"""Stage describe, a bare Lagrangian: the lagrangian section -> Lagrangian on the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..graph.core import Expr
+from .checks import check_keys
+from .description import items
+from .fields import LAGRANGIAN, MOTION
+from .mechanism import Lagrangian
+from .names import nearest
+from .reading import Reader
+from .sympy_face import name_of
+
+
+def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str, Any] | None:
+    """Check the section and take its coordinates into the namespace; None if there is no section."""
+    faults = reader.faults
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        reader.wrong("lagrangian", given, "table")
+        return {}
+    if has_bodies:
+        faults.add("lagrangian", "the model has bodies or joints too", "describe either bodies or a Lagrangian")
+    check_keys("lagrangian", given, LAGRANGIAN, faults)
+    values = dict(given)
+    listed = items(values.get("coordinates", ()))
+    if listed is None:
+        reader.wrong("lagrangian.coordinates", given["coordinates"], "names")
+        listed = []
+    elif not listed and "coordinates" in given:
+        faults.add("lagrangian.coordinates", "there are no coordinates", "name at least one")
+    values["coordinates"] = [name_of(q) for q in listed]
+    for k, name in enumerate(values["coordinates"]):
+        reader.names.declare("coordinate", name, f"lagrangian.coordinates[{k}]")
+    return values
+
+
+def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangian | None:
+    """The Lagrangian of a checked section."""
+    if values is None:
+        return None
+    path = "lagrangian"
+    names = [str(q) for q in values.get("coordinates", ())]
+    zero = reader.graph.zero
+    expression = (
+        reader.expression(f"{path}.expression", values["expression"], MOTION) if "expression" in values else zero
+    )
+    dissipation = reader.expression(f"{path}.dissipation", values.get("dissipation", 0), MOTION)
+    constraints = items(values.get("constraints", ()))
+    if constraints is None:
+        reader.wrong(f"{path}.constraints", values["constraints"], "expressions")
+        constraints = []
+    return Lagrangian(
+        tuple(names),
+        expression,
+        _forces(reader, f"{path}.forces", values.get("forces", ()), names),
+        dissipation,
+        tuple(reader.expression(f"{path}.constraints[{k}]", c, MOTION) for k, c in enumerate(constraints)),
+    )
+
+
+def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Expr, ...]:
+    """One generalized force for each coordinate; those not given are 0."""
+    result = dict.fromkeys(names, reader.graph.zero)
+    if isinstance(given, Mapping):
+        for key, value in given.items():
+            name = name_of(key)
+            if name not in result:
+                reader.faults.add(f"{path}.{name}", f"no coordinate {name!r}", nearest(str(name), names, "coordinates"))
+            else:
+                result[name] = reader.expression(f"{path}.{name}", value, MOTION)
+        return tuple(result.values())
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, "forces")
+    elif listed and len(listed) != len(names):
+        reader.faults.add(path, f"{len(listed)} forces for {len(names)} coordinates", "give one for each, in order")
+    elif listed:
+        return tuple(reader.expression(f"{path}[{k}]", value, MOTION) for k, value in enumerate(listed))
+    return tuple(result.values())

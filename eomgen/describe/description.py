@@ -1,0 +1,136 @@
+"""Stage describe, raw data: what Python calls and model files both fill, in the layout of the model file.
+
+A :class:`Description` is plain data: sections of named entries whose values are numbers, texts, sequences, mappings or
+SymPy expressions as the user gave them.  Nothing is looked up or judged here; :mod:`~eomgen.describe.build` does that.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import Problem
+
+GROUND_NAME = "ground"
+
+#: Sections made of named entries, in the order of a model file.
+SECTIONS = ("parameters", "inputs", "bodies", "joints", "forces", "outputs")
+
+Values = dict[str, Any]
+
+
+@dataclass
+class Entry:
+    """One named thing of a section; ``path`` is its dotted place."""
+
+    name: Any
+    values: Values
+    path: str
+
+
+@dataclass
+class Description:
+    """Everything said about a model so far, and where.
+
+    Attributes
+    ----------
+    values : dict
+        What stands outside the sections: name, doc, gravity, independent, initial,
+        guess, simulation, lagrangian.
+    sections : dict of list of Entry
+        One list for each of :data:`SECTIONS`, in the order of the description; names may still repeat.
+    motions : dict
+        Label of an unnamed marker whose motion was asked for -> its reference (a mapping of body, at, rpy).
+    lines : dict
+        Dotted path -> (file, line), filled when the model comes from a file.
+    problems : list of Problem
+        Faults found while the description was made.
+    """
+
+    values: Values = field(default_factory=dict)
+    sections: dict[str, list[Entry]] = field(default_factory=lambda: {name: [] for name in SECTIONS})
+    motions: dict[str, Values] = field(default_factory=dict)
+    lines: dict[str, tuple[str, int]] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+    def add(self, section: str, name: Any, values: Values) -> Entry:
+        """Append an entry to a section."""
+        entry = Entry(name, values, f"{section}.{name}")
+        self.sections[section].append(entry)
+        return entry
+
+
+def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]:
+    """File and line of a dotted path, or of the nearest enclosing one; ``("", 0)`` if there is none."""
+    while True:
+        found = lines.get(path)
+        if found is not None:
+            return found
+        if not path:
+            return ("", 0)
+        shorter = re.sub(r"(\.[^.\[]*|\[\d+\])\Z", "", path)
+        path = shorter if shorter != path else ""
+
+
+class Faults:
+    """Collects the problems of one description, with the file and line of each."""
+
+    def __init__(self, description: Description) -> None:
+        self.lines = description.lines
+        self.problems = list(description.problems)
+
+    def add(self, path: str, message: str, remedy: str = "") -> None:
+        """Note a fault at a dotted path."""
+        file, line = place_of(path, self.lines)
+        problem = Problem(path, message, remedy, file, line)
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def __len__(self) -> int:
+        return len(self.problems)
+
+    def under(self, path: str) -> bool:
+        """Whether a fault was noted at a path or inside it."""
+        return any(p.path == path or p.path.startswith((path + ".", path + "[")) for p in self.problems)
+
+    def sorted(self) -> list[Problem]:
+        """All problems; those of a file in the order of its lines."""
+        return sorted(self.problems, key=lambda p: (p.file, p.line))
+
+
+def items(value: Any) -> list[Any] | None:
+    """The items of a list, tuple, array or SymPy matrix (a column counts as a plain list); None for anything else."""
+    if isinstance(value, list | tuple):
+        return list(value)
+    if isinstance(value, str | bytes | Mapping) or not hasattr(value, "tolist"):
+        return None
+    listed = value.tolist()
+    if not isinstance(listed, list):
+        return None
+    if listed and all(isinstance(x, list) and len(x) == 1 for x in listed):
+        return [x[0] for x in listed]
+    return listed
+
+
+def text_of(value: Any) -> str:
+    """A value as it is shown in labels: numbers short, expressions as written."""
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    listed = items(value)
+    if listed is not None:
+        return "(" + ", ".join(text_of(x) for x in listed) + ")"
+    return str(value)
+
+
+def label_of(reference: Mapping[str, Any]) -> str:
+    """The label of an unnamed marker, e.g. ``crank.at(r, 0, 0)``."""
+    at = reference.get("at", (0, 0, 0))
+    text = text_of(at)
+    if not text.startswith("("):
+        text = f"({text})"
+    turn = items(reference.get("rpy"))
+    if turn is not None and any(not (isinstance(x, int | float) and x == 0) for x in turn):
+        text = f"{text[:-1]}, rpy={text_of(turn)})"
+    return f"{reference.get('body')}.at{text}"

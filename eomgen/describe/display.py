@@ -1,0 +1,52 @@
+"""Stage describe, display: Description -> a short HTML table for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from typing import Any
+
+from .description import Description, Entry, items, label_of, text_of
+
+
+def reference_text(value: Any) -> str:
+    """A body, marker or joint as it is shown."""
+    if isinstance(value, Mapping):
+        return label_of(value)
+    listed = items(value)
+    return text_of(value) if listed is None else " to ".join(reference_text(x) for x in listed)
+
+
+def _summary(entry: Entry) -> str:
+    parts = []
+    for key, value in entry.values.items():
+        if key == "markers":
+            names = list(value) if isinstance(value, Mapping) else [name for name, _ in value]
+            parts.append("markers " + ", ".join(map(str, names)))
+        elif key in ("type", "value", "expression"):
+            parts.append(text_of(value))
+        elif key in ("between", "marker", "body", "joint"):
+            parts.append(reference_text(value))
+        elif isinstance(value, Mapping):
+            parts.append(f"{key} " + ", ".join(f"{k} {text_of(v)}" for k, v in value.items()))
+        elif value not in ("", "z") and text_of(value) != "(0, 0, 0)":
+            parts.append(f"{key} {text_of(value)}")
+    return "; ".join(parts)
+
+
+def model_html(description: Description) -> str:
+    """The model as an HTML table, one row an entry."""
+    name = str(description.values.get("name", ""))
+    rows = [f"<tr><th colspan='3' style='text-align:left'>Model {escape(name)}</th></tr>"]
+    lagrangian = description.values.get("lagrangian")
+    if isinstance(lagrangian, Mapping):
+        text = text_of(lagrangian.get("expression"))
+        rows.append(f"<tr><td>Lagrangian</td><td></td><td>{escape(text)}</td></tr>")
+    for section, entries in description.sections.items():
+        for k, entry in enumerate(entries):
+            first = section if k == 0 else ""
+            rows.append(
+                f"<tr><td>{first}</td><td>{escape(str(entry.name))}</td>"
+                f"<td style='text-align:left'>{escape(_summary(entry))}</td></tr>"
+            )
+    return f"<table>{''.join(rows)}</table>"

@@ -1,0 +1,264 @@
+"""Stage describe, expressions: text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
+
+Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
+:data:`~eomgen.describe.names.FUNCTIONS` and, where markers can be resolved (in outputs), ``x y z vx vy vz ax ay az`` of
+a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.  Length, depth, size, numbers and exponents
+are bounded, so hostile text costs no more than honest text.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections.abc import Callable
+
+from ..errors import ExpressionError
+from ..graph.core import Expr, Graph
+from .names import FUNCTIONS, QUANTITIES, nearest
+
+LENGTH = 4000  #: characters of one expression
+DEPTH = 60  #: nesting
+NODES = 2000  #: names, numbers and operations
+EXPONENT = 1000.0  #: size of a numeric exponent
+
+ALLOWED = (
+    "allowed are numbers, names, + - * / **, comparisons, and, or, not, 'a if c else b' and the functions "
+    + " ".join(FUNCTIONS)
+)
+
+#: A name -> its expression; may raise :class:`ExpressionError` or note the fault and return a placeholder.
+Resolve = Callable[[str], Expr]
+#: A quantity (``vx``) and a marker (``rod.tip``) -> its expression.
+Locate = Callable[[str, str], Expr]
+
+_FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
+_HINTS = {
+    "^": "write ** for powers",
+    "%": "there is no remainder",
+    "'": "text has no place in an expression",
+    '"': "text has no place in an expression",
+    "[": "subscripts and lists have no place in an expression",
+    "{": "braces have no place in an expression",
+    ":": "neither ':=', lambda nor slices have a place in an expression",
+    "&": "write 'and'",
+    "|": "write 'or'",
+}
+_BINARY = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.Pow: "pow"}
+_COMPARISONS: dict[type[ast.cmpop], tuple[str, bool, bool]] = {  # operation, operands exchanged, negated
+    ast.Lt: ("lt", False, False),
+    ast.LtE: ("le", False, False),
+    ast.Gt: ("lt", True, False),
+    ast.GtE: ("le", True, False),
+    ast.Eq: ("eq", False, False),
+    ast.NotEq: ("eq", False, True),
+}
+_REFUSED: dict[type[ast.AST], str] = {
+    ast.Attribute: "a dot is for markers inside x(...), vx(...) and the like, in outputs",
+    ast.Tuple: "one expression is expected, not several",
+    ast.Starred: "'*' cannot stand before a name",
+    ast.Await: "'await' has no place in an expression",
+    ast.Yield: "'yield' has no place in an expression",
+    ast.YieldFrom: "'yield' has no place in an expression",
+    ast.GeneratorExp: "loops have no place in an expression",
+    ast.Lambda: "'lambda' has no place in an expression",
+}
+
+
+def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
+    """The graph expression of a text.
+
+    Parameters
+    ----------
+    text : str
+        An expression as in a model file, e.g. ``"m_r*l**2/12"``.
+    graph : Graph
+        Where its nodes are made.
+    resolve : callable
+        Gives the expression of a name.
+    locate : callable, optional
+        Gives the expression of a marker's motion; without it such calls are refused.
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    ExpressionError
+        The text is not an allowed expression; the error says what, in which column, and what is allowed.
+    """
+    if len(text) > LENGTH:
+        raise ExpressionError(f"an expression of {len(text)} characters is too long", 1, f"at most {LENGTH}", text)
+    if not text.strip():
+        raise ExpressionError("the expression is empty", 1, ALLOWED, text)
+    foreign = _FOREIGN.search(text)
+    if foreign:
+        mark = foreign.group()
+        raise ExpressionError(
+            f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, ALLOWED), text
+        )
+    line = re.sub(r"\s", " ", text)
+    start = len(line) - len(line.lstrip())
+    try:
+        body = ast.parse(line[start:]).body
+    except SyntaxError as error:
+        column = (error.offset or 1) + start
+        raise ExpressionError(f"not a valid expression ({error.msg})", column, ALLOWED, text) from None
+    except (ValueError, MemoryError, RecursionError):
+        raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
+    if len(body) != 1 or not isinstance(body[0], ast.Expr):
+        raise ExpressionError("a statement, not an expression", start + 1, ALLOWED, text)
+    return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
+
+
+class _Walker:
+    """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
+
+    def __init__(self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None) -> None:
+        self.text, self.start, self.graph = text, start, graph
+        self.resolve, self.locate = resolve, locate
+        self.size = 0
+
+    def fault(self, node: ast.AST, message: str, remedy: str = ALLOWED) -> ExpressionError:
+        return ExpressionError(message, getattr(node, "col_offset", 0) + self.start + 1, remedy, self.text)
+
+    def walk(self, node: ast.expr, depth: int) -> Expr:
+        self.size += 1
+        if self.size > NODES:
+            raise self.fault(node, "the expression is too large", f"at most {NODES} names, numbers and operations")
+        if depth > DEPTH:
+            raise self.fault(node, "nested too deeply", f"at most {DEPTH} levels")
+        if isinstance(node, ast.Constant):
+            return self.number(node)
+        if isinstance(node, ast.Name):
+            return self.name(node)
+        if isinstance(node, ast.BinOp):
+            return self.binary(node, depth)
+        if isinstance(node, ast.UnaryOp):
+            return self.unary(node, depth)
+        if isinstance(node, ast.Call):
+            return self.call(node, depth)
+        if isinstance(node, ast.Compare):
+            return self.compare(node, depth)
+        if isinstance(node, ast.BoolOp):
+            operation = "and" if isinstance(node.op, ast.And) else "or"
+            return self.fold(node, operation, [self.walk(value, depth + 1) for value in node.values])
+        if isinstance(node, ast.IfExp):
+            parts = [self.walk(part, depth + 1) for part in (node.test, node.body, node.orelse)]
+            return self.apply(node, "select", *parts)
+        raise self.fault(node, _REFUSED.get(type(node), f"{type(node).__name__} has no place in an expression"))
+
+    def number(self, node: ast.Constant) -> Expr:
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fault(node, f"{value!r} is not a number", "write 1 or 0 for true or false; " + ALLOWED)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise self.fault(node, "the number is too large", "numbers go up to 1.7e308")
+        return self.graph.constant(number)
+
+    def name(self, node: ast.Name) -> Expr:
+        if node.id == "pi":
+            return self.graph.constant(math.pi)
+        if node.id in FUNCTIONS:
+            raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
+        try:
+            return self.resolve(node.id)
+        except ExpressionError as error:
+            raise self.fault(node, error.message, error.remedy) from None
+
+    def binary(self, node: ast.BinOp, depth: int) -> Expr:
+        chain = [node]  # a long sum leans to the left; walking its spine keeps that from counting as depth
+        while isinstance(chain[-1].left, ast.BinOp):
+            chain.append(chain[-1].left)
+        value = self.walk(chain[-1].left, depth + 1)
+        for link in reversed(chain):
+            operation = _BINARY.get(type(link.op))
+            if operation is None:
+                raise self.fault(link, f"the operator {type(link.op).__name__} has no place in an expression")
+            self.size += 1
+            value = self.apply(link, operation, value, self.walk(link.right, depth + 1))
+        return value
+
+    def unary(self, node: ast.UnaryOp, depth: int) -> Expr:
+        if isinstance(node.op, ast.Invert):
+            raise self.fault(node, "the operator '~' has no place in an expression", "write 'not'")
+        value = self.walk(node.operand, depth + 1)
+        if isinstance(node.op, ast.USub):
+            return -value
+        return value if isinstance(node.op, ast.UAdd) else self.apply(node, "not", value)
+
+    def compare(self, node: ast.Compare, depth: int) -> Expr:
+        values = [self.walk(value, depth + 1) for value in (node.left, *node.comparators)]
+        results = []
+        for operator, a, b in zip(node.ops, values, values[1:], strict=False):
+            if type(operator) not in _COMPARISONS:
+                raise self.fault(node, "'is' and 'in' have no place in an expression", "compare with < <= > >= == !=")
+            operation, exchanged, negated = _COMPARISONS[type(operator)]
+            result = self.apply(node, operation, *((b, a) if exchanged else (a, b)))
+            results.append(self.apply(node, "not", result) if negated else result)
+        return self.fold(node, "and", results)
+
+    def call(self, node: ast.Call, depth: int) -> Expr:
+        if not isinstance(node.func, ast.Name):
+            raise self.fault(node, "only the listed functions can be called")
+        name = node.func.id
+        if node.keywords:
+            raise self.fault(node, f"{name}() takes no keywords")
+        if name in QUANTITIES and name not in FUNCTIONS:
+            return self.quantity(node, name)
+        if name not in FUNCTIONS:
+            remedy = nearest(name, [*FUNCTIONS, *(QUANTITIES if self.locate else ())], "functions")
+            raise self.fault(node, f"unknown function {name!r}", remedy)
+        least, most = FUNCTIONS[name]
+        if not least <= len(node.args) <= most:
+            number = f"{least}" if least == most else f"{least} or more"
+            plural = "" if number == "1" else "s"
+            raise self.fault(node, f"{name}() takes {number} argument{plural}, not {len(node.args)}", "")
+        arguments = [self.walk(argument, depth + 1) for argument in node.args]
+        if name in ("min", "max"):
+            return self.fold(node, name, arguments)
+        if name == "heaviside":  # 0, 1/2 at 0, 1
+            return 0.5 * (1.0 + self.apply(node, "sign", *arguments))
+        return self.apply(node, "select" if name == "where" else name, *arguments)
+
+    def quantity(self, node: ast.Call, name: str) -> Expr:
+        if self.locate is None:
+            raise self.fault(node, f"{name}(...) of a marker cannot be used here", "it is known in outputs only")
+        argument = node.args[0] if len(node.args) == 1 else None
+        if isinstance(argument, ast.Name):
+            marker = argument.id
+        elif isinstance(argument, ast.Attribute) and isinstance(argument.value, ast.Name):
+            marker = f"{argument.value.id}.{argument.attr}"
+        else:
+            raise self.fault(node, f"{name}() takes one marker", f"write {name}(body) or {name}(body.marker)")
+        try:
+            return self.locate(name, marker)
+        except ExpressionError as error:
+            raise self.fault(argument, error.message, error.remedy) from None
+
+    def fold(self, node: ast.expr, operation: str, values: list[Expr]) -> Expr:
+        result = values[0]
+        for value in values[1:]:
+            result = self.apply(node, operation, result, value)
+        return result
+
+    def apply(self, node: ast.expr, operation: str, *operands: Expr) -> Expr:
+        """One node; constants must fold to a finite number, so a fault shows here and not at run time."""
+        if operation == "pow":
+            exponent = operands[1].value
+            if exponent is not None and abs(exponent) > EXPONENT:
+                raise self.fault(node, f"the exponent {exponent:g} is too large", f"at most {EXPONENT:g}")
+        if operation == "div" and operands[1].is_zero:
+            raise self.fault(node, "division by zero", "")
+        try:
+            result = self.graph.apply(operation, *operands)
+        except OverflowError:
+            result = None
+        if result is None or (result.value is None and all(x.value is not None for x in operands)):
+            raise self.fault(node, "the value is not a finite real number", "")
+        return result

@@ -1,0 +1,190 @@
+"""Stage describe, handles: what Model's methods give back -> references by name, and SymPy symbols on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UsageError
+from ..joints import JOINTS
+from .build_joints import coordinate_names
+from .description import GROUND_NAME, Entry, label_of
+from .scope import RATES
+from .sympy_face import symbol
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Triple = tuple[Any, Any, Any]
+
+
+class MarkerHandle:
+    """A frame fixed in a body; joints and forces attach to it, outputs read its motion.
+
+    Attributes
+    ----------
+    model : Model
+        The model it belongs to.
+    reference : str or dict
+        How the model file would refer to it: ``rod.tip`` or a mapping of body, at, rpy.
+    label : str
+        How messages and symbols call it, e.g. ``rod.tip`` or ``crank.at(r, 0, 0)``.
+    """
+
+    def __init__(self, model: Model, reference: Any) -> None:
+        self.model, self.reference = model, reference
+        self.label: str = reference if isinstance(reference, str) else label_of(reference)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.label}>"
+
+    @property
+    def position(self) -> Triple:
+        """Position of the origin in ground axes (m), as SymPy symbols for use in outputs."""
+        return self._motion("")
+
+    @property
+    def velocity(self) -> Triple:
+        """Velocity of the origin in ground axes (m/s), as SymPy symbols for use in outputs."""
+        return self._motion("v")
+
+    @property
+    def acceleration(self) -> Triple:
+        """Acceleration of the origin in ground axes (m/s^2), as SymPy symbols for use in outputs."""
+        return self._motion("a")
+
+    def _motion(self, prefix: str) -> Triple:
+        if not isinstance(self.reference, str):
+            self.model.description.motions[self.label] = self.reference
+        x, y, z = (symbol(f"{prefix}{axis}({self.label})") for axis in "xyz")
+        return (x, y, z)
+
+
+class BodyHandle(MarkerHandle):
+    """A body, or ground; used as a marker it stands for the frame at its origin."""
+
+    def __init__(self, model: Model, name: str, entry: Entry | None) -> None:
+        super().__init__(model, name)
+        self.name = name
+        self._entry = entry
+
+    def at(self, x: Any = 0, y: Any = 0, z: Any = 0, *, rpy: Sequence[Any] = (0, 0, 0)) -> MarkerHandle:
+        """An unnamed marker.
+
+        Parameters
+        ----------
+        x, y, z : number, str or SymPy expression
+            Position in body axes (m).
+        rpy : sequence of three, optional
+            Fixed-axis roll, pitch, yaw (rad).
+
+        Returns
+        -------
+        MarkerHandle
+        """
+        reference: dict[str, Any] = {"body": self.name, "at": (x, y, z)}
+        if tuple(rpy) != (0, 0, 0):
+            reference["rpy"] = tuple(rpy)
+        return MarkerHandle(self.model, reference)
+
+    def marker(self, name: str, at: Sequence[Any] = (0, 0, 0), rpy: Sequence[Any] = (0, 0, 0)) -> MarkerHandle:
+        """A named marker, known as ``body.name`` everywhere.
+
+        Parameters
+        ----------
+        name : str
+            Identifier, unique in the body.
+        at : sequence of three
+            Position in body axes (m).
+        rpy : sequence of three, optional
+            Fixed-axis roll, pitch, yaw (rad).
+
+        Returns
+        -------
+        MarkerHandle
+        """
+        if self._entry is None:
+            self._entry = self.model.description.add("bodies", GROUND_NAME, {})
+        placed: dict[str, Any] = {"at": at}
+        if not isinstance(rpy, tuple | list) or tuple(rpy) != (0, 0, 0):
+            placed["rpy"] = rpy
+        markers = self._entry.values.get("markers", [])
+        listed = list(markers.items()) if isinstance(markers, dict) else list(markers)
+        self._entry.values["markers"] = [*listed, (name, placed)]
+        return MarkerHandle(self.model, f"{self.name}.{name}")
+
+
+class JointHandle:
+    """A joint; its coordinates are SymPy symbols for use in forces and outputs.
+
+    Attributes
+    ----------
+    model : Model
+        The model it belongs to.
+    name : str
+        Name of the joint.
+    """
+
+    def __init__(self, model: Model, entry: Entry) -> None:
+        self.model, self.name, self._entry = model, entry.name, entry
+
+    def __repr__(self) -> str:
+        return f"<JointHandle {self.name}: {self._entry.values.get('type')}>"
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names of the coordinates, in order."""
+        type_name = self._entry.values.get("type")
+        if type_name not in JOINTS:
+            raise UsageError(f"joints.{self.name}.type: no joint of type {type_name!r}; types: {', '.join(JOINTS)}")
+        return coordinate_names(type_name, self.name, self._entry.values)[0]
+
+    @property
+    def coordinates(self) -> tuple[Any, ...]:
+        """All coordinates as SymPy symbols."""
+        return tuple(symbol(name) for name in self.coordinate_names)
+
+    @property
+    def velocities(self) -> tuple[Any, ...]:
+        """Rates of all coordinates as SymPy symbols."""
+        return tuple(symbol(name + RATES[1]) for name in self.coordinate_names)
+
+    @property
+    def coordinate(self) -> Any:
+        """The coordinate of a joint of one degree, as a SymPy symbol."""
+        return symbol(self._only())
+
+    @property
+    def velocity(self) -> Any:
+        """The rate of the coordinate of a joint of one degree, as a SymPy symbol."""
+        return symbol(self._only() + RATES[1])
+
+    @property
+    def acceleration(self) -> Any:
+        """The second derivative of the coordinate of a joint of one degree, as a SymPy symbol (for outputs)."""
+        return symbol(self._only() + RATES[2])
+
+    def _only(self) -> str:
+        names = self.coordinate_names
+        if len(names) != 1:
+            shown = ", ".join(names) or "none"
+            raise UsageError(f"joint {self.name!r} has {len(names)} coordinates ({shown}); use .coordinates")
+        return names[0]
+
+
+class Settings(dict[str, Any]):
+    """A mapping that can also be called with keywords to add to it: ``model.initial(theta=0.3)``."""
+
+    def __call__(self, **values: Any) -> None:
+        """Set the given entries and keep the others."""
+        self.update(values)
+
+
+class Names(list[Any]):
+    """A list of names that can also be called to replace it: ``model.independent("theta")``."""
+
+    def __call__(self, *names: Any) -> None:
+        """Replace the list by the given names, or by one list of names."""
+        if len(names) == 1 and isinstance(names[0], list | tuple):
+            names = tuple(names[0])
+        self[:] = names

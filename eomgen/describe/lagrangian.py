@@ -1,0 +1,96 @@
+"""Stage describe, the bare Lagrangian in SymPy: L, coordinates, forces, ... -> Description."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..errors import ModelError, Problem
+from .description import Description, items
+from .scope import RATES
+from .sympy_face import free_names, function_names, is_sympy, name_of
+
+
+def describe_lagrangian(
+    name: str,
+    L: Any,
+    coordinates: Sequence[Any],
+    forces: Sequence[Any] | Mapping[Any, Any] | None = None,
+    dissipation: Any = None,
+    constraints: Sequence[Any] = (),
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | None = None,
+) -> Description:
+    """Describe a system by its Lagrangian.
+
+    Parameters
+    ----------
+    name : str
+        Identifier; the generated module bears it.
+    L : sympy.Expr or str
+        T - V in coordinates, velocities and t.
+    coordinates : sequence
+        Generalized coordinates: functions of time ``q(t)`` (``dynamicsymbols``), whose velocities are their
+        derivatives, or plain symbols ``q``, whose velocities are the symbols ``q_dot``.
+    forces : sequence or mapping, optional
+        Generalized forces, one for each coordinate in order, or by coordinate.
+    dissipation : sympy.Expr, optional
+        Rayleigh's dissipation function D(q, q_dot); it adds the forces -dD/dq_dot.
+    constraints : sequence of sympy.Expr, optional
+        Holonomic constraints, each = 0.
+    parameters : mapping, optional
+        Values by symbol or name.  Every other free symbol becomes a parameter without a value.
+    inputs : mapping, optional
+        Quantities given over time, by symbol or name: the value that holds while none is given.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    ModelError
+        A coordinate is neither a symbol nor a function of time ``q(t)``.
+    """
+    listed = items(coordinates)
+    names = [name_of(q) for q in ([coordinates] if listed is None else listed)]
+    wrong = [
+        Problem(
+            f"lagrangian.coordinates[{k}]", f"{q} is not a coordinate", "give symbols q or functions q(t) of the time t"
+        )
+        for k, q in enumerate(names)
+        if not isinstance(q, str)
+    ]
+    if wrong:
+        raise ModelError(wrong)
+    given: dict[str, Any] = {"coordinates": names, "expression": L}
+    if forces is not None:
+        given["forces"] = {name_of(q): Q for q, Q in forces.items()} if isinstance(forces, Mapping) else forces
+    if dissipation is not None:
+        given["dissipation"] = dissipation
+    if items(constraints) or not isinstance(constraints, list | tuple):
+        given["constraints"] = constraints
+
+    description = Description(values={"name": name, "lagrangian": given})
+    values = {name_of(symbol): value for symbol, value in (parameters or {}).items()}
+    driven = {name_of(symbol): value for symbol, value in (inputs or {}).items()}
+    known = {q + rate for q in names for rate in RATES} | set(driven)
+    for parameter in [*values, *(p for p in _symbols(given) if p not in values)]:
+        if parameter not in known:
+            value = values.get(parameter)
+            description.add("parameters", parameter, {} if value is None else {"value": value})
+    for source, value in driven.items():
+        description.add("inputs", source, {} if value is None else {"value": value})
+    return description
+
+
+def _symbols(given: Mapping[str, Any]) -> list[str]:
+    """Plain symbols of everything given; functions of time are coordinates or faults, never parameters."""
+    parts: list[Any] = [given["expression"], given.get("dissipation")]
+    forces = given.get("forces", ())
+    parts += list(forces.values()) if isinstance(forces, Mapping) else items(forces) or []
+    constraints = given.get("constraints", ())
+    parts += items(constraints) or []
+    parts = [part for part in parts if is_sympy(part)]
+    functions = set(function_names(parts)) if parts else set()
+    return [s for s in free_names(parts) if s not in functions] if parts else []

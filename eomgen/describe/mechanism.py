@@ -1,0 +1,152 @@
+"""Stage describe: Model (builder) -> Mechanism, the frozen value every later stage reads.
+
+A Mechanism holds graph expressions in the symbols of its graph: ``t``; parameters, inputs and coordinates under their
+own names; the velocity and acceleration of coordinate ``theta`` as ``theta_dot`` and ``theta_ddot``.  A coordinate of
+*any* joint may appear in an expression, also of one that a later stage cuts.  Motion of a marker in ground axes appears
+as a symbol named like ``vx(rod.tip)`` whose meaning is in :attr:`Mechanism.quantities`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ..errors import ModelError, Problem
+from ..frames import Marker
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+from .description import place_of
+
+if TYPE_CHECKING:
+    from ..forces.base import Force
+    from ..joints.base import Joint
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A constant of the model that can change between runs without recompiling."""
+
+    name: str
+    value: float | None = None
+    unit: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A quantity given from outside over time."""
+
+    name: str
+    value: float = 0.0
+    unit: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes."""
+
+    name: str
+    mass: Expr
+    com: Vec3
+    inertia: Mat3
+
+
+@dataclass(frozen=True)
+class JointSpec:
+    """A joint between two markers; ``joint`` answers what its type means, ``coordinates`` are the full names.
+
+    ``predecessor`` and ``successor`` already include the turn that brings the joint's axis to their z.
+    ``named`` tells whether the user named the coordinates (such joints are kept in the spanning tree first).
+    """
+
+    name: str
+    joint: Joint
+    predecessor: Marker
+    successor: Marker
+    coordinates: tuple[str, ...]
+    named: bool
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2."""
+
+    marker: Marker
+    level: int
+    axis: int
+
+
+@dataclass(frozen=True)
+class Output:
+    """A named result: an expression in t, coordinates, their rates, parameters, inputs and marker quantities."""
+
+    name: str
+    expression: Expr
+    unit: str = ""
+    doc: str = ""
+
+
+@dataclass(frozen=True)
+class Lagrangian:
+    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0."""
+
+    coordinates: tuple[str, ...]
+    expression: Expr
+    forces: tuple[Expr, ...]
+    dissipation: Expr
+    constraints: tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Defaults of ``simulate`` and ``eomgen run``."""
+
+    end: float = 10.0
+    method: str = "DOP853"
+    rtol: float = 1e-8
+    atol: float = 1e-10
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What the user said, checked and lowered to one graph."""
+
+    name: str
+    graph: Graph
+    parameters: tuple[Parameter, ...]
+    inputs: tuple[Input, ...]
+    gravity: Vec3
+    bodies: tuple[Body, ...]
+    joints: tuple[JointSpec, ...]
+    forces: tuple[Force, ...]
+    outputs: tuple[Output, ...]
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate or ``<coordinate>_dot``
+    guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts
+    independent: tuple[str, ...] = ()
+    simulation: Simulation = Simulation()
+    lagrangian: Lagrangian | None = None
+    lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
+    doc: str = ""
+
+    def problem(self, path: str, message: str, remedy: str = "") -> Problem:
+        """A problem at a dotted path, with the file and line the path or its nearest parent came from."""
+        return Problem(path, message, remedy, *place_of(path, self.lines))
+
+    def missing_values(self) -> list[Problem]:
+        """A problem for each parameter without a value."""
+        return [
+            self.problem(
+                f"parameters.{p.name}", "has no value", "give it one in the model, or where the module is made"
+            )
+            for p in self.parameters
+            if p.value is None
+        ]
+
+    def require_values(self) -> None:
+        """Raise ModelError unless every parameter has a value."""
+        problems = self.missing_values()
+        if problems:
+            raise ModelError(problems)

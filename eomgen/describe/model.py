@@ -1,0 +1,317 @@
+"""Stage describe, the builder: Python calls -> Description -> Mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from .build import build
+from .description import GROUND_NAME, SECTIONS, Description
+from .handles import BodyHandle, JointHandle, Names, Settings
+from .model_forces import ForceMethods
+from .model_joints import JointMethods
+from .sympy_face import symbol
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from .mechanism import Mechanism
+
+Value = Any  # a number, a text or a SymPy expression
+Vector = Sequence[Any]
+
+
+class Model(JointMethods, ForceMethods):
+    """A mechanism under description.
+
+    Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
+    their handles or by text.  Names are looked up when the model is checked, so order does not matter.
+
+    Parameters
+    ----------
+    name : str
+        Identifier; the generated module bears it.
+    gravity : sequence of three, optional
+        Acceleration of gravity in ground axes (m/s^2).
+    doc : str, optional
+        One sentence about the model.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> m = Model("pendulum", gravity=(0, -9.81, 0))
+    >>> l = m.parameter("l", 0.5, unit="m")
+    >>> bob = m.body("bob", mass=1, com=(0, -l, 0))
+    >>> theta = m.revolute("hinge", m.ground, bob, coordinate="theta").coordinate
+    >>> m.output("height", -l * sympy.cos(theta))
+    >>> m.mechanism().joints[0].coordinates
+    ('theta',)
+    """
+
+    def __init__(self, name: str, gravity: Vector = (0, 0, 0), doc: str = "") -> None:
+        values: dict[str, Any] = {"name": name, "gravity": gravity}
+        if doc:
+            values["doc"] = doc
+        self._start(Description(values=values))
+
+    def _start(self, description: Description) -> None:
+        self._description = description
+        for key in ("initial", "guess", "simulation"):
+            if isinstance(description.values.get(key, {}), dict):
+                description.values[key] = Settings(description.values.get(key, {}))
+        independent = description.values.get("independent", [])
+        if isinstance(independent, list | tuple):
+            description.values["independent"] = Names(independent)
+
+    @classmethod
+    def from_description(cls, description: Description) -> Model:
+        """A model around raw data, as the readers of model files make it."""
+        model = cls.__new__(cls)
+        model._start(description)
+        return model
+
+    @classmethod
+    def from_lagrangian(
+        cls,
+        name: str,
+        L: Any,
+        coordinates: Sequence[Any],
+        forces: Sequence[Any] | Mapping[Any, Any] | None = None,
+        dissipation: Any = None,
+        constraints: Sequence[Any] = (),
+        parameters: Mapping[Any, Any] | None = None,
+        inputs: Mapping[Any, Any] | None = None,
+    ) -> Model:
+        """A model from a bare Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
+        from .lagrangian import describe_lagrangian
+
+        return cls.from_description(
+            describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
+        )
+
+    # -- quantities -----------------------------------------------------------------------------------------------
+    def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:
+        """Declare a constant that can change between runs.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        value : number, optional
+            Needed to compile, not to derive.
+        unit, doc : str, optional
+            For display.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        self._quantity("parameters", name, value, unit, doc)
+        return symbol(name)
+
+    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "") -> Any:
+        """Declare a quantity given from outside over time; ``value`` holds while none is given.
+
+        Returns
+        -------
+        sympy.Symbol
+        """
+        self._quantity("inputs", name, value, unit, doc)
+        return symbol(name)
+
+    def output(self, name: str, expression: Value, unit: str = "", doc: str = "") -> None:
+        """Declare a named result.
+
+        Parameters
+        ----------
+        name : str
+            Identifier; it may repeat a coordinate if the expression is that coordinate.
+        expression : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, their rates and the motion of markers.
+        unit, doc : str, optional
+            For display.
+        """
+        self._quantity("outputs", name, expression, unit, doc, key="expression")
+
+    def _quantity(self, section: str, name: str, value: Value, unit: str, doc: str, key: str = "value") -> None:
+        given = {key: value, "unit": unit, "doc": doc}
+        self._description.add(section, name, {k: v for k, v in given.items() if v is not None and v != ""})
+
+    def coordinate(self, name: str) -> Any:
+        """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
+        return symbol(name)
+
+    @property
+    def t(self) -> Any:
+        """The time, as a SymPy symbol."""
+        return symbol("t")
+
+    # -- bodies ---------------------------------------------------------------------------------------------------
+    def body(self, name: str, mass: Value = None, com: Vector = (0, 0, 0), inertia: Any = (0, 0, 0)) -> BodyHandle:
+        """Add a rigid body.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        mass : number, str or SymPy expression
+            Mass (kg); 0 for a body without mass.
+        com : sequence of three, optional
+            Centre of mass in body axes (m).
+        inertia : sequence of three, 3 x 3 tensor or mapping, optional
+            About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
+            with the tensor's own sign; what is missing is 0.
+
+        Returns
+        -------
+        BodyHandle
+        """
+        values: dict[str, Any] = {"com": com, "inertia": inertia}
+        if mass is not None:
+            values = {"mass": mass, **values}
+        return BodyHandle(self, name, self._description.add("bodies", name, values))
+
+    @property
+    def ground(self) -> BodyHandle:
+        """The ground, which has markers like a body."""
+        return self._body_handle(GROUND_NAME)
+
+    @property
+    def bodies(self) -> dict[str, BodyHandle]:
+        """Handles of all bodies, by name."""
+        names = (entry.name for entry in self._description.sections["bodies"])
+        return {name: self._body_handle(name) for name in names if name != GROUND_NAME}
+
+    @property
+    def joints(self) -> dict[str, JointHandle]:
+        """Handles of all joints, by name."""
+        return {entry.name: JointHandle(self, entry) for entry in self._description.sections["joints"]}
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """SymPy symbols of all parameters, by name."""
+        return {entry.name: symbol(entry.name) for entry in self._description.sections["parameters"]}
+
+    def _body_handle(self, name: str) -> BodyHandle:
+        entries = self._description.sections["bodies"]
+        return BodyHandle(self, name, next((entry for entry in entries if entry.name == name), None))
+
+    # -- settings -------------------------------------------------------------------------------------------------
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return str(self._description.values.get("name", ""))
+
+    @property
+    def initial(self) -> Any:
+        """Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``."""
+        return self._description.values["initial"]
+
+    @initial.setter
+    def initial(self, values: Mapping[Any, Any]) -> None:
+        self._description.values["initial"] = Settings(values)
+
+    @property
+    def guess(self) -> Any:
+        """Rough coordinates where the assembly of loops starts: ``m.guess(phi=1.2)``."""
+        return self._description.values["guess"]
+
+    @guess.setter
+    def guess(self, values: Mapping[Any, Any]) -> None:
+        self._description.values["guess"] = Settings(values)
+
+    @property
+    def independent(self) -> Any:
+        """Coordinates to integrate, where loops leave a choice: ``m.independent("theta")`` or assign a list."""
+        return self._description.values["independent"]
+
+    @independent.setter
+    def independent(self, names: Sequence[Any]) -> None:
+        self._description.values["independent"] = Names([names] if isinstance(names, str) else names)
+
+    @property
+    def simulation(self) -> Any:
+        """Defaults of a simulation: ``m.simulation(end=5, rtol=1e-9)``."""
+        return self._description.values["simulation"]
+
+    @simulation.setter
+    def simulation(self, values: Mapping[str, Any]) -> None:
+        self._description.values["simulation"] = Settings(values)
+
+    # -- what comes next ------------------------------------------------------------------------------------------
+    @property
+    def description(self) -> Description:
+        """The raw data, in the layout of the model file."""
+        return self._description
+
+    def mechanism(self) -> Mechanism:
+        """Check the model and lower it to one graph.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        ModelError
+            The model has faults; ``.problems`` lists all of them.
+        """
+        return build(self._description)
+
+    def check(self) -> Any:
+        """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
+        from .. import pipeline
+
+        return pipeline.check(self)
+
+    def derive(self, method: str = "auto", independent: Sequence[Any] | None = None) -> Any:
+        """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
+        from .. import pipeline
+
+        return pipeline.derive(self, method, independent)
+
+    def compile(
+        self, method: str = "auto", target: str = "cython", independent: Sequence[Any] | None = None, **options: Any
+    ) -> Any:
+        """Derive, generate and compile a module; see ``eomgen.pipeline.compile_equations``."""
+        from .. import pipeline
+
+        return pipeline.compile_equations(self.derive(method, independent), target=target, **options)
+
+    def to_yaml(self) -> str:
+        """The model as the text of a model file."""
+        from .write_yaml import yaml_text
+
+        return yaml_text(self._description)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model as a model file."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.to_yaml())
+
+    # -- display --------------------------------------------------------------------------------------------------
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_"):
+            method = self._joint_method(name)
+            if method is not None:
+                return method
+        from .names import suggestion
+
+        near = suggestion(name, [n for n in dir(type(self)) if not n.startswith("_")])
+        raise AttributeError(f"a Model has no attribute {name!r}" + (f"; {near}" if near else ""))
+
+    def _counts(self) -> str:
+        counts = ((section, len(self._description.sections[section])) for section in SECTIONS)
+        return ", ".join(f"{number} {_SINGULAR[s] if number == 1 else s}" for s, number in counts if number)
+
+    def __repr__(self) -> str:
+        kind = "Lagrangian" if self._description.values.get("lagrangian") is not None else ""
+        return f"<Model {self.name}: {', '.join(part for part in (kind, self._counts()) if part) or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        from .display import model_html
+
+        return model_html(self._description)
+
+
+_SINGULAR = {section: {"bodies": "body"}.get(section, section[:-1]) for section in SECTIONS}

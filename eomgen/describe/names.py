@@ -1,0 +1,109 @@
+"""Stage describe, names: a name the user chose -> what is wrong with it, or the name they probably meant."""
+
+from __future__ import annotations
+
+import keyword
+import re
+from collections.abc import Iterable
+
+#: Functions an expression may call, with the least and the greatest number of arguments.
+FUNCTIONS: dict[str, tuple[int, int]] = {
+    "sin": (1, 1),
+    "cos": (1, 1),
+    "tan": (1, 1),
+    "asin": (1, 1),
+    "acos": (1, 1),
+    "atan": (1, 1),
+    "atan2": (2, 2),
+    "sinh": (1, 1),
+    "cosh": (1, 1),
+    "tanh": (1, 1),
+    "exp": (1, 1),
+    "log": (1, 1),
+    "sqrt": (1, 1),
+    "abs": (1, 1),
+    "sign": (1, 1),
+    "min": (2, 64),
+    "max": (2, 64),
+    "heaviside": (1, 1),
+    "where": (3, 3),
+}
+
+#: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).
+QUANTITIES: dict[str, tuple[int, int]] = {
+    prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
+}
+
+_C_KEYWORDS = frozenset(
+    word
+    for line in (
+        "auto break case char const continue default do double else enum extern float for goto if inline int long",
+        "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while",
+    )
+    for word in line.split()
+)
+_IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
+LONGEST = 64  #: characters of a name
+
+IDENTIFIER_RULE = "a name starts with a letter and goes on with letters a to z, digits and underscores"
+
+
+def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
+    """What is wrong with a name.
+
+    Parameters
+    ----------
+    name : object
+        The name as given; anything but text is a fault.
+    symbol : bool
+        Whether the name will stand in expressions by itself (parameter, input, coordinate, output), so that names
+        with a meaning of their own are refused too.
+
+    Returns
+    -------
+    (message, remedy) or None
+        None if the name can be used.
+    """
+    if not isinstance(name, str):
+        return f"{name!r} is not a name", IDENTIFIER_RULE
+    if not _IDENTIFIER.match(name):
+        return f"{name!r} is not an identifier", IDENTIFIER_RULE
+    if len(name) > LONGEST:
+        return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
+    if keyword.iskeyword(name):
+        return f"{name!r} is a word of Python", f"choose another name, e.g. {name}_"
+    if symbol:
+        if name in _C_KEYWORDS:
+            return f"{name!r} is a word of C", f"choose another name, e.g. {name}_"
+        if name == "t":
+            return "'t' is the time", "choose another name"
+        if name == "pi":
+            return "'pi' is the number", "choose another name"
+        if name in FUNCTIONS:
+            return f"{name!r} is a function", f"choose another name, e.g. {name}_"
+    return None
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """``"did you mean 'theta'?"`` if a known name is near, else an empty text."""
+    import difflib  # only needed once something is wrong
+
+    options = list(known)
+    near = difflib.get_close_matches(name, options, n=1, cutoff=0.6)
+    if not near:
+        folded = {option.lower(): option for option in options}
+        near = [folded[name.lower()]] if name.lower() in folded else []
+    return f"did you mean {near[0]!r}?" if near else ""
+
+
+def listing(known: Iterable[str], limit: int = 12) -> str:
+    """The names joined by commas, cut after ``limit``; ``"none"`` if there are none."""
+    names = list(known)
+    shown = ", ".join(names[:limit])
+    return (shown + f", ... ({len(names)} in all)" if len(names) > limit else shown) or "none"
+
+
+def nearest(name: str, known: Iterable[str], what: str = "known") -> str:
+    """A remedy for an unknown name: the near miss if there is one, and what is allowed."""
+    options = list(known)
+    return " ".join(part for part in (suggestion(name, options), f"{what}: {listing(options)}") if part)

@@ -1,0 +1,94 @@
+"""Stage describe, placements: roll-pitch-yaw and joint axes -> rotation matrices, with zeros and ones kept exact."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph, cos, sin
+from ..graph.vectors import Mat3
+
+_X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+_NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
+
+Numbers = tuple[float, float, float]
+
+#: Word for an axis -> columns of the turn that brings it to z.
+TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
+    "x": (_Y, _Z, _X),
+    "y": (_Z, _X, _Y),
+    "z": (_X, _Y, _Z),
+    "-x": (_Y, _NZ, _NX),
+    "-y": (_Z, _NX, _NY),
+    "-z": (_X, _NY, _NZ),
+}
+
+
+def cosine_and_sine(angle: Expr) -> tuple[Expr, Expr]:
+    """cos and sin of an angle; exact 0 and +-1 for numeric multiples of pi/2 (to within 1e-15 of relative rounding)."""
+    value = angle.value
+    if value is not None:
+        quarter = round(value / (math.pi / 2))
+        if abs(value - quarter * (math.pi / 2)) <= 1e-15 * max(1, abs(quarter)):
+            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+            return angle.graph.constant(c), angle.graph.constant(s)
+    return cos(angle), sin(angle)
+
+
+def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
+    """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF.
+
+    Parameters
+    ----------
+    graph : Graph
+    rpy : three Expr
+        Roll, pitch, yaw (rad).
+
+    Returns
+    -------
+    Mat3
+        Takes marker axes to body axes.
+    """
+    (cr, sr), (cp, sp), (cy, sy) = (cosine_and_sine(angle) for angle in rpy)
+    o, i = graph.zero, graph.one
+    about_x: Mat3 = ((i, o, o), (o, cr, -sr), (o, sr, cr))
+    about_y: Mat3 = ((cp, o, sp), (o, i, o), (-sp, o, cp))
+    about_z: Mat3 = ((cy, -sy, o), (sy, cy, o), (o, o, i))
+    return vec.product(about_z, vec.product(about_y, about_x))
+
+
+def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:
+    """Columns of a right-handed turn whose third column is the axis; None for the zero vector.
+
+    Along a coordinate axis the entries are those of :data:`TURNS`; an axis in a coordinate plane keeps that plane's
+    normal as first column, so that exact zeros stay.
+    """
+    largest = max(abs(a) for a in axis)
+    if largest == 0.0:
+        return None
+    x, y, z = (a / largest for a in axis)
+    zeros = [a == 0.0 for a in (x, y, z)]
+    if sum(zeros) == 2:
+        k = zeros.index(False)
+        return TURNS[("-" if axis[k] < 0 else "") + "xyz"[k]]
+    length = math.sqrt(x * x + y * y + z * z)
+    n = (x / length, y / length, z / length)
+    k = zeros.index(True) if any(zeros) else min(range(3), key=lambda i: abs(n[i]))
+    e = (_X, _Y, _Z)[k]
+    first = e if any(zeros) else _unit(_cross(e, n))
+    return first, _cross(n, first), n
+
+
+def turn_matrix(graph: Graph, columns: Sequence[Numbers]) -> Mat3:
+    """The constant matrix with the given columns."""
+    return vec.transpose(tuple(vec.vector(graph, column) for column in columns))  # type: ignore[arg-type]
+
+
+def _cross(a: Numbers, b: Numbers) -> Numbers:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _unit(a: Numbers) -> Numbers:
+    length = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    return (a[0] / length, a[1] / length, a[2] / length)

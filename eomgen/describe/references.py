@@ -1,0 +1,36 @@
+"""Stage describe, references: handles, symbols and names -> what a model file would write."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UsageError
+from .handles import JointHandle, MarkerHandle
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def marker_reference(model: Model, value: Any) -> Any:
+    """A marker, body or name as a model file refers to it; raises UsageError for a handle of another model."""
+    if isinstance(value, MarkerHandle):
+        _own(model, value)
+        return value.reference
+    if isinstance(value, JointHandle):
+        raise UsageError(f"{value!r} is a joint; a body or a marker is expected")
+    return value
+
+
+def joint_reference(model: Model, value: Any) -> Any:
+    """A joint, coordinate or name as a model file refers to it; raises UsageError for a handle of another model."""
+    if isinstance(value, JointHandle):
+        _own(model, value)
+        return value.name
+    if isinstance(value, MarkerHandle):
+        raise UsageError(f"{value!r} is a body or marker; a joint or a coordinate is expected")
+    return value
+
+
+def _own(model: Model, handle: MarkerHandle | JointHandle) -> None:
+    if handle.model is not model:
+        raise UsageError(f"{handle!r} belongs to the model {handle.model.name!r}, not to {model.name!r}")

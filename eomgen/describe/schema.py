@@ -1,0 +1,172 @@
+"""Stage describe, schema: the table of fields -> the JSON Schema of the model file (draft 2020-12)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..joints import JOINTS
+from .fields import (
+    AXES,
+    BODY,
+    FORCE,
+    INERTIA,
+    INPUT,
+    LAGRANGIAN,
+    MARKER,
+    MODEL,
+    ONE_OF,
+    OUTPUT_FIELDS,
+    PARAMETER,
+    PLACED,
+    SHORT,
+    SIMULATION,
+    Field,
+    Fields,
+    force_fields,
+    joint_fields,
+)
+from .names import LONGEST
+
+Schema = dict[str, Any]
+
+_NAME: Schema = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST}
+_EXPRESSION: Schema = {"type": ["number", "string"]}
+_VECTOR: Schema = {"type": "array", "items": {"$ref": "#/$defs/expression"}, "minItems": 3, "maxItems": 3}
+_MARKER_NAME: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"}
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _definitions() -> Schema:
+    expression = _ref("expression")
+    return {
+        "name": _NAME,
+        "expression": _EXPRESSION,
+        "vector": _VECTOR,
+        "inertia": {
+            "anyOf": [
+                _ref("vector"),
+                {"type": "array", "items": _ref("vector"), "minItems": 3, "maxItems": 3},
+                _object(dict.fromkeys(INERTIA, expression)),
+            ]
+        },
+        "placement": {"anyOf": [_ref("vector"), _table(MARKER)]},
+        "markers": {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("placement")},
+        "marker": {"anyOf": [_MARKER_NAME, _table(PLACED)]},
+        "pair": {"type": "array", "items": _ref("marker"), "minItems": 2, "maxItems": 2},
+        "axis": {
+            "anyOf": [
+                {"enum": list(AXES)},
+                {"type": "array", "items": _ref("expression"), "minItems": 3, "maxItems": 3},
+            ]
+        },
+        "names": {"type": "array", "items": _ref("name")},
+    }
+
+
+#: kind of field -> its schema; kinds not listed are handled by :func:`_field`.
+_KINDS: dict[str, Schema] = {
+    "text": {"type": "string"},
+    "name": _ref("name"),
+    "joint": _ref("name"),
+    "names": _ref("names"),
+    "number": {"type": ["number", "string"]},
+    "positive": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]},
+    "expression": _ref("expression"),
+    "expressions": {"type": "array", "items": _ref("expression")},
+    "vector": _ref("vector"),
+    "value": {"anyOf": [_ref("expression"), _ref("vector")]},
+    "inertia": _ref("inertia"),
+    "markers": _ref("markers"),
+    "marker": _ref("marker"),
+    "pair": _ref("pair"),
+    "axis": _ref("axis"),
+    "forces": {
+        "anyOf": [
+            {"type": "array", "items": _ref("expression")},
+            {"type": "object", "additionalProperties": _ref("expression")},
+        ]
+    },
+}
+
+
+def _field(field: Field) -> Schema:
+    schema = {"enum": list(field.choices)} if field.kind == "choice" else dict(_KINDS[field.kind])
+    if field.default not in (None, ()):
+        default = field.default
+        schema["default"] = list(default) if isinstance(default, tuple) else default
+    return {**schema, "description": field.doc}
+
+
+def _object(properties: Schema, required: list[str] | None = None) -> Schema:
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {**schema, "required": required} if required else schema
+
+
+def _table(fields: Fields, without: tuple[str, ...] = ()) -> Schema:
+    """An object with the keys of a table."""
+    kept = {key: field for key, field in fields.items() if key not in without}
+    return _object({k: _field(f) for k, f in kept.items()}, [k for k, f in kept.items() if f.required])
+
+
+def _typed(fields: Fields, type_name: str) -> Schema:
+    schema = _table(fields)
+    schema["properties"]["type"] = {"const": type_name}
+    return schema
+
+
+def _force(type_name: str) -> Schema:
+    schema = _typed(force_fields(type_name), type_name)
+    if type_name in ONE_OF:
+        schema["oneOf"] = [{"required": [key]} for key in ONE_OF[type_name]]
+    return schema
+
+
+def _section(entry: Schema, doc: str) -> Schema:
+    return {
+        "type": ["object", "null"],
+        "propertyNames": _ref("name"),
+        "additionalProperties": entry,
+        "description": doc,
+    }
+
+
+def _short(section: str, fields: Fields) -> Schema:
+    """An entry that may be written as the value of its main key alone."""
+    alone: list[Schema] = [_field(fields[SHORT[section]])]
+    if not fields[SHORT[section]].required:
+        alone.append({"type": "null"})
+    return {"anyOf": [*alone, _table(fields)]}
+
+
+def model_schema() -> dict[str, Any]:
+    """The JSON Schema of model files.
+
+    Returns
+    -------
+    dict
+        Plain data, ready for ``json.dumps``.  It describes the layout; names and expressions are judged by the check.
+    """
+    values = _section(_ref("expression"), "")
+    sections: Schema = {
+        "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
+        "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
+        "bodies": _section(_table(BODY), MODEL["bodies"].doc),
+        "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
+        "forces": _section({"oneOf": [_force(name) for name in FORCE]}, MODEL["forces"].doc),
+        "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
+        "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},
+        "simulation": {**_table(SIMULATION), "description": MODEL["simulation"].doc},
+        "initial": {**values, "description": MODEL["initial"].doc},
+        "guess": {**values, "description": MODEL["guess"].doc},
+    }
+    sections["bodies"]["properties"] = {"ground": _table({"markers": BODY["markers"]})}
+    properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "eomgen model file",
+        **_object(properties, [key for key, field in MODEL.items() if field.required]),
+        "$defs": _definitions(),
+    }

@@ -1,0 +1,124 @@
+"""Stage describe, names in expressions: the one namespace of a model -> what each name means and where it may stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+from ..errors import ExpressionError
+from ..frames import Marker
+from ..graph.core import Expr, Graph
+from .description import Faults
+from .fields import CONSTANT, MOTION, NUMBER, OUTPUT
+from .mechanism import Quantity
+from .names import QUANTITIES, fault_of_name, nearest
+
+#: Kind of name -> the least level of a field in which it may stand.
+LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
+LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
+
+_LEVEL_REMEDY = {
+    NUMBER: "numbers and pi can",
+    CONSTANT: "numbers, parameters and pi can",
+    MOTION: "t, parameters, inputs, coordinates and their velocities can",
+    OUTPUT: "t, parameters, inputs, coordinates, their rates and motion of markers can",
+}
+_QUANTITY = re.compile(r"([va]?[xyz])\((.+)\)\Z", re.DOTALL)
+RATES = ("", "_dot", "_ddot")
+
+
+def quantity_of(name: str) -> tuple[str, str] | None:
+    """``("vx", "rod.tip")`` of the symbol name ``vx(rod.tip)``; None for other names."""
+    found = _QUANTITY.match(name)
+    return (found.group(1), found.group(2)) if found else None
+
+
+class Namespace:
+    """The names of one model: parameters, inputs, coordinates with their rates, and the time."""
+
+    def __init__(self, faults: Faults) -> None:
+        self.faults = faults
+        self.kinds: dict[str, str] = {"t": "time"}
+        self.places: dict[str, str] = {}
+
+    def declare(self, kind: str, name: object, path: str) -> bool:
+        """Take a name in; faults of the name, and clashes with others, are noted.  Returns whether it is usable."""
+        fault = fault_of_name(name, symbol=True)
+        if fault or not isinstance(name, str):
+            self.faults.add(path, *(fault or ("", "")))
+            return False
+        names = [name + suffix for suffix in RATES] if kind == "coordinate" else [name]
+        clash = next((n for n in names if n in self.kinds), None)
+        for n, level in zip(names, ("coordinate", "velocity", "acceleration"), strict=False):
+            if n not in self.kinds:  # also after a clash, so that users of the name are not at fault too
+                self.kinds[n] = level if kind == "coordinate" else kind
+                self.places[n] = path
+        if clash is not None:
+            other = f"{self.kinds[clash]} at {self.places[clash]}"
+            own = "" if clash == name else f"; {clash!r} would be the rate of {name!r}"
+            self.faults.add(
+                path,
+                f"the name {clash!r} is taken by the {other}{own}",
+                "parameters, inputs, coordinates and outputs share one namespace, with the _dot and _ddot of "
+                "coordinates; rename one",
+            )
+            return False
+        return True
+
+    def of(self, *kinds: str) -> Iterator[str]:
+        """Names of the given kinds, in order of declaration."""
+        return (name for name, kind in self.kinds.items() if kind in kinds)
+
+
+class Scope:
+    """What the names of one expression mean.
+
+    Unknown and misplaced names are noted as faults at ``path`` and stood in for by a placeholder, so that one reading
+    tells all of them.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        names: Namespace,
+        path: str,
+        level: int,
+        marker: Callable[[str], Marker],
+        quantities: dict[str, Quantity],
+    ) -> None:
+        self.graph, self.names, self.path, self.level = graph, names, path, level
+        self.marker, self.quantities = marker, quantities
+
+    def resolve(self, name: str) -> Expr:
+        """The expression of a name."""
+        quantity = quantity_of(name)
+        if quantity is not None:
+            try:
+                return self.locate(*quantity)
+            except ExpressionError as error:
+                self.names.faults.add(self.path, error.message, error.remedy)
+                return self.graph.symbol(name)
+        kind = self.names.kinds.get(name)
+        if kind is None:
+            known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
+            remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
+            if self.level == NUMBER:
+                remedy = f"only {_LEVEL_REMEDY[NUMBER]} stand here"
+            self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
+        elif LEVELS[kind] > self.level:
+            self._refuse(name, kind)
+        return self.graph.symbol(name)
+
+    def locate(self, quantity: str, marker: str) -> Expr:
+        """The symbol of a marker's motion, e.g. ``vx(rod.tip)``; raises ExpressionError for an unknown marker."""
+        name = f"{quantity}({marker})"
+        if self.level < OUTPUT:
+            self._refuse(name, "motion of a marker")
+            return self.graph.symbol(name)
+        level, axis = QUANTITIES[quantity]
+        self.quantities[name] = Quantity(self.marker(marker), level, axis)
+        return self.graph.symbol(name)
+
+    def _refuse(self, name: str, kind: str) -> None:
+        remedy = f"only {_LEVEL_REMEDY[self.level]}"
+        self.names.faults.add(self.path, f"the {kind} {name!r} cannot stand here", remedy)

@@ -1,0 +1,109 @@
+"""Stage describe, the SymPy border: SymPy expressions -> graph, names -> SymPy symbols; SymPy loads on first use."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ExpressionError
+
+if TYPE_CHECKING:
+    from ..graph.core import Expr, Graph
+
+Resolve = Callable[[str], "Expr"]
+
+
+def symbol(name: str) -> Any:
+    """The plain SymPy symbol that stands for a name."""
+    import sympy
+
+    return sympy.Symbol(name)
+
+
+def is_sympy(value: object) -> bool:
+    """Whether a value is a SymPy object; never imports SymPy."""
+    sympy = sys.modules.get("sympy")
+    return sympy is not None and isinstance(value, sympy.Basic)
+
+
+def name_of(value: object) -> Any:
+    """The name behind a coordinate given as a symbol or as a function of time; other values unchanged."""
+    if not is_sympy(value):
+        return value
+    sympy = sys.modules["sympy"]
+    if isinstance(value, sympy.Symbol):
+        return value.name
+    return function_name(value) or value
+
+
+def function_name(value: Any) -> str | None:
+    """``"q"`` for ``q(t)`` and ``"q_dot"``, ``"q_ddot"`` for its derivatives; None for anything else."""
+    from sympy import Derivative
+    from sympy.core.function import AppliedUndef
+
+    if isinstance(value, AppliedUndef):
+        return str(value.func.__name__) if _is_time(value.args) else None
+    if isinstance(value, Derivative) and isinstance(value.expr, AppliedUndef) and _is_time(value.expr.args):
+        (variable, order), *rest = value.variable_count
+        if not rest and _is_time((variable,)) and order in (1, 2):
+            return f"{value.expr.func.__name__}_{'d' * int(order)}ot"
+    return None
+
+
+def _is_time(arguments: Any) -> bool:
+    return len(arguments) == 1 and getattr(arguments[0], "name", None) == "t"
+
+
+def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
+    """The graph expression of a SymPy expression.
+
+    Parameters
+    ----------
+    graph : Graph
+    expression : sympy.Expr
+        In plain symbols, in functions of time ``q(t)`` with their derivatives, or both.
+    resolve : callable
+        Gives the expression of a name.
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    ExpressionError
+        The expression has a part without a meaning.
+    """
+    from ..graph.sympy_lower import LoweringError, lower
+
+    def meaning(part: Any) -> Expr | None:
+        name = name_of(part)
+        return resolve(name) if isinstance(name, str) else None
+
+    try:
+        return lower(graph, expression, meaning)
+    except LoweringError as error:
+        raise ExpressionError(error.reason.replace("\n", "; ")) from None
+
+
+def free_names(expressions: list[Any]) -> list[str]:
+    """Names of all symbols in SymPy expressions, the time excepted, sorted."""
+    import sympy
+
+    names: set[str] = set()
+    for expression in expressions:
+        if is_sympy(expression):
+            names |= {s.name for s in expression.atoms(sympy.Symbol)}
+    return sorted(names - {"t"})
+
+
+def function_names(expressions: list[Any]) -> list[str]:
+    """Names of all functions of time in SymPy expressions, sorted."""
+    from sympy.core.function import AppliedUndef
+
+    found: set[str] = set()
+    for expression in expressions:
+        if is_sympy(expression):
+            found |= {name for f in expression.atoms(AppliedUndef) if (name := function_name(f))}
+    return sorted(found)

@@ -1,0 +1,80 @@
+"""Stage describe, SymPy -> text: a SymPy expression -> the same expression as a model file writes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import ExpressionError, UsageError
+from ..graph.core import Graph
+from .expressions import parse
+from .sympy_face import function_name
+
+
+def sympy_text(expression: Any) -> str:
+    """A SymPy expression as a text that the expressions of a model file know.
+
+    Raises
+    ------
+    UsageError
+        The expression has parts that such a text cannot say.
+    """
+    from sympy.printing.str import StrPrinter
+
+    class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
+        """SymPy's text with the names of functions that a model file uses."""
+
+        def _print_Abs(self, e: Any) -> str:
+            return f"abs({self._print(e.args[0])})"
+
+        def _print_Min(self, e: Any) -> str:
+            return f"min({', '.join(self._print(x) for x in e.args)})"
+
+        def _print_Max(self, e: Any) -> str:
+            return f"max({', '.join(self._print(x) for x in e.args)})"
+
+        def _print_Heaviside(self, e: Any) -> str:
+            return f"heaviside({self._print(e.args[0])})"
+
+        def _print_ExpBase(self, e: Any) -> str:
+            return f"exp({self._print(e.args[0])})"
+
+        def _print_exp(self, e: Any) -> str:
+            return f"exp({self._print(e.args[0])})"
+
+        def _print_Exp1(self, e: Any) -> str:
+            return "exp(1)"
+
+        def _print_And(self, e: Any) -> str:
+            return "(" + " and ".join(self._print(x) for x in e.args) + ")"
+
+        def _print_Or(self, e: Any) -> str:
+            return "(" + " or ".join(self._print(x) for x in e.args) + ")"
+
+        def _print_Not(self, e: Any) -> str:
+            return f"(not {self._print(e.args[0])})"
+
+        def _print_Relational(self, e: Any) -> str:
+            return f"({self._print(e.lhs)} {e.rel_op} {self._print(e.rhs)})"
+
+        def _print_Piecewise(self, e: Any) -> str:
+            *pieces, last = e.args
+            if last.cond != True:  # noqa: E712 - SymPy's own true
+                raise UsageError(f"{e} leaves cases without a value; end the Piecewise with (expression, True)")
+            text = self._print(last.expr)
+            for piece in reversed(pieces):
+                text = f"where({self._print(piece.cond)}, {self._print(piece.expr)}, {text})"
+            return str(text)
+
+        def _print_AppliedUndef(self, e: Any) -> str:
+            return function_name(e) or str(e)
+
+        def _print_Derivative(self, e: Any) -> str:
+            return function_name(e) or str(e)
+
+    text = str(Printer({"full_prec": True}).doprint(expression))
+    graph = Graph()
+    try:
+        parse(text, graph, graph.symbol, lambda quantity, marker: graph.symbol(f"{quantity}({marker})"))
+    except ExpressionError as error:
+        raise UsageError(f"{expression} cannot be written as a text: {error}") from None
+    return text

@@ -1,0 +1,109 @@
+"""Stage describe, writing: Description -> the text of a model file that reads back as the same model."""
+
+from __future__ import annotations
+
+import json
+import numbers
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import UsageError
+from .description import SECTIONS, Description, items
+from .fields import MODEL, SHORT
+from .sympy_face import is_sympy, name_of
+from .yaml_nodes import scalar
+
+_PLAIN = re.compile(r"[A-Za-z0-9_.(*+/-][A-Za-z0-9_.()*+/<>= -]*\Z")
+
+
+def yaml_text(description: Description) -> str:
+    """The text of a model file.
+
+    Parameters
+    ----------
+    description : Description
+        SymPy expressions in it are written as text.
+
+    Returns
+    -------
+    str
+        YAML 1.2, sections in the order of the table of fields, one entry a line.
+
+    Raises
+    ------
+    UsageError
+        An expression or value has no form in a model file.
+    """
+    lines: list[str] = []
+    for key in MODEL:
+        if key in SECTIONS:
+            lines += _section(key, description)
+        elif key in description.values:
+            value = description.values[key]
+            if key == "lagrangian" and value is not None:
+                lines += ["lagrangian:", *(f"  {k}: {_value(v)}" for k, v in value.items())]
+            elif not _is_default(key, value):
+                lines.append(f"{key}: {_value(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _section(section: str, description: Description) -> list[str]:
+    entries = description.sections[section]
+    if not entries:
+        return []
+    short = SHORT.get(section)
+    lines = [f"{section}:"]
+    for entry in entries:
+        values = {key: value for key, value in entry.values.items() if not _is_default(key, value)}
+        only = short is not None and list(values) == [short]
+        lines.append(f"  {entry.name}: {_value(values[short] if only and short else values)}")
+    return lines
+
+
+def _is_default(key: str, value: Any) -> bool:
+    """Whether leaving a value out means the same."""
+    if value is None or value == "" or (isinstance(value, list | tuple | dict) and len(value) == 0):
+        return True
+    if key in ("com", "inertia", "gravity", "rpy"):
+        listed = items(value)
+        return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
+    return key == "axis" and isinstance(value, str) and value == "z"
+
+
+def _value(value: Any) -> str:
+    if value is None:
+        return "null"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real | str | Mapping | list | tuple):
+        listed = items(value)
+        if listed is not None:
+            return _value(listed)
+        if is_sympy(value):
+            return _sympy(value)
+        raise UsageError(f"{value!r} cannot be written to a model file")
+    if is_sympy(value):
+        return _sympy(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, numbers.Real):
+        return str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name_of(k)}: {_value(v)}" for k, v in value.items()) + "}"
+    if value and all(isinstance(x, tuple) and len(x) == 2 and isinstance(x[1], dict) for x in value):
+        return _value(dict(value))  # named markers
+    return "[" + ", ".join(_value(x) for x in value) + "]"
+
+
+def _sympy(value: Any) -> str:
+    from .sympy_text import sympy_text
+
+    text = sympy_text(value)
+    return text if isinstance(scalar(text), int | float) else _text(text)
+
+
+def _text(text: str) -> str:
+    """A text as a plain scalar where that reads back as the same text, else in quotes."""
+    plain = _PLAIN.match(text) and isinstance(scalar(text), str) and not text.endswith(" ") and ": " not in text
+    if plain and not text.startswith(("- ", "---", "...", "*")) and text not in ("-", "=", "<<", "*"):
+        return text
+    return json.dumps(text)

@@ -1,0 +1,6 @@
+"""Stage emit: Program -> SourceSet, the text of the generated files; pure and deterministic."""
+
+from .c import emit_c
+from .sources import SourceSet
+
+__all__ = ["SourceSet", "emit_c"]

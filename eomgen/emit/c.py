@@ -1,0 +1,85 @@
+"""Stage emit: Program -> C99 library: ``<name>.c``, ``<name>.h``, ``eomgen.h`` and ``model.json``."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ..program import KERNELS, Block, Program
+from .c_layout import driver_files, work_areas
+from .c_text import print_block, print_precompute, used_helpers
+from .layouts import describe_layouts
+from .sources import SourceSet, read_template, render
+
+
+def emit_c(program: Program) -> SourceSet:
+    """The C sources of a program.
+
+    Returns
+    -------
+    SourceSet
+        ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.
+    """
+    context = _context(program)
+    return SourceSet(
+        {
+            f"{program.name}.c": render("c/model.c.j2", context),
+            f"{program.name}.h": render("c/model.h.j2", context),
+            "eomgen.h": read_template("c/eomgen.h"),
+            "model.json": metadata_json(program),
+        }
+    )
+
+
+def metadata_json(program: Program) -> str:
+    """The text of model.json."""
+    return json.dumps(program.metadata, indent=1, allow_nan=False) + "\n"
+
+
+def _context(program: Program) -> dict[str, Any]:
+    precompute, scratch = print_precompute(program) if program.hoisted else ("", 0)
+    printed = [print_block(program, block) for block in program.blocks]
+    areas, n_work = work_areas(program, max((work for _, work in printed), default=0))
+    n_const = len(program.parameters) + len(program.hoisted) + scratch
+    sizes = program.sizes
+    results = {k.name: k.result for k in KERNELS}
+    numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work}
+    others = [i for i in range(sizes.n_v) if i not in program.preferred]
+    roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
+    return {
+        "name": program.name,
+        "prefix": program.name.upper(),
+        "guard": f"EOMGEN_{program.name.upper()}_H",
+        "metadata": program.metadata,
+        "sizes": sizes,
+        "numbers": [(key.upper(), value) for key, value in numbers.items()],
+        "n_const": n_const,
+        "n_work": n_work,
+        "hoisted": len(program.hoisted),
+        "helpers": used_helpers(program, roots),
+        "blocks": [precompute, *(text for text, _ in printed)] if precompute else [text for text, _ in printed],
+        "drivers": [read_template(f"c/drivers/{file}.c") for file in driver_files(program)],
+        "areas": areas,
+        "order": [*program.preferred, *others],
+        "dependent": [int(i in others) for i in range(sizes.n_v)],
+        "parent": program.parent,
+        "kernels": [
+            {
+                "name": k.name,
+                "call": f"block_{k.name}" if isinstance(k, Block) else f"drive_{k.name}",
+                "n_in": k.n_in,
+                "n_out": k.n_out,
+                "ports": [port.name for port in k.ports],
+                "result": results[k.name],
+            }
+            for k in program.kernels
+        ],
+        "layouts": describe_layouts(program),
+        "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
+    }
+
+
+def _literal_lines(text: str, width: int = 100) -> list[str]:
+    """A text as the insides of adjacent C string literals; ``?`` is escaped, so that no trigraph appears."""
+    escape = {"\\": "\\\\", '"': '\\"', "?": "\\?"}
+    return ["".join(escape.get(ch, ch) for ch in text[k : k + width]) for k in range(0, len(text), width)]

@@ -1,0 +1,87 @@
+"""Stage emit: Program -> the driver files a C source needs, and where each keeps its numbers in the work array."""
+
+from __future__ import annotations
+
+from ..program import Program
+
+LOOPS: dict[str, tuple[str, ...]] = {
+    "project": ("scaled", "cholesky", "project", "close"),
+    "rhs": ("scaled", "cholesky", "project", "close", "partition", "embed", "ldl", "accelerate", "rhs"),
+    "embedded_mass_matrix": ("scaled", "partition", "embed", "mass"),
+    "kinematics": ("scaled", "partition", "embed", "kinematics", "kinematics_drive"),
+    "outputs": ("scaled", "cholesky", "project", "close", "outputs_closed"),
+}
+ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
+
+TREES: dict[str, tuple[str, ...]] = {
+    "rhs": ("tree", "tree_rhs"),
+    "outputs": ("tree", "tree_outputs"),
+}
+
+
+def driver_files(program: Program) -> list[str]:
+    """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
+    direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
+    files: dict[str, None] = {}
+    for driver in program.drivers:
+        if not program.has_loops:
+            needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
+        elif driver.name == "jacobian":
+            needed = (*LOOPS["rhs"][:-1], direct, "jacobian")
+        elif driver.name == "outputs" and "terms" in driver.blocks:
+            needed = ACCELERATED
+        else:
+            needed = LOOPS[driver.name]
+        files.update(dict.fromkeys(needed))
+    return list(files)
+
+
+def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
+    """Areas of the work array.
+
+    Parameters
+    ----------
+    program : Program
+    blocks : int
+        Doubles at the start of the work array that blocks use.
+
+    Returns
+    -------
+    areas : list of (name, start, length)
+    total : int
+        Length of the work array.
+    """
+    if not program.drivers:
+        return [], blocks
+    n, m, f = program.sizes.n_v, program.sizes.n_c, program.sizes.n_dof
+    names = program.block_names
+    residual = 2 * n * n + 3 * m * n if "residual_jacobian" in names else 0
+    lengths = [
+        ("X", 5 * n + m),  # q, v, a, multipliers, dq, dv
+        ("SCALES", n + m),
+        ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
+        ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
+        ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
+    ]
+    if program.has_loops:
+        lengths += [
+            ("POSITION", m + m * n),  # C, C_q
+            ("RATE", m),
+            ("J", m * n),
+            ("G", m * m),
+            ("E", m),
+            ("STEP", n),
+            ("ROWS", m * (n + 1 + m)),
+            ("B", n * f),
+            ("MASS", n * n),
+            ("MB", n * f),
+            ("EMBEDDED", f * f),
+            ("H", n),
+            ("A", n),
+            ("Y", f),
+        ]
+    areas, start = [], blocks
+    for name, length in lengths:
+        areas.append((name, start, length))
+        start += length
+    return areas, start

@@ -1,0 +1,59 @@
+"""Stage emit: what the stage hands on: relative file names and their text, and how templates become text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+
+class SourceSet(Mapping[str, str]):
+    """Frozen mapping of relative file name (with ``/``) to text."""
+
+    def __init__(self, files: Mapping[str, str]) -> None:
+        self._files = dict(files)
+
+    def __getitem__(self, name: str) -> str:
+        return self._files[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    def __repr__(self) -> str:
+        return f"SourceSet({', '.join(f'{name} ({len(text)})' for name, text in self._files.items())})"
+
+
+@cache
+def environment() -> Environment:
+    """The template environment: undefined names are errors."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(
+        loader=PackageLoader("eomgen.templates", ""),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    made.filters["comment"] = lambda text: str(text).replace("*/", "* /")
+    return made
+
+
+def render(template: str, context: Mapping[str, Any]) -> str:
+    """The text of a template with one context."""
+    return environment().get_template(template).render(context)
+
+
+@cache
+def read_template(name: str) -> str:
+    """A file of the templates folder as it is."""
+    made = environment()
+    assert made.loader is not None
+    return made.loader.get_source(made, name)[0]

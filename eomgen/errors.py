@@ -1,0 +1,149 @@
+"""The exceptions of eomgen; generated packages carry a copy of this file.
+
+::
+
+    EomgenError
+    |- ModelError            the description is wrong; .problems lists every fault found
+    |- ExpressionError       a text is not an allowed expression; .column says where
+    |- AssemblyError         the loops do not close at the given coordinates, or the given values contradict each other
+    |- EvaluationError       a kernel could not be evaluated; .time and .state say where
+    |  |- SingularMassMatrixError   a combination of coordinates has no inertia behind it
+    |  |- ProjectionError           the state could not be brought onto the constraints
+    |  |- PartitionError            the chosen independent coordinates cannot move the mechanism here
+    |  '- NonFiniteError            a result is not a finite number
+    |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
+    |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
+    |- MissingDependencyError       an optional package is needed; the message says what to install
+    '- UsageError            a call with names or shapes that do not fit the model
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class EomgenError(Exception):
+    """Base of every error eomgen raises on purpose."""
+
+
+class Problem(NamedTuple):
+    """One fault of a model: where it is, what is wrong, and what is allowed or to be done."""
+
+    path: str  #: dotted place, e.g. ``joints.A.axis``
+    message: str  #: what is wrong
+    remedy: str = ""  #: what is allowed, or what to do
+    file: str = ""  #: model file, if the model came from one
+    line: int = 0  #: 1-based line in that file, 0 if none
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}: " if self.file else ""
+        tail = f"; {self.remedy}" if self.remedy else ""
+        return f"{place}{self.path}: {self.message}{tail}"
+
+
+class ModelError(EomgenError):
+    """The description of a model is wrong.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+        Every fault found, in the order of the description.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(p) for p in self.problems))
+
+
+class ExpressionError(EomgenError, ValueError):
+    """A text is not an expression that a model may use.
+
+    Attributes
+    ----------
+    message : str
+        What is wrong.
+    column : int
+        1-based place in the text, 0 if none.
+    remedy : str
+        What is allowed.
+    text : str
+        The whole expression.
+    """
+
+    def __init__(self, message: str, column: int = 0, remedy: str = "", text: str = "") -> None:
+        self.message, self.column, self.remedy, self.text = message, column, remedy, text
+        tail = f"; {remedy}" if remedy else ""
+        super().__init__(f"{self.place()}{tail}")
+
+    def place(self) -> str:
+        """The message with the column and the expression (shortened)."""
+        shown = self.text if len(self.text) <= 60 else self.text[:57] + "..."
+        return f"{self.message} in column {self.column} of {shown!r}" if self.column else self.message
+
+
+class AssemblyError(EomgenError):
+    """The loops do not close from the given guess, or given values contradict each other."""
+
+
+class UsageError(EomgenError, ValueError):
+    """A call names something the model does not have, or passes an array of the wrong shape."""
+
+
+class EvaluationError(EomgenError):
+    """A kernel failed at a state; a recoverable failure, so integrators see NaN and shorten their step."""
+
+    def __init__(self, message: str, time: float | None = None, state: object = None) -> None:
+        super().__init__(message)
+        self.time = time
+        self.state = state
+
+
+class SingularMassMatrixError(EvaluationError):
+    """The mass matrix of the degrees of freedom is not positive definite."""
+
+
+class ProjectionError(EvaluationError):
+    """Newton's iteration onto the constraint manifold did not converge."""
+
+
+class PartitionError(EvaluationError):
+    """The chosen independent coordinates are not independent at this configuration."""
+
+
+class NonFiniteError(EvaluationError):
+    """A result is NaN or infinite."""
+
+
+class SimulationError(EomgenError):
+    """The integration could not be finished."""
+
+
+class ToolchainError(EomgenError):
+    """A compiler is missing or failed.
+
+    Attributes
+    ----------
+    command : str
+        The command line that was run, empty when no compiler was found.
+    output : str
+        What the compiler printed.
+    """
+
+    def __init__(self, message: str, command: str = "", output: str = "") -> None:
+        super().__init__(message)
+        self.command = command
+        self.output = output
+
+
+class MissingDependencyError(EomgenError, ImportError):
+    """An optional package is needed for this call."""
+
+
+#: What a kernel's status code means; 0 is success, positive codes are recoverable (the C header has the same table).
+STATUS: dict[int, type[EvaluationError]] = {
+    1: NonFiniteError,
+    2: SingularMassMatrixError,
+    3: ProjectionError,
+    4: PartitionError,
+}

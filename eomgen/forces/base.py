@@ -1,0 +1,62 @@
+"""Force elements: each a frozen class holding graph expressions and markers, asked for loads or a potential.
+
+A force element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Protocol
+
+from ..frames import Marker
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+
+
+class View(Protocol):
+    """Motion of markers in ground axes and of joint coordinates, as expressions."""
+
+    graph: Graph
+
+    def position(self, marker: Marker) -> Vec3: ...
+    def velocity(self, marker: Marker) -> Vec3: ...
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def angular_velocity(self, marker: Marker) -> Vec3: ...
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        """Value and rate of a coordinate of any joint, tree or cut."""
+        ...
+
+
+class MarkerLoad(NamedTuple):
+    """A wrench on the marker's body: force at the marker's origin and torque, in ground axes (N, N m)."""
+
+    marker: Marker
+    force: Vec3
+    torque: Vec3
+
+
+class CoordinateLoad(NamedTuple):
+    """A generalized force along a joint coordinate (N m or N)."""
+
+    coordinate: str
+    value: Expr
+
+
+Load = MarkerLoad | CoordinateLoad
+
+
+@dataclass(frozen=True)
+class Force(ABC):
+    """A force element.  ``name`` is the user's; a subclass adds its markers and laws."""
+
+    type_name: ClassVar[str]
+    name: str
+
+    @abstractmethod
+    def loads(self, view: View) -> list[Load]:
+        """Everything this element exerts, its conservative part included."""
+
+    def potential(self, view: View) -> Expr | None:
+        """Potential energy (J) if the element is conservative as a whole, else None."""
+        return None

@@ -1,0 +1,26 @@
+"""Frames fixed in bodies: what joints and force elements attach to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .graph.vectors import Mat3, Vec3
+
+GROUND = -1
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Placement in a body: ``rotation`` takes marker axes to body axes, ``position`` is in body axes (m)."""
+
+    rotation: Mat3
+    position: Vec3
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A frame fixed in a body (``body`` is an index, or GROUND); ``label`` is how messages call it."""
+
+    body: int
+    frame: Frame
+    label: str

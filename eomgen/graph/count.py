@@ -1,0 +1,99 @@
+"""Stage graph: expressions -> the number of operations they take."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .core import Expr
+from .traverse import LEAVES, common_graph, reachable
+
+CHOICES = frozenset({"abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select"})
+
+
+@dataclass(frozen=True)
+class Operations:
+    """How many operations evaluate some expressions, each shared node counted once.
+
+    Attributes
+    ----------
+    multiplications, additions, divisions, negations : int
+        Subtractions are additions.
+    functions : mapping of str to int
+        sqrt, sin, pow, ... by name.
+    choices : mapping of str to int
+        abs, sign, min, max, comparisons, logic and select by name.
+    """
+
+    multiplications: int = 0
+    additions: int = 0
+    divisions: int = 0
+    negations: int = 0
+    functions: Mapping[str, int] = field(default_factory=dict)
+    choices: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def total(self) -> int:
+        """Multiplications, additions and divisions together."""
+        return self.multiplications + self.additions + self.divisions
+
+    def __add__(self, other: Operations) -> Operations:
+        return Operations(
+            self.multiplications + other.multiplications,
+            self.additions + other.additions,
+            self.divisions + other.divisions,
+            self.negations + other.negations,
+            _sum(self.functions, other.functions),
+            _sum(self.choices, other.choices),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The counts as plain numbers and dicts, for a metadata file."""
+        return {
+            "multiplications": self.multiplications,
+            "additions": self.additions,
+            "divisions": self.divisions,
+            "negations": self.negations,
+            "functions": dict(self.functions),
+            "choices": dict(self.choices),
+        }
+
+
+def _sum(a: Mapping[str, int], b: Mapping[str, int]) -> dict[str, int]:
+    return {name: a.get(name, 0) + b.get(name, 0) for name in sorted({*a, *b})}
+
+
+def count(outputs: Sequence[Expr]) -> Operations:
+    """Count the distinct operations that the outputs are made of."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return Operations()
+    nodes = graph.nodes
+    found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
+    arithmetic = {"mul", "add", "sub", "div", "neg"} | LEAVES
+    return Operations(
+        multiplications=found["mul"],
+        additions=found["add"] + found["sub"],
+        divisions=found["div"],
+        negations=found["neg"],
+        functions={k: found[k] for k in sorted(found) if k not in arithmetic and k not in CHOICES},
+        choices={k: found[k] for k in sorted(found) if k in CHOICES},
+    )
+
+
+def critical_path(outputs: Sequence[Expr]) -> int:
+    """Operations on the longest chain from a leaf to an output; every operation counts 1, negation 0."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return 0
+    nodes = graph.nodes
+    depth: dict[int, int] = {}
+    for i in reachable(graph, (y.id for y in outputs)):
+        node = nodes[i]
+        if node[0] in LEAVES:
+            depth[i] = 0
+        else:
+            depth[i] = max(depth[k] for k in node[1:]) + (node[0] != "neg")
+    return max(depth[y.id] for y in outputs)

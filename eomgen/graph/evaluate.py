@@ -1,0 +1,237 @@
+"""Stage graph: expressions and numbers -> their values, in NumPy; the oracle for every target.
+
+Numbers are evaluated as Python floats, arrays with NumPy's broadcasting.  Nothing raises and nothing warns: a division
+by zero gives an infinity, a logarithm of a negative number NaN.  Both branches of ``select`` are evaluated and one is
+taken, so what happens in the other never shows.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+from .core import Expr
+from .traverse import common_graph, reachable
+
+Value = Any  # float or ndarray
+
+
+def _minimum(a: float, b: float) -> float:
+    return a if a <= b or math.isnan(a) else b  # NaN wins, as in numpy.minimum
+
+
+def _maximum(a: float, b: float) -> float:
+    return a if a >= b or math.isnan(a) else b
+
+
+def _sign(a: float) -> float:
+    return float((a > 0) - (a < 0)) if not math.isnan(a) else a
+
+
+#: operation -> (on floats, on arrays)
+FUNCTIONS: dict[str, tuple[Callable[..., float], Callable[..., Any]]] = {
+    "add": (operator.add, np.add),
+    "sub": (operator.sub, np.subtract),
+    "mul": (operator.mul, np.multiply),
+    "div": (operator.truediv, np.divide),
+    "neg": (operator.neg, np.negative),
+    "pow": (math.pow, np.power),
+    "sqrt": (math.sqrt, np.sqrt),
+    "exp": (math.exp, np.exp),
+    "log": (math.log, np.log),
+    "sin": (math.sin, np.sin),
+    "cos": (math.cos, np.cos),
+    "tan": (math.tan, np.tan),
+    "asin": (math.asin, np.arcsin),
+    "acos": (math.acos, np.arccos),
+    "atan": (math.atan, np.arctan),
+    "sinh": (math.sinh, np.sinh),
+    "cosh": (math.cosh, np.cosh),
+    "tanh": (math.tanh, np.tanh),
+    "atan2": (math.atan2, np.arctan2),
+    "abs": (abs, np.abs),
+    "sign": (_sign, np.sign),
+    "min": (_minimum, np.minimum),
+    "max": (_maximum, np.maximum),
+    "lt": (lambda a, b: 1.0 if a < b else 0.0, lambda a, b: np.less(a, b) * 1.0),
+    "le": (lambda a, b: 1.0 if a <= b else 0.0, lambda a, b: np.less_equal(a, b) * 1.0),
+    "eq": (lambda a, b: 1.0 if a == b else 0.0, lambda a, b: np.equal(a, b) * 1.0),
+    "not": (lambda a: 0.0 if a else 1.0, lambda a: np.logical_not(a) * 1.0),
+    "and": (lambda a, b: 1.0 if a and b else 0.0, lambda a, b: np.logical_and(a, b) * 1.0),
+    "or": (lambda a, b: 1.0 if a or b else 0.0, lambda a, b: np.logical_or(a, b) * 1.0),
+    "select": (lambda c, a, b: a if c else b, lambda c, a, b: np.where(np.asarray(c) != 0.0, a, b)),
+}
+
+
+class Evaluator:
+    """A schedule that evaluates the same expressions again and again; made by :func:`compile_evaluator`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Order of the values when they are given as a sequence.
+    """
+
+    def __init__(self, outputs: Sequence[Expr], names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        graph = common_graph(outputs)
+        order = reachable(graph, (y.id for y in outputs)) if graph is not None else []
+        nodes = graph.nodes if graph is not None else []
+        place = {name: k for k, name in enumerate(self.names)}
+        self._constants: list[float] = []
+        slots: dict[int, int] = {}
+        used: set[int] = set()
+        unknown: list[str] = []
+        rest: list[int] = []
+        for i in order:
+            kind, *args = nodes[i]
+            if kind == "const":
+                slots[i] = len(self.names) + len(self._constants)
+                self._constants.append(args[0])
+            elif kind == "sym":
+                slots[i] = place.get(args[0], -1)
+                used.add(slots[i])
+                if args[0] not in place:
+                    unknown.append(args[0])
+            else:
+                rest.append(i)
+        if unknown:
+            raise UsageError(f"no value for {', '.join(sorted(unknown))}")
+        first = len(self.names) + len(self._constants)
+        self._steps: list[tuple[str, int, int, int]] = []  # operation and operand slots, -1 where there is none
+        last: dict[int, int] = {}
+        for k, i in enumerate(rest):
+            node = nodes[i]
+            a, b, c = (*(slots[j] for j in node[1:]), -1, -1)[:3]
+            slots[i] = first + k
+            self._steps.append((node[0], a, b, c))
+            for s in (a, b, c):
+                last[s] = k
+        self._outputs = [slots[y.id] for y in outputs]
+        keep = {*self._outputs, -1, *range(first)}
+        self._dead: list[tuple[int, ...]] = [()] * len(rest)  # slots not needed after each step
+        for s, k in last.items():
+            if s not in keep:
+                self._dead[k] = (*self._dead[k], s)
+        self._scalar = [(FUNCTIONS[op][0], a, b, c) for op, a, b, c in self._steps]
+        self._used = used
+
+    def __call__(self, values: Mapping[str, Value] | Sequence[Value] | np.ndarray) -> list[Value]:
+        """Evaluate.
+
+        Parameters
+        ----------
+        values : mapping or sequence
+            Numbers or arrays that broadcast against each other, by name or in the order of :attr:`names`.
+
+        Returns
+        -------
+        list of float or ndarray
+            One per output; an output that depends on no array is a float.
+        """
+        data, arrays = self._inputs(values)
+        data.extend(self._constants)
+        return self._on_arrays(data) if arrays else self._on_floats(data)
+
+    def _inputs(self, values: Mapping[str, Value] | Sequence[Value] | np.ndarray) -> tuple[list[Value], bool]:
+        if isinstance(values, Mapping):
+            used = self._used
+            absent = [n for k, n in enumerate(self.names) if k in used and n not in values]
+            if absent:
+                raise UsageError(f"no value for {', '.join(sorted(absent))}")
+            data = [values.get(n, 0.0) if k in used else 0.0 for k, n in enumerate(self.names)]
+        else:
+            data = values.tolist() if isinstance(values, np.ndarray) and values.ndim == 1 else list(values)
+            if len(data) != len(self.names):
+                raise UsageError(f"{len(self.names)} values expected, not {len(data)}")
+        arrays = False
+        for k, x in enumerate(data):
+            if type(x) is float:
+                continue
+            array = np.asarray(x, dtype=float)
+            if array.ndim:
+                data[k], arrays = array, True
+            else:
+                data[k] = float(array)
+        return data, arrays
+
+    def _on_floats(self, data: list[float]) -> list[Value]:
+        append = data.append
+        for k, (function, a, b, c) in enumerate(self._scalar):
+            try:
+                if b < 0:
+                    append(function(data[a]))
+                elif c < 0:
+                    append(function(data[a], data[b]))
+                else:
+                    append(function(data[a], data[b], data[c]))
+            except (ValueError, ZeroDivisionError, OverflowError):  # NumPy knows the infinity or NaN it should be
+                with np.errstate(all="ignore"):
+                    append(float(FUNCTIONS[self._steps[k][0]][1](*(np.float64(data[s]) for s in (a, b, c) if s >= 0))))
+        return [data[s] for s in self._outputs]
+
+    def _on_arrays(self, data: list[Value]) -> list[Value]:
+        append = data.append
+        with np.errstate(all="ignore"):
+            for (operation, a, b, c), dead in zip(self._steps, self._dead, strict=True):
+                function = FUNCTIONS[operation][1]
+                if b < 0:
+                    append(function(data[a]))
+                elif c < 0:
+                    append(function(data[a], data[b]))
+                else:
+                    append(function(data[a], data[b], data[c]))
+                for s in dead:
+                    data[s] = None
+        return [data[s] if np.ndim(data[s]) else float(data[s]) for s in self._outputs]
+
+
+def compile_evaluator(outputs: Sequence[Expr], names: Sequence[str]) -> Evaluator:
+    """Prepare the outputs for many evaluations.
+
+    Parameters
+    ----------
+    outputs : sequence of Expr
+        Expressions of one graph.
+    names : sequence of str
+        Symbols that will be given, at least those the outputs depend on.
+
+    Returns
+    -------
+    Evaluator
+        Called with a mapping, or with a sequence in the order of ``names``.
+
+    Raises
+    ------
+    UsageError
+        The outputs depend on a symbol that is not named.
+    """
+    return Evaluator(outputs, names)
+
+
+def evaluate(outputs: Sequence[Expr], values: Mapping[str, Value]) -> list[Value]:
+    """Values of the outputs at the given numbers or arrays (which broadcast against each other).
+
+    Parameters
+    ----------
+    outputs : sequence of Expr
+        Expressions of one graph.
+    values : mapping of str to float or ndarray
+        By symbol name; names that are not needed are ignored.
+
+    Returns
+    -------
+    list of float or ndarray
+        One per output; an output that depends on no array is a float.
+
+    Raises
+    ------
+    UsageError
+        A symbol has no value.
+    """
+    return Evaluator(outputs, list(values))(values)

@@ -1,0 +1,49 @@
+"""Stage graph: the operations of expressions -> what each does to numbers, and the symmetries used to simplify."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
+ODD = frozenset({"sin", "tan", "asin", "atan", "sinh", "tanh"})
+EVEN = frozenset({"cos", "cosh", "abs"})
+
+
+def _sign(x: float) -> float:
+    return float((x > 0) - (x < 0))
+
+
+#: What each operation does to numbers; the meaning every target must reproduce.
+FOLD: dict[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "pow": lambda a, b: a**b,
+    "sqrt": math.sqrt,
+    "exp": math.exp,
+    "log": math.log,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "sinh": math.sinh,
+    "cosh": math.cosh,
+    "tanh": math.tanh,
+    "atan2": math.atan2,
+    "abs": abs,
+    "sign": _sign,
+    "min": min,
+    "max": max,
+    "lt": lambda a, b: float(a < b),
+    "le": lambda a, b: float(a <= b),
+    "eq": lambda a, b: float(a == b),
+    "not": lambda a: float(not a),
+    "and": lambda a, b: float(bool(a) and bool(b)),
+    "or": lambda a, b: float(bool(a) or bool(b)),
+    "select": lambda c, a, b: a if c else b,
+}

@@ -1,0 +1,76 @@
+"""Stage graph: a node -> its partial derivatives with respect to its operands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from .core import Graph
+
+#: Operations that take one of several branches; what a branch not taken does must not leak into the derivative.
+BRANCHING = frozenset({"select", "min", "max"})
+#: Operations whose derivative is zero wherever it exists.
+FLAT = frozenset({"sign", "lt", "le", "eq", "not", "and", "or"})
+
+
+def _square(g: Graph, a: int) -> int:
+    return g.mul(a, a)
+
+
+def _over(g: Graph, a: int) -> int:
+    return g.div(g.one.id, a)
+
+
+def _asin_slope(g: Graph, a: int) -> int:  # 1 / sqrt(1 - a^2)
+    return _over(g, g.make("sqrt", g.sub(g.one.id, _square(g, a))))
+
+
+#: Slope of y = f(a) of each function of one operand, from (graph, id of y, id of a).
+SLOPES: dict[str, Callable[[Graph, int, int], int]] = {
+    "sin": lambda g, y, a: g.make("cos", a),
+    "cos": lambda g, y, a: g.neg(g.make("sin", a)),
+    "sqrt": lambda g, y, a: g.div(g.constant(0.5).id, y),
+    "exp": lambda g, y, a: y,
+    "log": lambda g, y, a: _over(g, a),
+    "tan": lambda g, y, a: g.add(g.one.id, _square(g, y)),
+    "asin": lambda g, y, a: _asin_slope(g, a),
+    "acos": lambda g, y, a: g.neg(_asin_slope(g, a)),
+    "atan": lambda g, y, a: _over(g, g.add(g.one.id, _square(g, a))),
+    "sinh": lambda g, y, a: g.make("cosh", a),
+    "cosh": lambda g, y, a: g.make("sinh", a),
+    "tanh": lambda g, y, a: g.sub(g.one.id, _square(g, y)),
+    "abs": lambda g, y, a: g.make("sign", a),
+}
+
+
+def partials(g: Graph, i: int, active: Sequence[bool]) -> list[int]:
+    """Partial derivatives of a smooth node with respect to its operands (zero where not active)."""
+    node = g.nodes[i]
+    operation, a = node[0], node[1]
+    zero = g.zero.id
+    slope = SLOPES.get(operation)
+    if slope is not None:
+        return [slope(g, i, a)]
+    b = node[2]
+    if operation == "mul":
+        return [b, a]
+    if operation == "div":
+        if not active[1]:
+            return [_over(g, b), zero]
+        r = _over(g, b)
+        return [r, g.neg(g.mul(i, r))]
+    if operation == "pow":  # b a^(b-1), y log a
+        base = g.mul(b, g.make("pow", a, g.sub(b, g.one.id))) if active[0] else zero
+        return [base, g.mul(i, g.make("log", a)) if active[1] else zero]
+    if operation == "atan2":  # a = opposite, b = adjacent
+        r = _over(g, g.add(_square(g, a), _square(g, b)))
+        return [g.mul(b, r), g.neg(g.mul(a, r))]
+    raise ValueError(f"operation {operation!r} has no derivative")
+
+
+def choice(g: Graph, i: int) -> tuple[int, int, int]:
+    """A branching node as (condition, operand if true, operand if false)."""
+    node = g.nodes[i]
+    if node[0] == "select":
+        return node[1], node[2], node[3]
+    a, b = node[1], node[2]
+    return (g.make("le", a, b) if node[0] == "min" else g.make("le", b, a)), a, b

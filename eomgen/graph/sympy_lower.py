@@ -1,0 +1,302 @@
+"""Stage graph: a SymPy expression -> the same expression in a graph.
+
+All quantities are real.  What has a meaning: real numbers; ``+ * **``; sin cos tan sec csc cot asin acos atan atan2
+sinh cosh tanh sech csch coth exp log sqrt; Abs sign Min Max Heaviside re im conjugate; Piecewise ending with ``True``;
+``< <= > >= Eq Ne And Or Not Xor ITE Implies Equivalent``; and whatever the caller resolves: symbols, functions of time
+``q(t)``, their derivatives, own functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from functools import reduce
+from typing import Any
+
+import sympy
+from sympy.core.function import AppliedUndef
+from sympy.functions.elementary.piecewise import ExprCondPair
+from sympy.logic.boolalg import BooleanFalse, BooleanTrue
+from sympy.matrices.matrixbase import MatrixBase
+
+from ..errors import EomgenError
+from .core import Expr, Graph
+
+Resolve = Callable[[sympy.Basic], Expr | None]
+Build = Callable[[Graph, Sequence[int]], int]
+
+SMOOTH = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+KNOWN = (
+    "numbers, + - * / **, sqrt exp log, sin cos tan sec csc cot asin acos atan atan2, sinh cosh tanh sech csch coth, "
+    "Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
+)
+
+
+class LoweringError(EomgenError):
+    """A SymPy expression has no meaning as a real function of known quantities.
+
+    Attributes
+    ----------
+    expression : sympy.Basic
+        The part at fault (the first of them, if there are several).
+    reason : str
+        What is wrong and what is allowed.
+    unresolved : tuple of sympy.Basic
+        All symbols and functions that have no meaning, sorted by name.
+    """
+
+    def __init__(self, expression: Any, reason: str, unresolved: Sequence[Any] = ()) -> None:
+        super().__init__(reason)
+        self.expression = expression
+        self.reason = reason
+        self.unresolved = tuple(unresolved)
+
+
+class _Fault(Exception):
+    """Why one sub-expression cannot be lowered."""
+
+
+def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str] = ()) -> Expr:
+    """Build a SymPy expression in a graph.
+
+    Parameters
+    ----------
+    graph : Graph
+        Where to build.
+    expression : sympy.Basic or number
+        A scalar.
+    resolve : callable
+        Gives the meaning of a symbol, an applied function such as ``q(t)``, a ``Derivative`` or anything else that is
+        not known here; None if it has none.
+    allowed : iterable of str, optional
+        Names that would have been accepted, for the message of the error.
+
+    Returns
+    -------
+    Expr
+
+    Raises
+    ------
+    LoweringError
+        The expression has parts without a meaning; all of them are named.
+    """
+    if isinstance(expression, (int, float)):
+        expression = sympy.Float(expression, 17) if isinstance(expression, float) else sympy.Integer(expression)
+    if isinstance(expression, MatrixBase) or not isinstance(expression, sympy.Basic):
+        kind = type(expression).__name__
+        raise LoweringError(expression, f"a SymPy scalar is expected, not {kind}")
+    walk = _Walk(graph, resolve)
+    result = walk.run(expression)
+    if walk.unresolved or walk.faults:
+        raise _error(walk, sorted(allowed))
+    return Expr(graph, result)
+
+
+def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
+    lines = [f"{_short(part)}: {why}" for part, why in walk.faults]
+    unresolved = sorted(walk.unresolved, key=str)
+    if unresolved:
+        names = ", ".join(_short(x) for x in unresolved)
+        lines.append(f"no meaning for {names}; " + (f"known are {', '.join(allowed)}" if allowed else "declare them"))
+    first = walk.faults[0][0] if walk.faults else unresolved[0]
+    return LoweringError(first, "\n".join(lines), unresolved)
+
+
+def _short(expression: Any) -> str:
+    try:
+        text = str(expression)
+    except RecursionError:  # SymPy prints recursively
+        text = type(expression).__name__
+    return text if len(text) <= 120 else f"{text[:117]}..."
+
+
+class _Walk:
+    """One walk over an expression, each object of it once, without recursion."""
+
+    def __init__(self, graph: Graph, resolve: Resolve) -> None:
+        self.graph = graph
+        self.resolve = resolve
+        self.unresolved: dict[Any, None] = {}
+        self.faults: list[tuple[Any, str]] = []
+        # by identity: hashing and comparing deep expressions is recursive in SymPy; the entries keep the parts alive
+        self.done: dict[int, tuple[Any, int]] = {}
+
+    def run(self, root: Any) -> int:
+        done = self.done
+        pending: dict[int, tuple[Sequence[Any], Build]] = {}
+        stack = [root]
+        while stack:
+            part = stack[-1]
+            if id(part) in done:
+                stack.pop()
+                continue
+            if id(part) not in pending:
+                try:
+                    pending[id(part)] = self._open(part)
+                except _Fault as fault:
+                    self.faults.append((part, str(fault)))
+                    done[id(part)] = (part, self.graph.one.id)
+                    continue
+                missing = [x for x in pending[id(part)][0] if id(x) not in done]
+                if missing:
+                    stack.extend(reversed(missing))
+                    continue
+            stack.pop()
+            operands, build = pending[id(part)]
+            done[id(part)] = (part, build(self.graph, [done[id(x)][1] for x in operands]))
+        return done[id(root)][1]
+
+    def _open(self, part: Any) -> tuple[Sequence[Any], Build]:
+        """The operands of a part and how to combine them once they are lowered."""
+        build = BUILD.get(part.func)
+        if build is not None:
+            return part.args, build
+        if isinstance(part, (sympy.Number, sympy.NumberSymbol)):
+            value = self.graph.constant(_number(part)).id
+            return (), lambda g, ids: value
+        if isinstance(part, (BooleanTrue, BooleanFalse)):
+            truth = self.graph.one.id if part else self.graph.zero.id
+            return (), lambda g, ids: truth
+        if isinstance(part, sympy.Piecewise):
+            return _pieces(part), _piecewise
+        if isinstance(part, (sympy.Xor, sympy.ITE, sympy.Implies, sympy.Equivalent)):
+            return (part.to_nnf(simplify=False),), lambda g, ids: ids[0]
+        if part is sympy.I or part is sympy.zoo:
+            raise _Fault("complex numbers have no meaning here")
+        found = self.resolve(part)
+        if found is not None:
+            meaning = self.graph.lift(found).id
+            return (), lambda g, ids: meaning
+        return self._rewritten(part)
+
+    def _rewritten(self, part: Any) -> tuple[Sequence[Any], Build]:
+        if isinstance(part, (sympy.Symbol, AppliedUndef)):
+            self.unresolved[part] = None
+            return (), lambda g, ids: g.one.id
+        other = part
+        if isinstance(part, (sympy.Derivative, sympy.Subs)):
+            other = part.doit()
+            if other == part and isinstance(part.expr, AppliedUndef):
+                self.unresolved[part] = None
+                return (), lambda g, ids: g.one.id
+        elif isinstance(part, sympy.Expr) and not part.free_symbols and not part.atoms(AppliedUndef):
+            other = part.evalf(30)  # e.g. gamma(1/3)
+            if not isinstance(other, sympy.Number):
+                other = part
+        if other == part or not isinstance(other, sympy.Basic):
+            name = part.func.__name__
+            raise _Fault(f"{name} is not among what can be lowered: {KNOWN}")
+        return (other,), lambda g, ids: ids[0]
+
+
+def _number(part: Any) -> float:
+    """The double nearest to a real number of SymPy."""
+    if part is sympy.nan or not part.is_finite:
+        raise _Fault("infinities and NaN have no meaning here")
+    if isinstance(part, sympy.NumberSymbol):
+        part = part.evalf(40)
+    try:
+        if isinstance(part, sympy.Rational):
+            return float(Fraction(int(part.p), int(part.q)))
+        # a Float is exactly (-1)^sign mantissa 2^exponent; its own float() would cut digits off instead of rounding
+        sign, mantissa, exponent, bits = part._mpf_
+        if exponent + bits < -1100:
+            return 0.0
+        if exponent + bits > 1100:
+            raise OverflowError
+        return float(Fraction(int(-mantissa if sign else mantissa)) * Fraction(2) ** int(exponent))
+    except OverflowError:
+        raise _Fault("the number is too large for a double") from None
+
+
+def _pieces(part: Any) -> Sequence[Any]:
+    """Expressions and conditions in turn: e1, c1, e2, c2, ..., last expression."""
+    flat: list[Any] = []
+    for pair in part.args:
+        if not isinstance(pair, ExprCondPair):
+            raise _Fault("a Piecewise is made of (expression, condition) pairs")
+        if pair.cond is sympy.true:
+            return [*flat, pair.expr]
+        flat += [pair.expr, pair.cond]
+    last = part.args[-1]
+    raise _Fault(
+        f"the last piece ({_short(last.expr)} if {_short(last.cond)}) leaves the other cases without a value; "
+        "end the Piecewise with (expression, True)"
+    )
+
+
+def _piecewise(g: Graph, ids: Sequence[int]) -> int:
+    result = ids[-1]
+    for k in range(len(ids) - 3, -1, -2):
+        result = g.make("select", ids[k + 1], ids[k], result)
+    return result
+
+
+def _product(g: Graph, ids: Sequence[int]) -> int:
+    """Factors 1/y go into one denominator, numbers to the front."""
+    numbers, above, below = [], [], []
+    for i in ids:
+        node = g.nodes[i]
+        if node[0] == "const":
+            numbers.append(i)
+        elif node[0] == "div" and node[1] == g.one.id:
+            below.append(node[2])
+        else:
+            above.append(i)
+    if not below:
+        return reduce(g.mul, [*numbers, *above]) if not numbers else g.mul(reduce(g.mul, numbers), _all(g, above))
+    top = g.mul(reduce(g.mul, numbers, g.one.id), _all(g, above))
+    return g.div(top, reduce(g.mul, below))
+
+
+def _all(g: Graph, ids: Sequence[int]) -> int:
+    return reduce(g.mul, ids) if ids else g.one.id
+
+
+def _chain(operation: str) -> Build:
+    return lambda g, ids: reduce(lambda a, b: g.make(operation, a, b), ids)
+
+
+def _function(operation: str) -> Build:
+    return lambda g, ids: g.make(operation, *ids)
+
+
+def _over(operation: str) -> Build:
+    return lambda g, ids: g.div(g.one.id, g.make(operation, *ids))
+
+
+def _heaviside(g: Graph, ids: Sequence[int]) -> int:
+    x, middle, zero = ids[0], ids[1], g.zero.id
+    below = g.make("select", g.make("lt", x, zero), zero, middle)
+    return g.make("select", g.make("lt", zero, x), g.one.id, below)
+
+
+#: How each class of SymPy is built from its lowered arguments.
+BUILD: dict[Any, Build] = {
+    sympy.Add: lambda g, ids: reduce(g.add, ids),
+    sympy.Mul: _product,
+    sympy.Pow: _function("pow"),
+    **{getattr(sympy, name): _function(name) for name in (*SMOOTH, "atan2", "sign")},
+    sympy.Abs: _function("abs"),
+    sympy.sec: _over("cos"),
+    sympy.csc: _over("sin"),
+    sympy.cot: lambda g, ids: g.div(g.make("cos", ids[0]), g.make("sin", ids[0])),
+    sympy.sech: _over("cosh"),
+    sympy.csch: _over("sinh"),
+    sympy.coth: _over("tanh"),
+    sympy.Min: _chain("min"),
+    sympy.Max: _chain("max"),
+    sympy.Heaviside: _heaviside,
+    sympy.StrictLessThan: _function("lt"),
+    sympy.LessThan: _function("le"),
+    sympy.StrictGreaterThan: lambda g, ids: g.make("lt", ids[1], ids[0]),
+    sympy.GreaterThan: lambda g, ids: g.make("le", ids[1], ids[0]),
+    sympy.Equality: _function("eq"),
+    sympy.Unequality: lambda g, ids: g.make("not", g.make("eq", *ids)),
+    sympy.And: _chain("and"),
+    sympy.Or: _chain("or"),
+    sympy.Not: _function("not"),
+    sympy.re: lambda g, ids: ids[0],
+    sympy.im: lambda g, ids: g.zero.id,
+    sympy.conjugate: lambda g, ids: ids[0],
+}

@@ -1,0 +1,53 @@
+"""Stage graph: roots -> the ids of the nodes they are made of, in topological order."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Sequence
+
+from .core import Expr, Graph, Node
+
+LEAVES = frozenset({"const", "sym"})
+
+
+def operands(node: Node) -> tuple[int, ...]:
+    """The operand ids of a node; none for constants and symbols."""
+    return () if node[0] in LEAVES else node[1:]
+
+
+def reachable(graph: Graph, roots: Iterable[int], stop: Container[int] = ()) -> list[int]:
+    """Ids of all nodes that the roots are made of, the roots included, ascending.
+
+    Operands have smaller ids than the nodes that use them, so every node comes after its operands.  The operands of
+    nodes in ``stop`` are not entered.
+    """
+    nodes = graph.nodes
+    stack = list(roots)
+    seen = set(stack)
+    while stack:
+        i = stack.pop()
+        node = nodes[i]
+        if node[0] in LEAVES or i in stop:
+            continue
+        for k in node[1:]:
+            if k not in seen:
+                seen.add(k)
+                stack.append(k)
+    return sorted(seen)
+
+
+def common_graph(*groups: Sequence[Expr]) -> Graph | None:
+    """The one graph of all these expressions, None if there are none.
+
+    Raises
+    ------
+    ValueError
+        Expressions of different graphs.
+    """
+    graph: Graph | None = None
+    for group in groups:
+        for x in group:
+            if graph is None:
+                graph = x.graph
+            elif x.graph is not graph:
+                raise ValueError("expressions of different graphs cannot be used together")
+    return graph

@@ -1,0 +1,83 @@
+"""Stage graph: 3-vectors and 3 x 3 matrices of expressions, as tuples; zeros and ones fold as everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .core import Expr, Graph
+
+Vec3 = tuple[Expr, Expr, Expr]
+Mat3 = tuple[Vec3, Vec3, Vec3]  # rows
+
+
+def vector(graph: Graph, values: Sequence[Expr | float]) -> Vec3:
+    """A vector from three Exprs or numbers."""
+    x, y, z = (graph.lift(v) for v in values)
+    return (x, y, z)
+
+
+def zero(graph: Graph) -> Vec3:
+    """The zero vector."""
+    return (graph.zero, graph.zero, graph.zero)
+
+
+def identity(graph: Graph) -> Mat3:
+    """The unit matrix."""
+    o, i = graph.zero, graph.one
+    return ((i, o, o), (o, i, o), (o, o, i))
+
+
+def add(a: Vec3, b: Vec3) -> Vec3:
+    """a + b"""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def sub(a: Vec3, b: Vec3) -> Vec3:
+    """a - b"""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def neg(a: Vec3) -> Vec3:
+    """-a"""
+    return (-a[0], -a[1], -a[2])
+
+
+def scale(s: Expr, a: Vec3) -> Vec3:
+    """s a"""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+def dot(a: Vec3, b: Vec3) -> Expr:
+    """a . b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vec3, b: Vec3) -> Vec3:
+    """a x b"""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def times(m: Mat3, a: Vec3) -> Vec3:
+    """m a"""
+    return (dot(m[0], a), dot(m[1], a), dot(m[2], a))
+
+
+def transpose_times(m: Mat3, a: Vec3) -> Vec3:
+    """m^T a"""
+    c = transpose(m)
+    return (dot(c[0], a), dot(c[1], a), dot(c[2], a))
+
+
+def transpose(m: Mat3) -> Mat3:
+    """m^T"""
+    return (
+        (m[0][0], m[1][0], m[2][0]),
+        (m[0][1], m[1][1], m[2][1]),
+        (m[0][2], m[1][2], m[2][2]),
+    )
+
+
+def product(a: Mat3, b: Mat3) -> Mat3:
+    """a b"""
+    c = transpose(b)
+    return tuple(tuple(dot(row, col) for col in c) for row in a)  # type: ignore[return-value]

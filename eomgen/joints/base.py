@@ -1,0 +1,68 @@
+"""Joints: what a joint type means, answered by one short class; nothing outside this package names a type.
+
+A joint connects marker P (predecessor) and marker S (successor); its axis, where it has one, is the z axis of both.
+Rotations are matrices that take S axes to P axes; a twist is (angular, linear) of S relative to P, in S axes, at S.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+
+
+class Coordinate(NamedTuple):
+    """One coordinate of a joint type: its name is the joint's name plus ``suffix``; ``kind`` is 'angle' or 'length'."""
+
+    suffix: str
+    kind: str
+
+
+class Closure(NamedTuple):
+    """One loop-closure equation ``expression = 0``; ``kind`` is 'length' (m) or 'angle' (a direction cosine, rad)."""
+
+    label: str
+    expression: Expr
+    kind: str
+
+
+@dataclass(frozen=True)
+class Joint(ABC):
+    """Questions every joint type answers.
+
+    Class attributes
+    ----------------
+    type_name : the word in model files and the Model's method
+    has_axis : whether ``axis=`` is accepted
+    options : names of further keywords of this type (fields of the dataclass)
+    coordinates : the coordinates, in order
+    """
+
+    type_name: ClassVar[str]
+    has_axis: ClassVar[bool] = True
+    options: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[Coordinate, ...]] = ()
+
+    @abstractmethod
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        """Rotation of S in P, and position of S's origin in P axes."""
+
+    @abstractmethod
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        """One (angular, linear) column per coordinate: the relative twist is the sum of column times rate."""
+
+    @abstractmethod
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        """Equations that hold the relative pose to what the joint allows, when a loop is closed by it."""
+
+    @abstractmethod
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        """The coordinates as functions of a relative pose the joint allows."""
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        """Expressions that must be positive: the closure equations alone also admit anti-parallel axes."""
+        return []

@@ -1,0 +1,143 @@
+"""Joints of several degrees of freedom, and the weld: cylindrical, planar, spherical, free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph, atan2
+from ..graph.vectors import Mat3, Vec3
+from .base import Closure, Coordinate, Joint
+from .closures import along, parallel_axes, same_orientation
+from .rotations import about, euler, euler_angles, euler_rates, unit
+
+
+@dataclass(frozen=True)
+class Cylindrical(Joint):
+    """Slides along and turns about the common z axis.  Allows 2, removes 4."""
+
+    type_name: ClassVar[str] = "cylindrical"
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[1]), (graph.zero, graph.zero, q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, 2)), (unit(graph, 2), vec.zero(graph))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xy") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2], atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Planar(Joint):
+    """Moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
+
+    type_name: ClassVar[str] = "planar"
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("_x", "length"),
+        Coordinate("_y", "length"),
+        Coordinate("_3", "angle"),
+    )
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[2]), (q[0], q[1], graph.zero)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        turn = about(graph, 2, q[2])
+        o = vec.zero(graph)
+        return [(o, turn[0]), (o, turn[1]), (unit(graph, 2), o)]  # R^T e_k is row k of R
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "z") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[0], position[1], atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Spherical(Joint):
+    """Turns about a point, in Euler angles (intrinsic, x-y'-z'' unless ``sequence`` says).  Allows 3, removes 3.
+
+    Euler angles are singular where the middle angle brings the first and last axes in line.
+    """
+
+    type_name: ClassVar[str] = "spherical"
+    has_axis: ClassVar[bool] = False
+    options: ClassVar[tuple[str, ...]] = ("sequence",)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
+    sequence: str = "xyz"
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return euler(graph, self.sequence, q), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(g, vec.zero(graph)) for g in euler_rates(graph, self.sequence, q)]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return euler_angles(graph, self.sequence, rotation)
+
+
+@dataclass(frozen=True)
+class Free(Joint):
+    """Six degrees of freedom: position of S in P axes, then Euler angles.  Removes none."""
+
+    type_name: ClassVar[str] = "free"
+    has_axis: ClassVar[bool] = False
+    options: ClassVar[tuple[str, ...]] = ("sequence",)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(
+        [Coordinate(f"_{k}", "length") for k in "xyz"] + [Coordinate(f"_{k}", "angle") for k in (1, 2, 3)]
+    )
+    sequence: str = "xyz"
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return euler(graph, self.sequence, q[3:]), (q[0], q[1], q[2])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        turn = euler(graph, self.sequence, q[3:])
+        o = vec.zero(graph)
+        rates = euler_rates(graph, self.sequence, q[3:])
+        return [(o, row) for row in turn] + [(g, o) for g in rates]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return []
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [*position, *euler_angles(graph, self.sequence, rotation)]
+
+
+@dataclass(frozen=True)
+class Weld(Joint):
+    """No motion.  Allows 0, removes 6."""
+
+    type_name: ClassVar[str] = "weld"
+    has_axis: ClassVar[bool] = False
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return []
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz") + same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return []

@@ -1,0 +1,60 @@
+"""Joints of one degree of freedom: revolute (turn about z) and prismatic (slide along z)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph, atan2
+from ..graph.vectors import Mat3, Vec3
+from .base import Closure, Coordinate, Joint
+from .closures import along, parallel_axes, same_orientation
+from .rotations import about, unit
+
+
+@dataclass(frozen=True)
+class Revolute(Joint):
+    """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
+
+    type_name: ClassVar[str] = "revolute"
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[0]), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(unit(graph, 2), vec.zero(graph))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz") + parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [atan2(rotation[1][0], rotation[0][0])]
+
+
+@dataclass(frozen=True)
+class Prismatic(Joint):
+    """Slides along the common z axis without turning.  Allows 1, removes 5."""
+
+    type_name: ClassVar[str] = "prismatic"
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), (graph.zero, graph.zero, q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, 2))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xy") + same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2]]

@@ -1,0 +1,20 @@
+"""Stage kinematics: Mechanism -> Kinematics (spanning tree, poses, twists, loop constraints) and its mobility."""
+
+from .kinematics import ForceTerms, Kinematics, LoopCoordinates, analyse
+from .loops import Constraints
+from .topology import Branch, Topology, find_topology
+from .tree import Link, Poses, Twist
+
+__all__ = [
+    "Branch",
+    "Constraints",
+    "ForceTerms",
+    "Kinematics",
+    "Link",
+    "LoopCoordinates",
+    "Poses",
+    "Topology",
+    "Twist",
+    "analyse",
+    "find_topology",
+]

@@ -1,0 +1,94 @@
+"""Stage kinematics: cut joints -> constraint equations C(q, t) = 0 and the coordinates of the cut joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..describe.mechanism import JointSpec, Mechanism
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jacobian, jvp
+from .tree import Poses
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """C(q, t) = 0 and what follows from it (Shabana, sec. 3.4 ff.): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
+
+    Rows that vanish identically are left out and listed in ``vanishing``; redundant ones stay.
+    """
+
+    labels: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()  #: 'length' or 'angle' per row
+    values: tuple[Expr, ...] = ()
+    jacobian: tuple[tuple[Expr, ...], ...] = ()  #: dense rows, mostly the zero node
+    time_derivative: tuple[Expr, ...] = ()  #: C_t
+    velocity: tuple[Expr, ...] = ()  #: C_q v + C_t
+    gamma: tuple[Expr, ...] = ()
+    aligned: tuple[Expr, ...] = ()  #: must be positive, else an axis is flipped
+    vanishing: tuple[str, ...] = ()
+    declared: int = 0  #: rows before the vanishing ones were left out
+
+
+@dataclass(frozen=True)
+class Row:
+    """One equation before its derivatives are formed."""
+
+    label: str
+    expression: Expr
+    kind: str
+
+
+def close_loop(spec: JointSpec, poses: Poses) -> tuple[list[Row], list[Expr], list[Expr]]:
+    """Equations of a cut joint, its coordinates, and its alignment conditions."""
+    graph = poses.graph
+    base = poses.common(spec.predecessor, spec.successor)
+    outer = poses.marker(spec.predecessor, base)
+    inner = poses.marker(spec.successor, base)
+    rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
+    gap = vec.sub(inner.position, outer.position)
+    position = vec.transpose_times(outer.rotation, gap)
+    rows = spec.joint.closure(graph, rotation, position)
+    if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish, so any axes do: those of the base are simplest
+        free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
+        rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
+    measured = spec.joint.measure(graph, rotation, position)
+    labelled = [Row(f"{spec.name}.{r.label}", r.expression, r.kind) for r in rows]
+    return labelled, measured, spec.joint.aligned(rotation)
+
+
+def differentiate_constraints(
+    graph: Graph,
+    rows: Sequence[Row],
+    aligned: Sequence[Expr],
+    motion: tuple[Sequence[Expr], Sequence[Expr], Expr],
+) -> Constraints:
+    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
+    q, v, t = motion
+    kept = [r for r in rows if not r.expression.is_zero]
+    values = [r.expression for r in kept]
+    along = dict(zip(q, v, strict=True)) | {t: graph.one}
+    velocity = jvp(values, along)
+    rest = along | dict.fromkeys(v, graph.zero)
+    entries = jacobian(values, list(q))
+    zero = graph.zero
+    return Constraints(
+        labels=tuple(r.label for r in kept),
+        kinds=tuple(r.kind for r in kept),
+        values=tuple(values),
+        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(q))) for i in range(len(kept))),
+        time_derivative=tuple(jvp(values, {t: graph.one})),
+        velocity=tuple(velocity),
+        gamma=tuple(jvp(velocity, rest)),
+        aligned=tuple(e for e in aligned if e.value is None or e.value <= 0),
+        vanishing=tuple(r.label for r in rows if r.expression.is_zero),
+        declared=len(rows),
+    )
+
+
+def lagrangian_rows(mechanism: Mechanism) -> list[Row]:
+    """The constraint equations that accompany a bare Lagrangian."""
+    if mechanism.lagrangian is None:
+        return []
+    return [Row(f"constraint_{k + 1}", e, "angle") for k, e in enumerate(mechanism.lagrangian.constraints)]

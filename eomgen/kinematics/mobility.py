@@ -1,0 +1,302 @@
+"""Stage kinematics: Kinematics and numbers -> Mobility: assembled reference, rank, degrees of freedom, partition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import AssemblyError, ModelError, Problem
+from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
+from ..numeric import (
+    Scales,
+    assemble,
+    choose_independent,
+    conditioning,
+    independent_rows,
+    rank,
+)
+from ..numeric.closure import Equations, System, close
+from .kinematics import Kinematics
+
+Array = NDArray[np.float64]
+PROBES = 4  #: further assembled configurations at which the rank is judged
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """What the numbers say about a mechanism.
+
+    Attributes
+    ----------
+    q_reference : (n_q,) tuple
+        Assembled at the declared initial values.
+    rank : int
+        Largest rank of the constraint Jacobian found at ``configurations`` assembled configurations.
+    n_dof : int
+        Degrees of freedom, n_v - rank.
+    independent, dependent : tuple of str
+        The partition of the coordinates.
+    independent_rows : tuple of int
+        Constraint rows that carry the rank at the reference; the others are ``redundant`` there.
+    conditioning : float
+        How well the independent coordinates move the mechanism at the reference: 1 perfect, 0 not at all.
+    assumed : bool
+        True when parameters had no value, so that the rank was judged with made-up ones.
+    """
+
+    q_reference: tuple[float, ...]
+    rank: int
+    n_dof: int
+    independent: tuple[str, ...]
+    dependent: tuple[str, ...]
+    independent_rows: tuple[int, ...]
+    redundant: tuple[str, ...]
+    conditioning: float
+    length_scale: float
+    configurations: int = 1
+    ranks: tuple[int, ...] = ()
+    assumed: bool = False
+    residual: float = 0.0
+
+
+class ConstraintFunctions:
+    """C, C_q, loop coordinates and alignment of a kinematics as NumPy functions of q, with numbers for the rest."""
+
+    def __init__(self, kinematics: Kinematics, values: Mapping[str, float]) -> None:
+        self.kinematics = kinematics
+        self.values = dict(values) | {"t": 0.0}
+        c, loop = kinematics.constraints, kinematics.loop_coordinates
+        self.n, self.m, self.k = len(kinematics.q), len(c.values), len(loop.names)
+        self._names = (*kinematics.names, *self.values)
+        self._rest = list(self.values.values())
+        self._position = self._compile([*c.values, *_flat(c.jacobian)])
+        self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
+        self._aligned = self._compile(list(c.aligned))
+        (length,) = self._compile([kinematics.length_scale])(np.zeros(self.n))
+        self.length_scale = float(length)
+        self.scales = Scales.of_kinds(kinematics.kinds, c.kinds, self.length_scale)
+
+    def _compile(self, outputs: list[Expr]):  # type: ignore[no-untyped-def]
+        evaluator = compile_evaluator(outputs, self._names)
+        rest = self._rest
+
+        def call(q: Array) -> Array:
+            with np.errstate(all="ignore"):
+                return np.array(evaluator([*map(float, q), *rest]), dtype=float)
+
+        return call
+
+    def position(self, q: Array) -> tuple[Array, Array]:
+        """C (m,) and C_q (m, n)."""
+        flat = self._position(q)
+        return flat[: self.m], flat[self.m :].reshape(self.m, self.n)
+
+    def loop(self, q: Array) -> tuple[Array, Array]:
+        """Coordinates y (k,) of cut joints and y_q (k, n)."""
+        flat = self._loop(q)
+        return flat[: self.k], flat[self.k :].reshape(self.k, self.n)
+
+    def aligned(self, q: Array) -> Array:
+        """Numbers that are positive unless an axis is flipped."""
+        return np.asarray(self._aligned(q))
+
+    def scaled_jacobian(self, q: Array) -> Array:
+        """J (m, n)."""
+        return self.scales.jacobian(self.position(q)[1])
+
+    def _equations(self, wanted: Mapping[str, float]) -> Equations | None:
+        """Values for coordinates of cut joints as equations."""
+        loop = self.kinematics.loop_coordinates
+        picked = [j for j, n in enumerate(loop.names) if n in wanted]
+        if not picked:
+            return None
+        scale = {"length": self.length_scale, "angle": 1.0}
+
+        def measure(q: Array) -> tuple[Array, Array]:
+            y, y_q = self.loop(q)
+            return y[picked], y_q[picked]
+
+        return Equations(
+            measure,
+            np.array([wanted[loop.names[j]] for j in picked]),
+            np.array([scale[loop.kinds[j]] for j in picked]),
+            [loop.kinds[j] == "angle" for j in picked],
+            [loop.names[j] for j in picked],
+        )
+
+    def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> tuple[Array, float]:
+        """Assemble with the given values exact; returns q and the largest scaled residual."""
+        k = self.kinematics
+        start = np.array([given.get(n, guess.get(n, 0.0)) for n in k.names], dtype=float)
+        held = [j for j, n in enumerate(k.names) if n in given]
+        rough = self._equations(guess)
+        if rough is not None:  # come near the guessed coordinates of cut joints first
+            free = np.array([0.0 if n in given else 1.0 for n in k.names])
+            start = close(System(self.position, self.scales, free, rough), start)[0]
+        equations = self._equations(given)
+        found = assemble(
+            self.position,
+            start,
+            self.scales,
+            held=held,
+            equations=equations,
+            alignment=self.aligned if k.constraints.aligned else None,
+            names=k.names,
+            labels=k.constraints.labels,
+        )
+        return found.q, found.residual
+
+
+def _flat(rows: Sequence[Sequence[Expr]]) -> list[Expr]:
+    return [e for row in rows for e in row]
+
+
+def initial_values(kinematics: Kinematics, values: Mapping[str, float], which: str = "initial") -> dict[str, float]:
+    """Declared initial values (or guesses) as numbers, by name."""
+    given: Mapping[str, Expr] = getattr(kinematics.mechanism, which)
+    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values())) if given else []
+    return {name: float(x) for name, x in zip(given, numbers, strict=True)}
+
+
+def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
+    """Assemble the mechanism at its declared initial values and judge its mobility.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    independent : names of coordinates that should be the independent ones; the model's own by default
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close.
+    ModelError
+        The chosen independent coordinates are too many, unknown or cannot move the mechanism.
+    """
+    mechanism = kinematics.mechanism
+    wanted = tuple(independent) or mechanism.independent
+    _check_names(kinematics, wanted)
+    values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
+    missing = [n for n, x in values.items() if x is None]
+    numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
+    functions = ConstraintFunctions(kinematics, numbers)
+    if missing:
+        return replace(_judge_assumed(functions, wanted), assumed=True)
+    given = initial_values(kinematics, numbers)
+    guess = initial_values(kinematics, numbers, "guess")
+    positions = {n: x for n, x in given.items() if not n.endswith("_dot")}
+    q, residual = functions.close(positions, guess)
+    return replace(_partition(functions, [q, *_probe(functions, q)], wanted), residual=residual)
+
+
+def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
+    problems = []
+    known = (*kinematics.names, *kinematics.loop_coordinates.names)
+    for name in wanted:
+        if name in kinematics.names:
+            continue
+        if name in known:
+            message = f"{name!r} belongs to the joint that closes its loop, as the other joints were chosen too"
+            problems.append(Problem("independent", message, "choose fewer coordinates of one loop"))
+        else:
+            near = get_close_matches(name, known, 1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            problems.append(Problem("independent", f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"))
+    if problems:
+        raise ModelError(problems)
+
+
+def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
+    """Without parameter values: made-up ones, assembled if that works, else judged off the manifold."""
+    zero = np.zeros(functions.n)
+    if not functions.m:
+        return _partition(functions, [zero], wanted)
+    for k in range(5):  # some sizes close a loop and some do not
+        names = list(functions.values)
+        trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
+        attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
+        try:
+            q, _ = attempt.close({}, {n: 0.3 + 0.1 * j for j, n in enumerate(functions.kinematics.names)})
+        except AssemblyError:
+            continue
+        return _partition(attempt, [q, *_probe(attempt, q)], wanted)
+    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, functions.n))
+    return _partition(functions, list(generic), wanted)
+
+
+def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
+    """More assembled configurations, reached along the null space from q."""
+    if not functions.m:
+        return []
+    found = []
+    random = np.random.default_rng(1)
+    for k in range(PROBES):
+        J = functions.scaled_jacobian(q)
+        basis = np.linalg.svd(J)[2][rank(J).rank :]
+        step = random.normal(size=len(basis)) @ basis
+        length = float(np.linalg.norm(step))
+        if length == 0.0:
+            break
+        start = q + (0.1 + 0.1 * k) / length * step * functions.scales.q
+        try:
+            closed, _ = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True)))
+        except AssemblyError:
+            continue
+        found.append(closed)
+    return found
+
+
+def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], wanted: Sequence[str]) -> Mobility:
+    kinematics = functions.kinematics
+    names, labels = kinematics.names, kinematics.constraints.labels
+    n = len(names)
+    q = configurations[0]
+    if functions.m:
+        jacobians = [functions.scaled_jacobian(x) for x in configurations]
+        ranks = tuple(rank(J).rank for J in jacobians)
+    else:
+        jacobians, ranks = [np.empty((0, n))], (0,)
+    r = max(ranks)
+    n_dof = n - r
+    if len(wanted) > n_dof:
+        message = f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
+        raise ModelError([Problem("independent", message, f"choose {n_dof} of {', '.join(names)}")])
+    chosen = _choose(kinematics, jacobians, r, wanted)
+    quality = conditioning(jacobians[0], chosen)
+    if wanted and quality < 1e-8 and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
+        message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
+        better = [names[j] for j in choose_independent(jacobians, r)]
+        raise ModelError([Problem("independent", message, f"{', '.join(better)} can")])
+    rows = independent_rows(jacobians[int(np.argmax(ranks))], r) if r else np.empty(0, dtype=int)
+    kept = tuple(int(i) for i in rows)
+    return Mobility(
+        q_reference=tuple(float(x) for x in q),
+        rank=r,
+        n_dof=n_dof,
+        independent=tuple(names[j] for j in chosen),
+        dependent=tuple(name for j, name in enumerate(names) if j not in chosen),
+        independent_rows=kept,
+        redundant=tuple(label for i, label in enumerate(labels) if i not in kept),
+        conditioning=quality,
+        length_scale=functions.length_scale,
+        configurations=len(configurations),
+        ranks=ranks,
+    )
+
+
+def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
+    names = kinematics.names
+    n_dof = len(names) - r
+    picked = [names.index(name) for name in wanted]
+    if len(picked) == n_dof:
+        return tuple(picked)
+    if r == 0:
+        return tuple(range(n_dof))
+    named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
+    prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
+    return tuple(int(j) for j in choose_independent(jacobians, r, prefer))

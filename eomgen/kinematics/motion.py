@@ -1,0 +1,87 @@
+"""Stage kinematics: motion of markers and joint coordinates in ground axes, what force elements and outputs look at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..describe.mechanism import Mechanism
+from ..frames import GROUND, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.differentiate import jvp
+from ..graph.vectors import Mat3, Vec3
+from .tree import Poses, Twist
+
+COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
+
+
+class Motion:
+    """Implements :class:`eomgen.forces.View`, and resolves every derived symbol of a mechanism.
+
+    Parameters
+    ----------
+    coordinates : mapping
+        ``name -> (value, rate, acceleration)`` of every joint coordinate, tree and cut.
+    """
+
+    def __init__(
+        self,
+        poses: Poses,
+        twists: Sequence[Twist],
+        state: tuple[Sequence[Expr], Sequence[Expr], Sequence[Expr], Expr],
+        coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
+    ) -> None:
+        self.graph = poses.graph
+        self.poses = poses
+        self.twists = twists
+        self.coordinates = coordinates
+        q, v, a, t = state
+        self._along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True)) | {t: self.graph.one}
+
+    def position(self, marker: Marker) -> Vec3:
+        """Origin of the marker, ground axes (m)."""
+        return self.poses.marker(marker).position
+
+    def rotation(self, marker: Marker) -> Mat3:
+        """Rotation that takes marker axes to ground axes."""
+        return self.poses.marker(marker).rotation
+
+    def angular_velocity(self, marker: Marker) -> Vec3:
+        """Angular velocity of the marker's body, ground axes (rad/s)."""
+        if marker.body == GROUND:
+            return vec.zero(self.graph)
+        link = self.poses.link_of[marker.body]
+        return vec.times(self.poses.link(link).rotation, self.twists[link][0])
+
+    def velocity(self, marker: Marker) -> Vec3:
+        """Velocity of the marker's origin, ground axes (m/s)."""
+        if marker.body == GROUND:
+            return vec.zero(self.graph)
+        link = self.poses.link_of[marker.body]
+        angular, linear = self.twists[link]
+        arm = self.poses.marker_in_link(marker).position
+        return vec.times(self.poses.link(link).rotation, vec.add(linear, vec.cross(angular, arm)))
+
+    def acceleration(self, marker: Marker) -> Vec3:
+        """Acceleration of the marker's origin, ground axes (m/s^2)."""
+        x, y, z = jvp(list(self.velocity(marker)), self._along)
+        return (x, y, z)
+
+    def coordinate(self, name: str) -> tuple[Expr, Expr]:
+        """Value and rate of a joint coordinate."""
+        value, rate, _ = self.coordinates[name]
+        return value, rate
+
+    def derived_symbols(self, mechanism: Mechanism, used: set[str]) -> dict[Expr, Expr]:
+        """What cut joints' coordinates and marker quantities stand for, as a substitution, for the symbols ``used``."""
+        mapping: dict[Expr, Expr] = {}
+        for name, triple in self.coordinates.items():
+            for suffix, value in zip(COORDINATE_SUFFIXES, triple, strict=True):
+                symbol = self.graph.symbol(name + suffix)
+                if name + suffix in used and symbol != value:
+                    mapping[symbol] = value
+        look = (self.position, self.velocity, self.acceleration)
+        for name, quantity in mechanism.quantities.items():
+            if name in used:
+                mapping[self.graph.symbol(name)] = look[quantity.level](quantity.marker)[quantity.axis]
+        return mapping

@@ -1,0 +1,159 @@
+"""Stage kinematics: Kinematics and Mobility -> MechanismReport, what a person wants to know before trusting a model."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from .kinematics import Kinematics
+from .mobility import Mobility
+
+
+@dataclass(frozen=True)
+class MechanismReport:
+    """Counts, topology and mobility of a mechanism.
+
+    Attributes
+    ----------
+    gruebler_kutzbach : int or None
+        6 (bodies) - sum over joints of 6 - f; None for a bare Lagrangian.
+    gruebler_kutzbach_planar : int or None
+        3 (bodies) - sum of 3 - f, where the mechanism moves in a plane.
+    constraints : int
+        Loop-closure rows that do not vanish identically, of ``constraints_declared``.
+    redundant : list of str
+        Rows that follow from the others at the reference configuration.
+    """
+
+    name: str
+    bodies: list[str]
+    joints: list[dict[str, Any]]
+    tree: list[dict[str, str]]
+    loop_joints: list[str]
+    coordinates: list[str]
+    loop_coordinates: list[str]
+    independent: list[str]
+    dependent: list[str]
+    constraints: int
+    constraints_declared: int
+    rank: int
+    ranks: list[int]
+    degrees_of_freedom: int
+    gruebler_kutzbach: int | None
+    gruebler_kutzbach_planar: int | None
+    redundant: list[str]
+    conditioning: float
+    length_scale: float
+    reference: dict[str, float]
+    assumed: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as plain values, for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        lines = [f"mechanism {self.name}"]
+
+        def say(label: str, text: str) -> None:
+            lines.append(f"  {label:<22}{text}")
+
+        if self.bodies:
+            say("bodies", f"{len(self.bodies)}: {_list(self.bodies)}")
+            say("joints", f"{len(self.joints)}: " + _list([f"{j['name']} ({j['type']})" for j in self.joints]))
+            say("loop joints", _list(self.loop_joints) or "none (open tree)")
+        say("coordinates", f"{len(self.coordinates)}: {_list(self.coordinates)}")
+        if self.loop_coordinates:
+            say("at loop joints", _list(self.loop_coordinates))
+        if self.constraints_declared:
+            vanishing = self.constraints_declared - self.constraints
+            note = f" ({vanishing} more hold identically)" if vanishing else ""
+            say("constraints", f"{self.constraints}{note}")
+            say("rank", f"{self.rank}" + (f"; redundant: {_list(self.redundant)}" if self.redundant else ""))
+        if len(set(self.ranks)) > 1:
+            say("", f"the rank differs between configurations: {sorted(set(self.ranks))}")
+        counts = []
+        if self.gruebler_kutzbach is not None:
+            counts.append(f"Gruebler-Kutzbach {self.gruebler_kutzbach} in space")
+        if self.gruebler_kutzbach_planar is not None:
+            counts.append(f"{self.gruebler_kutzbach_planar} in the plane")
+        say("degrees of freedom", f"{self.degrees_of_freedom}" + (f" ({', '.join(counts)})" if counts else ""))
+        say("independent", _list(self.independent) or "none")
+        if self.dependent:
+            say("dependent", f"{_list(self.dependent)} (conditioning {self.conditioning:.2g})")
+        if self.assumed:
+            lines.append("  some parameters have no value: the rank was judged with made-up ones")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def _list(names: list[str], limit: int = 12) -> str:
+    if len(names) <= limit:
+        return ", ".join(names)
+    return ", ".join(names[: limit - 2]) + f", ... ({len(names) - limit + 2} more)"
+
+
+def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
+    """Describe a mechanism and what its numbers say."""
+    m, c = kinematics.mechanism, kinematics.constraints
+    names = ["ground", *(b.name for b in m.bodies)]
+    spatial = planar = None
+    if m.lagrangian is None:
+        freedoms = [len(j.coordinates) for j in m.joints]
+        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms)
+        if _moves_in_a_plane(kinematics):
+            planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
+    return MechanismReport(
+        name=m.name,
+        bodies=names[1:],
+        joints=[
+            {
+                "name": j.name,
+                "type": j.joint.type_name,
+                "between": [j.predecessor.label, j.successor.label],
+                "coordinates": list(j.coordinates),
+            }
+            for j in m.joints
+        ],
+        tree=[
+            {"body": names[b.body + 1], "parent": names[b.parent + 1], "joint": m.joints[b.joint].name}
+            for b in kinematics.topology.branches
+        ],
+        loop_joints=[m.joints[k].name for k in kinematics.topology.cut],
+        coordinates=list(kinematics.names),
+        loop_coordinates=list(kinematics.loop_coordinates.names),
+        independent=list(mobility.independent),
+        dependent=list(mobility.dependent),
+        constraints=len(c.values),
+        constraints_declared=c.declared,
+        rank=mobility.rank,
+        ranks=list(mobility.ranks),
+        degrees_of_freedom=mobility.n_dof,
+        gruebler_kutzbach=spatial,
+        gruebler_kutzbach_planar=planar,
+        redundant=list(mobility.redundant),
+        conditioning=mobility.conditioning,
+        length_scale=mobility.length_scale,
+        reference=dict(zip(kinematics.names, mobility.q_reference, strict=True)),
+        assumed=mobility.assumed,
+    )
+
+
+def _moves_in_a_plane(kinematics: Kinematics) -> bool:
+    """Whether every body turns about one ground axis only and moves across it, identically."""
+    graph = kinematics.graph
+    turns, slides = [], []
+    for k in range(len(kinematics.mechanism.bodies)):
+        origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), "")
+        turns.append(kinematics.motion.angular_velocity(origin))
+        slides.append(kinematics.motion.velocity(origin))
+    for axis in range(3):
+        others = [i for i in range(3) if i != axis]
+        if all(w[i].is_zero for w in turns for i in others) and all(v[axis].is_zero for v in slides):
+            return bool(kinematics.mechanism.bodies)
+    return False

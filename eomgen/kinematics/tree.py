@@ -1,0 +1,182 @@
+"""Stage kinematics: Topology -> links, the bodies of the tree with their placement and twist recursion.
+
+Each body is described in its *link frame*: the marker by which its tree joint holds it.  Twists are (angular, linear)
+in link axes at the link's origin (Featherstone, RBDA, ch. 2, with body coordinates).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..describe.mechanism import Mechanism
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+from .topology import Topology
+
+Twist = tuple[Vec3, Vec3]
+
+
+@dataclass(frozen=True)
+class Link:
+    """One body of the tree.
+
+    A vector in parent link axes goes to link axes by ``joint_rotation^T turn^T``; the link's origin is at ``position``
+    in parent link axes.  ``columns`` is the motion subspace in link axes, for coordinates ``first`` onwards.
+    """
+
+    name: str
+    body: int
+    parent: int  #: index of the parent link, GROUND for none
+    first: int
+    turn: Mat3  #: rotation of the joint's marker on the parent, constant
+    joint_rotation: Mat3
+    position: Vec3
+    columns: tuple[Twist, ...]
+    mass: Expr
+    com: Vec3  #: centre of mass, link axes
+    inertia: Mat3  #: about the centre of mass, link axes
+    frame: Frame  #: the link frame in the body
+
+    def down(self, x: Vec3) -> Vec3:
+        """Parent link axes to link axes."""
+        return vec.transpose_times(self.joint_rotation, vec.transpose_times(self.turn, x))
+
+    def up(self, x: Vec3) -> Vec3:
+        """Link axes to parent link axes."""
+        return vec.times(self.turn, vec.times(self.joint_rotation, x))
+
+    def down_twist(self, twist: Twist) -> Twist:
+        """A twist of the parent, seen in this link's frame."""
+        angular, linear = twist
+        return self.down(angular), self.down(vec.add(linear, vec.cross(angular, self.position)))
+
+
+def place(frame: Frame, marker: Frame) -> Frame:
+    """A marker of the body, in the link frame ``frame`` of the same body."""
+    turn = vec.transpose(frame.rotation)
+    return Frame(vec.product(turn, marker.rotation), vec.times(turn, vec.sub(marker.position, frame.position)))
+
+
+def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Expr]) -> tuple[Link, ...]:
+    """Links in tree order; ``symbols`` gives the Expr of each tree coordinate by name."""
+    graph = mechanism.graph
+    ground = Frame(vec.identity(graph), vec.zero(graph))
+    index = {GROUND: GROUND}
+    frames = {GROUND: ground}
+    links: list[Link] = []
+    first = 0
+    for branch in topology.branches:
+        spec = mechanism.joints[branch.joint]
+        q = [symbols[name] for name in spec.coordinates]
+        rotation, position = spec.joint.pose(graph, q)
+        columns = spec.joint.subspace(graph, q)
+        outer, inner = spec.predecessor, spec.successor
+        if branch.reversed:
+            outer, inner = inner, outer
+            columns = [_reverse(rotation, position, column) for column in columns]
+            position = vec.neg(vec.transpose_times(rotation, position))
+            rotation = vec.transpose(rotation)
+        holder = place(frames[branch.parent], outer.frame)
+        body = mechanism.bodies[branch.body]
+        frame = inner.frame
+        back = vec.transpose(frame.rotation)
+        links.append(
+            Link(
+                name=body.name,
+                body=branch.body,
+                parent=index[branch.parent],
+                first=first,
+                turn=holder.rotation,
+                joint_rotation=rotation,
+                position=vec.add(holder.position, vec.times(holder.rotation, position)),
+                columns=tuple(columns),
+                mass=body.mass,
+                com=vec.times(back, vec.sub(body.com, frame.position)),
+                inertia=vec.product(back, vec.product(body.inertia, frame.rotation)),
+                frame=frame,
+            )
+        )
+        index[branch.body] = len(links) - 1
+        frames[branch.body] = frame
+        first += len(columns)
+    return tuple(links)
+
+
+def _reverse(rotation: Mat3, position: Vec3, column: Twist) -> Twist:
+    """The twist of P relative to S, in P axes at P, from that of S relative to P, in S axes at S."""
+    angular, linear = (vec.times(rotation, x) for x in column)
+    return vec.neg(angular), vec.sub(vec.cross(angular, position), linear)
+
+
+def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> list[Twist]:
+    """Twists of all links: omega_i = R^T omega_p + sum s v (Featherstone, RBDA, eq. 4.9)."""
+    twists: list[Twist] = []
+    still = (vec.zero(graph), vec.zero(graph))
+    for link in links:
+        twist = link.down_twist(twists[link.parent] if link.parent != GROUND else still)
+        for k, (angular, linear) in enumerate(link.columns):
+            rate = v[link.first + k]
+            twist = (vec.add(twist[0], vec.scale(rate, angular)), vec.add(twist[1], vec.scale(rate, linear)))
+        twists.append(twist)
+    return twists
+
+
+class Poses:
+    """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
+
+    def __init__(self, mechanism: Mechanism, links: tuple[Link, ...]) -> None:
+        self.graph = mechanism.graph
+        self.links = links
+        self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
+        self._known: dict[tuple[int, int], Frame] = {}
+
+    def marker_in_link(self, marker: Marker) -> Frame:
+        """Constant placement of a marker in its link frame (in ground for a ground marker)."""
+        if marker.body == GROUND:
+            return marker.frame
+        return place(self.links[self.link_of[marker.body]].frame, marker.frame)
+
+    def ancestors(self, link: int) -> list[int]:
+        """The link, its parent, ..., GROUND."""
+        chain = [link]
+        while chain[-1] != GROUND:
+            chain.append(self.links[chain[-1]].parent)
+        return chain
+
+    def link(self, link: int, base: int = GROUND) -> Frame:
+        """Placement of a link in link ``base``, one of its ancestors."""
+        if link == base:
+            return Frame(vec.identity(self.graph), vec.zero(self.graph))
+        key = (link, base)
+        if key not in self._known:
+            chain = self.ancestors(link)
+            for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
+                if (k, base) not in self._known:
+                    self._known[k, base] = self._step(k, base)
+        return self._known[key]
+
+    def _step(self, k: int, base: int) -> Frame:
+        link = self.links[k]
+        local = vec.product(link.turn, link.joint_rotation)
+        if link.parent == base:
+            return Frame(local, link.position)
+        parent = self._known[link.parent, base]
+        rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
+        return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+
+    def marker(self, marker: Marker, base: int = GROUND) -> Frame:
+        """Placement of a marker in link ``base``, an ancestor of its link."""
+        inner = self.marker_in_link(marker)
+        outer = self.link(self.link_of[marker.body], base)
+        return Frame(
+            vec.product(outer.rotation, inner.rotation),
+            vec.add(outer.position, vec.times(outer.rotation, inner.position)),
+        )
+
+    def common(self, a: Marker, b: Marker) -> int:
+        """The nearest link that carries both markers."""
+        first = self.ancestors(self.link_of[a.body])
+        second = set(self.ancestors(self.link_of[b.body]))
+        return next(k for k in first if k in second)

@@ -1,0 +1,179 @@
+"""Stage numeric: a rough guess, values to hold -> coordinates with all loops closed, or a message that says why not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import AssemblyError
+from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
+from .closure import Equations, System, close, closed
+from .projection import largest
+from .rank import rank
+from .scales import Array, Indices, Position, Scales
+
+__all__ = ["Assembly", "Equations", "Rates", "VelocityEquations", "assemble", "assemble_velocity", "starts"]
+
+RESTARTS = 24  #: further starts near the guess
+RADII = (0.05, 0.2, 0.5, 1.0, 1.6, 2.4)  #: scaled distance of the starts, each used for a few
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
+
+
+class Assembly(NamedTuple):
+    """An assembled position."""
+
+    q: Array  #: (n,)
+    residual: float  #: largest scaled residual
+    restarts: int  #: starts needed besides the guess
+    distance: float  #: largest scaled distance of a coordinate from the guess
+
+
+def assemble(
+    position: Position,
+    guess: Array,
+    scales: Scales,
+    *,
+    held: Sequence[int] | Indices = (),
+    equations: Equations | None = None,
+    alignment: Callable[[Array], Array] | None = None,
+    names: Sequence[str] = (),
+    labels: Sequence[str] = (),
+    restarts: int = RESTARTS,
+) -> Assembly:
+    """Close the loops.
+
+    Parameters
+    ----------
+    position : callable
+        q (n,) -> C (m,), C_q (m, n); all rows, redundant ones included.
+    guess : (n,) array
+        Start; the held coordinates have their exact values here.
+    scales : Scales
+    held : sequence of int
+        Coordinates that must not move.
+    equations : Equations, optional
+        Values of functions of q to reach exactly.
+    alignment : callable, optional
+        q -> (n_a,) numbers that are positive unless a loop closes with a joint's axes flipped.
+    names, labels : sequences of str
+        Names of the coordinates (n,) and of the constraint rows (m,), for messages.
+    restarts : int
+        Largest number of further starts, at fixed places around the guess.
+
+    Returns
+    -------
+    Assembly
+        The first closed position found; from a good guess the nearest one.
+
+    Raises
+    ------
+    AssemblyError
+        With the rows that stay open, what was held, and whether leaving the given values free helps.
+    """
+    guess = np.asarray(guess, dtype=float)
+    held = np.asarray(held, dtype=np.intp)
+    free = np.ones(len(guess))
+    free[held] = 0.0
+    system = System(position, scales, free, equations)
+    best, least, flipped = guess, np.inf, False
+    for attempt, start in enumerate(starts(guess, free * scales.q, restarts)):
+        with np.errstate(all="ignore"):
+            q, residual = close(system, start)
+        if not closed(residual):
+            if residual < least:
+                best, least = q, residual
+        elif alignment is not None and not (np.asarray(alignment(q)) > 0.0).all():
+            flipped = True
+        else:
+            return Assembly(q, residual, attempt, largest((q - guess) / scales.q))
+    failure = _Failure(system, guess, held, best, flipped, names, labels, restarts)
+    raise AssemblyError(failure.message())
+
+
+def starts(guess: Array, reach: Array, restarts: int) -> Iterator[Array]:
+    """The guess, then `restarts` places around it, ever farther away; the same ones every time."""
+    yield guess
+    for k in range(restarts):
+        radius = RADII[min(k * len(RADII) // restarts, len(RADII) - 1)]
+        # Halton sequence; the shifted index keeps later coordinates from repeating earlier ones
+        unit = [_halton(k + 1 + 7 * (i // len(PRIMES)), PRIMES[i % len(PRIMES)]) for i in range(len(guess))]
+        yield guess + radius * reach * (2.0 * np.array(unit) - 1.0)
+
+
+def _halton(index: int, base: int) -> float:
+    value, part = 0.0, 1.0
+    while index:
+        part /= base
+        value += part * (index % base)
+        index //= base
+    return value
+
+
+class _Failure(NamedTuple):
+    """Everything needed to say why an assembly failed."""
+
+    system: System
+    guess: Array
+    held: Indices
+    best: Array
+    flipped: bool
+    names: Sequence[str]
+    labels: Sequence[str]
+    restarts: int
+
+    def message(self) -> str:
+        given = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
+        if self.flipped:
+            return (
+                f"the loops close only with the axes of a joint flipped{self._with(given)}; "
+                "give initial values nearer to the wanted position"
+            )
+        gaps = f"the largest gaps are {self._gaps()}"
+        if not given:
+            return (
+                f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
+                "check the dimensions, or give a better guess"
+            )
+        free = System(self.system.position, self.system.scales, np.ones_like(self.guess))
+        for start in starts(self.best, free.scales.q, self.restarts // 2):
+            with np.errstate(all="ignore"):
+                q, residual = close(free, start)
+            if closed(residual):
+                break
+        else:
+            return (
+                f"the loops do not close{self._with(given)}, nor with these values left free "
+                f"({self.restarts + 1} starts tried): {gaps}; check the dimensions, or give a better guess"
+            )
+        near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
+        dof = len(q) - rank(free.evaluate(q)[1]).rank
+        if len(given) > dof:
+            return (
+                f"the given values {', '.join(given)} are inconsistent: {len(given)} values for {dof} "
+                f"degree{'s' if dof != 1 else ''} of freedom, and with all of them held {gaps}; "
+                f"give fewer, or consistent ones such as {', '.join(near)}"
+            )
+        return f"the loops cannot close{self._with(given)}: {gaps}; a closed position nearby has {', '.join(near)}"
+
+    def _with(self, given: list[str]) -> str:
+        return f" with {', '.join(given)}" if given else ""
+
+    def _given(self, q: Array, y: Array) -> list[str]:
+        names = self.names or [f"q[{i}]" for i in range(len(q))]
+        coordinates = [f"{names[i]} = {q[i]:.6g}" for i in self.held]
+        functions = self.system.equations.names if self.system.equations else ()
+        return coordinates + [f"{name} = {value:.6g}" for name, value in zip(functions, y, strict=True)]
+
+    def _gaps(self) -> str:
+        C = self.system.position(self.best)[0]
+        e, found = self.system.scales.residual(C), list(C)
+        labels = list(self.labels) or [f"C[{i}]" for i in range(len(C))]
+        if self.system.equations:
+            y = self.system.equations.difference(self.system.equations.evaluate(self.best)[0])
+            e = np.concatenate([e, y / self.system.equations.scales])
+            found += list(y)
+            labels += list(self.system.equations.names)
+        order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= 1e-8]
+        return ", ".join(f"{labels[i]} {abs(found[i]):.3g}" for i in order)

@@ -1,0 +1,103 @@
+"""Stage numeric: constraints, held coordinates, further equations -> coordinates that satisfy all, near a guess.
+
+Levenberg-damped Gauss-Newton steps of minimum norm in the coordinates that are free to move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .projection import ACCEPTED, EXACT, SETTLED, TIKHONOV, largest
+from .scales import Array, Position, Scales
+
+STEPS = 80  #: damped steps at most
+LONGEST = 0.5  #: largest scaled step
+
+
+class Equations(NamedTuple):
+    """Values wanted for functions y(q), such as the coordinates of cut joints."""
+
+    evaluate: Callable[[Array], tuple[Array, Array]]  #: q (n,) -> y (k,), y_q (k, n)
+    values: Array  #: (k,) wanted
+    scales: Array  #: (k,) the length scale for lengths, 1 for angles
+    angles: Sequence[bool]  #: (k,) whether y counts modulo a full turn
+    names: Sequence[str]  #: (k,) for messages
+
+    def difference(self, y: Array) -> Array:
+        """y - values, angles in [-pi, pi]; not scaled."""
+        gap = y - self.values
+        return np.where(self.angles, np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
+
+
+class System(NamedTuple):
+    """C(q) = 0 and y(q) = values with some coordinates held."""
+
+    position: Position
+    scales: Scales
+    free: Array  #: (n,) 1.0 for a coordinate that may move, 0.0 for a held one
+    equations: Equations | None = None
+
+    def evaluate(self, q: Array) -> tuple[Array, Array]:
+        """Scaled residual e (m + k,) and its scaled Jacobian (m + k, n), zero in the columns of held coordinates."""
+        C, C_q = self.position(q)
+        e, J = self.scales.residual(C), self.scales.jacobian(C_q)
+        if self.equations is not None:
+            y, y_q = self.equations.evaluate(q)
+            s = self.equations.scales
+            e = np.concatenate([e, self.equations.difference(y) / s])
+            J = np.vstack([J, y_q * self.scales.q / s[:, None]])
+        return e, J * self.free
+
+
+def close(system: System, q: Array, steps: int = STEPS) -> tuple[Array, float]:
+    """Minimise the scaled residual from q.
+
+    Returns
+    -------
+    q : (n,) array
+        The last point.
+    residual : float
+        Largest scaled residual there; closed when it is not above 1e-10.
+    """
+    e, J = system.evaluate(q)
+    damping = 1e-3
+    for _ in range(steps):
+        size = largest(e)
+        if size <= EXACT or not np.isfinite(size):
+            break
+        G = J @ J.T
+        top = float(G.diagonal().max())
+        if top == 0.0 or largest(J.T @ e) <= 1e-15 * top:
+            break  # nothing that may move makes a difference
+        G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
+        dz = -J.T @ np.linalg.solve(G, e)
+        longest = largest(dz)
+        if longest > LONGEST:
+            dz *= LONGEST / longest
+        trial = q + system.scales.q * dz
+        e_trial, J_trial = system.evaluate(trial)
+        gained = float(e @ e - e_trial @ e_trial)
+        if not gained > 0.0:  # NaN included
+            if size <= SETTLED:
+                break
+            damping = max(10.0 * damping, 1e-8)
+            if damping > 1e8:
+                break
+            continue
+        settled = size <= SETTLED and largest(e_trial) > 0.5 * size
+        q, e, J = trial, e_trial, J_trial
+        if settled:
+            break
+        # quadratic convergence at the end needs the damping to vanish with the residual
+        damping = min(0.1 * damping, size)
+        if damping < TIKHONOV:
+            damping = 0.0
+    return q, largest(e)
+
+
+def closed(residual: float) -> bool:
+    """Whether a scaled residual counts as closed."""
+    return residual <= ACCEPTED

@@ -1,0 +1,76 @@
+"""Stage numeric: a closed position, other values of held coordinates -> the position reached by moving there steadily.
+
+The way to stay on the branch the mechanism is on: small steps along the straight line of the held values.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import AssemblyError
+from .closure import Equations, System, close, closed
+from .projection import largest
+from .scales import Array, Indices, Position, Scales
+
+STEP = 0.1  #: largest scaled change of a held value in one step
+JUMP = 0.6  #: largest scaled change of any coordinate in one step
+SMALLEST = 2.0**-10  #: of STEP, before giving up
+LONGEST = 200.0  #: scaled distance too long to walk
+
+
+def follow(
+    position: Position,
+    start: Array,
+    scales: Scales,
+    held: Indices,
+    values: Array,
+    equations: Equations | None = None,
+) -> Array:
+    """Move held coordinates, and functions y(q), from where they are to new values; the others follow.
+
+    Parameters
+    ----------
+    position : callable
+        q (n,) -> C (m,), C_q (m, n).
+    start : (n,) array
+        A closed position.
+    held : (k,) array of int
+        Coordinates that are led.
+    values : (k,) array
+        Their values at the end, reached exactly.
+    equations : Equations, optional
+        Functions of q that are led to values as well.
+
+    Returns
+    -------
+    (n,) array
+
+    Raises
+    ------
+    AssemblyError
+        The way is blocked (a dead centre of a led coordinate), or longer than 200 rad or length scales.
+    """
+    q = np.array(start)
+    way = values - q[held]
+    gap = equations.difference(equations.evaluate(q)[0]) if equations else np.empty(0)
+    length = max(largest(way / scales.q[held]), largest(gap / equations.scales) if equations else 0.0)
+    if not length <= LONGEST:
+        raise AssemblyError(f"the way from the reference position is too long ({length:.3g})")
+    free = np.ones_like(q)
+    free[held] = 0.0
+    done, step = 0.0, min(1.0, STEP / length) if length else 1.0
+    usual = step
+    while done < 1.0:
+        reached = min(1.0, done + step)
+        trial = np.array(q)
+        trial[held] = values if reached == 1.0 else start[held] + reached * way
+        part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
+        trial, residual = close(System(position, scales, free, part), trial, steps=15)
+        if closed(residual) and largest((trial - q) / scales.q) <= JUMP:
+            q, done = trial, reached
+            step = min(2.0 * step, usual)
+        else:
+            step *= 0.5
+            if step < SMALLEST * usual:
+                raise AssemblyError(f"the way is blocked after {100 * done:.0f} % of it")
+    return q

@@ -1,0 +1,170 @@
+"""Stage numeric: M, h, C_q, gamma of a state -> accelerations, and the exact Jacobian of the right-hand side.
+
+The embedding technique (Shabana, Computational Dynamics, "embedding technique"): ``v = B v_i + b_t``, so that
+``B^T M B a_i = -B^T (h + M a_p)`` with a particular solution ``C_q a_p = -gamma``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import NonFiniteError, SingularMassMatrixError
+from .partition import Partition, partition
+from .projection import minimum_norm, project, tangent_projector
+from .scales import Array, Indices, Position, Rate, Scales
+
+SINGULAR = 1e-13  #: smallest pivot of the embedded mass matrix, relative to its largest diagonal entry
+
+
+class Terms(NamedTuple):
+    """What the equations ``M a + h + C_q^T l = 0``, ``C_q a + gamma = 0`` are made of at one state."""
+
+    M: Array  #: (n, n)
+    h: Array  #: (n,)
+    C_q: Array  #: (m, n)
+    gamma: Array  #: (m,)
+
+
+def unpack_terms(flat: Array, n: int, m: int) -> Terms:
+    """The block ``terms`` [M lower triangle row by row | h | C_q | gamma] as arrays."""
+    lower = n * (n + 1) // 2
+    M = np.empty((n, n))
+    rows, columns = np.tril_indices(n)
+    M[rows, columns] = flat[:lower]
+    M[columns, rows] = flat[:lower]
+    h, C_q, gamma = np.split(flat[lower:], [n, n + m * n])
+    return Terms(M, h, C_q.reshape(m, n), gamma)
+
+
+class Embedded(NamedTuple):
+    """The system of the degrees of freedom at one configuration, scaled and factorised."""
+
+    M: Array  #: (n, n) scaled mass matrix of the tree
+    matrix: Array  #: (n_dof, n_dof) B^T M B
+    factor: Array  #: its Cholesky factor L
+    split: Partition
+
+    def solve(self, f: Array) -> Array:
+        """``B (B^T M B)^-1 B^T f``, f (n,) or (n, k)."""
+        y = np.linalg.solve(self.factor, self.split.B.T @ f)
+        return np.asarray(self.split.B @ np.linalg.solve(self.factor.T, y))
+
+
+def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence[int] | Indices) -> Embedded:
+    """Form and factorise the embedded mass matrix.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        A pivot is not above 1e-13 of the largest diagonal entry.
+    PartitionError
+        As :func:`~.partition.partition`.
+    """
+    scaled = scales.q[:, None] * M * scales.q
+    split = partition(scales.jacobian(C_q), rank, independent)
+    matrix = split.B.T @ scaled @ split.B
+    if not np.isfinite(matrix).all():
+        raise NonFiniteError("the mass matrix is not finite")
+    try:
+        factor: Array = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise SingularMassMatrixError("the mass matrix of the degrees of freedom is not positive definite") from None
+    # the squares of its diagonal are the pivots of L D L^T
+    if matrix.size and factor.diagonal().min() ** 2 <= SINGULAR * matrix.diagonal().max():
+        raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
+    return Embedded(scaled, matrix, factor, split)
+
+
+def accelerate(terms: Terms, scales: Scales, system: Embedded) -> Array:
+    """Accelerations a (n,) at a state on the manifold."""
+    s = scales.q
+    a_p = system.split.particular(-scales.residual(terms.gamma))
+    a = s * (a_p - system.solve(s * terms.h + system.M @ a_p))
+    if not np.isfinite(a).all():
+        raise NonFiniteError("the accelerations are not finite")
+    return np.asarray(a)
+
+
+def rhs(
+    terms: Callable[[Array, Array], Terms],
+    position: Position,
+    rate: Rate,
+    q: Array,
+    v: Array,
+    scales: Scales,
+    rank: int,
+    independent: Sequence[int] | Indices,
+) -> Array:
+    """x' = [v, a] (2 n,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
+    q, v = project(position, rate, q, v, scales)
+    here = terms(q, v)
+    return np.concatenate([v, accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))])
+
+
+class Residuals(NamedTuple):
+    """Derivatives of r1 = M a + h + C_q^T l, r2 = C_q a + gamma, r3 = C_q v + C_t at fixed a, l."""
+
+    r1_q: Array  #: (n, n)
+    r1_v: Array  #: (n, n)
+    r2_q: Array  #: (m, n)
+    r2_v: Array  #: (m, n)
+    r3_q: Array  #: (m, n)
+
+
+def jacobian(
+    terms: Callable[[Array, Array], Terms],
+    residuals: Callable[[Array, Array, Array, Array], Residuals],
+    position: Position,
+    rate: Rate,
+    q: Array,
+    v: Array,
+    scales: Scales,
+    rank: int,
+    independent: Sequence[int] | Indices,
+) -> Array:
+    """Derivative (2 n, 2 n) of :func:`rhs` by [q; v], projection included.
+
+    Parameters
+    ----------
+    terms, residuals, position, rate : callables
+        (q, v) -> Terms; (q, v, a, l) -> Residuals; q -> C, C_q; q -> C_t.
+    q, v : (n,) arrays
+        A state on the manifold, where the result is exact; others are projected first.
+    """
+    n, s = len(q), scales.q
+    q, v = project(position, rate, q, v, scales)
+    here = terms(q, v)
+    system = embed(here.M, here.C_q, scales, rank, independent)
+    split = system.split
+    a = accelerate(here, scales, system)
+    multipliers = np.zeros(len(here.gamma))
+    # dependent rows of C_q^T l = -(M a + h); redundant rows carry nothing
+    multipliers[split.rows] = split.multipliers(-s * (here.M @ a + here.h)) / scales.c[split.rows]
+    r = residuals(q, v, a, multipliers)
+    dq, dv = np.eye(n, 2 * n), np.eye(n, 2 * n, n)
+    if len(here.gamma):
+        P = tangent_projector(here.C_q, scales)
+        dq = np.hstack([P, np.zeros((n, n))])
+        dv = np.hstack([-minimum_norm(here.C_q, r.r3_q @ P, scales), P])
+    a_p = split.particular(-(r.r2_q @ dq + r.r2_v @ dv) / scales.c[:, None])
+    da = s[:, None] * (a_p - system.solve(s[:, None] * (r.r1_q @ dq + r.r1_v @ dv) + system.M @ a_p))
+    if not np.isfinite(da).all():
+        raise NonFiniteError("the Jacobian is not finite")
+    return np.vstack([dv, da])
+
+
+def embedded_mass(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence[int] | Indices) -> Array:
+    """``B^T M B`` (n_dof, n_dof) for exactly the given independent coordinates, in their order and units.
+
+    Raises
+    ------
+    PartitionError
+        The coordinates are not independent here.
+    """
+    split = partition(scales.jacobian(C_q), rank, independent, strict=True)
+    s_i = scales.q[split.independent]
+    scaled = split.B.T @ (scales.q[:, None] * M * scales.q) @ split.B
+    return np.asarray(scaled / s_i[:, None] / s_i)

@@ -1,0 +1,110 @@
+"""Stage numeric: scaled constraint Jacobian -> dependent and independent coordinates, and what the first follow from.
+
+Gauss-Jordan elimination with complete pivoting: the columns of the pivots are the dependent coordinates, rows without
+a pivot are redundant here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import PartitionError
+from .scales import Array, Indices
+
+PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best
+RANK = 1e-10  #: smallest pivot, relative to the largest entry of J
+STRICT = 1e-8  #: the same when the set of independent coordinates is fixed
+
+
+class Partition(NamedTuple):
+    """The coordinates of one configuration split in two; all quantities scaled."""
+
+    dependent: Indices  #: (r,) columns
+    independent: Indices  #: (n - r,) columns, the preferred ones first and in their order
+    rows: Indices  #: (r,) rows that determine the dependent coordinates; the others are redundant here
+    inverse: Array  #: (r, r) inverse of J[rows, dependent]
+    B: Array  #: (n, n - r) velocity transformation: v = B v_i (+ b_t), J B = 0
+    pivot: float  #: smallest pivot divided by the largest entry of J: 1 is good, 0 is singular
+
+    def particular(self, y: Array) -> Array:
+        """The x (n,) or (n, k) with J x = y on the pivot rows and x = 0 for the independent coordinates."""
+        x = np.zeros((len(self.B), *y.shape[1:]))
+        x[self.dependent] = self.inverse @ y[self.rows]
+        return x
+
+    def multipliers(self, f: Array) -> Array:
+        """The l (rows with no pivot zero) with ``(J^T l)_d = f_d``; f (n,), returned l[rows] (r,)."""
+        return np.asarray(self.inverse.T @ f[self.dependent])
+
+
+def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict: bool = False) -> Partition:
+    """Split the coordinates.
+
+    Parameters
+    ----------
+    J : (m, n) array
+        Scaled Jacobian.
+    rank : int
+        Number of dependent coordinates, fixed for a mechanism.
+    independent : sequence of int
+        Preferred independent columns; the other columns are preferred as dependent.
+    strict : bool
+        Take exactly this set or fail.
+
+    Returns
+    -------
+    Partition
+
+    Raises
+    ------
+    PartitionError
+        Fewer than `rank` good pivots: below 1e-10 of the largest entry of J, or 1e-8 if `strict`.
+    """
+    n = J.shape[1]
+    preferred = np.ones(n, dtype=bool)
+    preferred[np.asarray(independent, dtype=np.intp)] = False
+    work = np.array(J)
+    size = float(np.abs(J).max()) if J.size else 0.0
+    rows = np.empty(rank, dtype=np.intp)
+    dependent = np.empty(rank, dtype=np.intp)
+    smallest = size
+    for step in range(rank):
+        magnitude = np.abs(work)
+        magnitude[rows[:step]] = 0.0
+        magnitude[:, dependent[:step]] = 0.0
+        row, column, best = _best(magnitude[:, preferred])
+        if best > 0.0:
+            column = int(np.flatnonzero(preferred)[column])
+        if not strict:
+            row_any, column_any, best_any = _best(magnitude)
+            if not best >= PREFERENCE * best_any or best == 0.0:
+                row, column, best = row_any, column_any, best_any
+        if not best > (STRICT if strict else RANK) * size:
+            raise PartitionError(
+                "the chosen independent coordinates cannot move the mechanism here"
+                if strict
+                else f"the constraints have rank {step} here and {rank} elsewhere"
+            )
+        smallest = min(smallest, best)
+        rows[step], dependent[step] = row, column
+        pivot_row = work[row] / work[row, column]
+        work -= np.outer(work[:, column], pivot_row)
+        work[row] = pivot_row
+    chosen = set(dependent.tolist())
+    order = [int(i) for i in independent if int(i) not in chosen]
+    kept = np.array(order + [i for i in range(n) if i not in chosen and i not in set(order)], dtype=np.intp)
+    inverse: Array = np.asarray(np.linalg.inv(J[np.ix_(rows, dependent)]), dtype=np.float64)
+    B = np.zeros((n, n - rank))
+    B[kept, np.arange(n - rank)] = 1.0
+    B[dependent] = -inverse @ J[np.ix_(rows, kept)]
+    return Partition(dependent, kept, rows, inverse, B, smallest / size if size else 1.0)
+
+
+def _best(magnitude: Array) -> tuple[int, int, float]:
+    if not magnitude.size:
+        return 0, 0, 0.0
+    row, column = divmod(int(magnitude.argmax()), magnitude.shape[1])
+    return row, column, float(magnitude[row, column])

@@ -1,0 +1,139 @@
+"""Stage numeric: a state near the constraint manifold -> the nearest state on it, position and velocity level.
+
+The correction is the minimum-norm Newton step ``-J^T (J J^T)^-1 e`` in scaled coordinates.  It does not depend on any
+partition of the coordinates, so a partition that goes bad at a dead centre costs no digits.  A relative Tikhonov term
+in ``J J^T`` carries redundant rows and configurations where the rank drops.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import NonFiniteError, ProjectionError
+from .scales import Array, Position, Rate, Scales
+
+STEPS = 25  #: Newton steps at most
+TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
+EXACT = 1e-14  #: scaled residual at which to stop at once
+SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
+ACCEPTED = 1e-10  #: largest scaled residual of a projected state
+DAMPING = 0.5  #: largest scaled Newton step
+
+
+def largest(values: Array) -> float:
+    """The largest magnitude, 0.0 of nothing, NaN if one is NaN."""
+    return float(np.abs(values).max()) if values.size else 0.0
+
+
+def gram_solve(J: Array, e: Array) -> Array:
+    """``(J J^T + 1e-12 max(diag) I)^-1 e`` for e (m,) or (m, k)."""
+    G = J @ J.T
+    size = G.diagonal().max()
+    G.flat[:: len(G) + 1] += TIKHONOV * size
+    try:
+        L = np.linalg.cholesky(G)
+    except np.linalg.LinAlgError:
+        raise ProjectionError("the constraint Jacobian vanishes, so no correction is defined") from None
+    return np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
+
+
+def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Array, Array]:
+    """The nearest q with C(q) = 0, and C_q there.
+
+    Parameters
+    ----------
+    position : callable
+        q (n,) -> C (m,), C_q (m, n).
+    q : (n,) array
+        Coordinates near the manifold; not changed.
+    scales : Scales
+
+    Returns
+    -------
+    q : (n,) array
+    C_q : (m, n) array
+
+    Raises
+    ------
+    ProjectionError
+        No convergence to a scaled residual of 1e-10 in 25 steps.
+    NonFiniteError
+        The constraints are not finite.
+    """
+    before = np.inf
+    for step in range(STEPS + 1):
+        C, C_q = position(q)
+        e = scales.residual(C)
+        size = largest(e)
+        if size <= EXACT or (step and size <= SETTLED and size > 0.5 * before):
+            return q, C_q
+        if not np.isfinite(size):
+            raise NonFiniteError("the constraints are not finite")
+        if step == STEPS:
+            break
+        J = scales.jacobian(C_q)
+        dz = J.T @ gram_solve(J, e)
+        longest = largest(dz)
+        if longest > DAMPING:
+            dz *= DAMPING / longest
+        q = q - scales.q * dz
+        before = size
+    if size <= ACCEPTED:
+        return q, C_q
+    raise ProjectionError(f"the projection onto the constraints stopped at a scaled residual of {size:.1e}")
+
+
+def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
+    """The nearest v (n,) with C_q v + C_t = 0; two steps, so that the Tikhonov term leaves no trace."""
+    J = scales.jacobian(C_q)
+    for _ in range(2):
+        v = v - scales.q * (J.T @ gram_solve(J, scales.residual(C_q @ v + C_t)))
+    return v
+
+
+def project(position: Position, rate: Rate, q: Array, v: Array, scales: Scales) -> tuple[Array, Array]:
+    """The nearest state on the manifold, position level first, then velocity level.
+
+    Parameters
+    ----------
+    position : callable
+        q (n,) -> C (m,), C_q (m, n).
+    rate : callable
+        q (n,) -> C_t (m,).
+    q, v : (n,) arrays
+    scales : Scales
+
+    Returns
+    -------
+    q, v : (n,) arrays
+
+    Raises
+    ------
+    ProjectionError, NonFiniteError
+        As :func:`correct_position`.
+    """
+    if not scales.c.size:
+        return q, v
+    q, C_q = correct_position(position, q, scales)
+    return q, correct_velocity(C_q, rate(q), v, scales)
+
+
+def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
+    """The smallest scaled x (n, k) with C_q x = y (m, k); y must be consistent, as rates of redundant rows are.
+
+    Never form the pseudo-inverse by y = I: with redundant rows its parts outside the range are 1e12 times as large as
+    the result, and leave four digits of it.
+    """
+    J = scales.jacobian(C_q)
+    z = y / scales.c[:, None]
+    x = J.T @ gram_solve(J, z)
+    x += J.T @ gram_solve(J, z - J @ x)  # second step, as in correct_velocity
+    return np.asarray(scales.q[:, None] * x)
+
+
+def tangent_projector(C_q: Array, scales: Scales) -> Array:
+    """``P = I - S^2 C_q^T (C_q S^2 C_q^T)^+ C_q`` (n, n).
+
+    The derivative, at a point of the manifold, of the projected q by q and of the projected v by v.
+    """
+    return np.asarray(np.eye(len(scales.q)) - minimum_norm(C_q, C_q, scales))

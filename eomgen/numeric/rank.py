@@ -1,0 +1,136 @@
+"""Stage numeric: scaled constraint Jacobians at several configurations -> rank, redundant rows, good coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+
+from .partition import PREFERENCE
+from .scales import Array, Indices
+
+TOLERANCE = 1e-8  #: a singular value below this part of the largest counts as zero
+ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one
+
+
+class Rank(NamedTuple):
+    """Rank of a scaled Jacobian, and how clearly it is decided."""
+
+    rank: int
+    kept: float  #: smallest singular value counted, relative to the largest
+    dropped: float  #: largest singular value not counted, relative to the largest
+
+    @property
+    def clear(self) -> bool:
+        """Whether the decision is far from the tolerance on both sides (a factor of 100)."""
+        return self.kept > 100.0 * TOLERANCE and self.dropped < 0.01 * TOLERANCE
+
+
+def rank(J: Array, tolerance: float = TOLERANCE) -> Rank:
+    """Numerical rank of a scaled Jacobian J (m, n) by its singular values."""
+    values = np.linalg.svd(J, compute_uv=False) if J.size else np.empty(0)
+    if not values.size or values[0] == 0.0:
+        return Rank(0, 1.0, 0.0)
+    relative = values / values[0]
+    count = int(np.count_nonzero(relative > tolerance))
+    return Rank(count, float(relative[count - 1]), float(relative[count]) if count < len(relative) else 0.0)
+
+
+def independent_rows(J: Array, rank: int) -> Indices:
+    """`rank` rows that span the row space, in ascending order.
+
+    Earlier rows are preferred: a row is skipped only when the best remaining one is a hundred times farther from the
+    span of the chosen ones.
+    """
+    work = np.array(J)
+    chosen: list[int] = []
+    for _ in range(rank):
+        distance = np.linalg.norm(work, axis=1)
+        distance[chosen] = 0.0
+        row = int(np.flatnonzero(distance >= PREFERENCE * distance.max())[0])
+        chosen.append(row)
+        direction = work[row] / distance[row]
+        work -= np.outer(work @ direction, direction)
+    return np.array(sorted(chosen), dtype=np.intp)
+
+
+def redundant_rows(J: Array, rank: int, labels: Sequence[str]) -> list[str]:
+    """Labels of the rows that follow from the others at this configuration."""
+    kept = set(independent_rows(J, rank).tolist())
+    return [label for row, label in enumerate(labels) if row not in kept]
+
+
+def conditioning(J: Array, independent: Sequence[int] | Indices) -> float:
+    """How well a set of independent coordinates moves the mechanism: 1 is perfect, 0 not at all.
+
+    The smallest singular value of J_d divided by the largest of J, where d are the other columns.
+    """
+    n = J.shape[1]
+    dependent = np.setdiff1d(np.arange(n), np.asarray(independent, dtype=np.intp))
+    if not dependent.size:
+        return 1.0
+    values = np.linalg.svd(J[:, dependent], compute_uv=False)
+    if len(values) < len(dependent):
+        return 0.0
+    size = np.linalg.norm(J, 2)
+    return float(values[len(dependent) - 1] / size) if size else 0.0
+
+
+def choose_independent(jacobians: Sequence[Array], rank: int, prefer: Sequence[int] = ()) -> Indices:
+    """The independent coordinates that stay best conditioned over several configurations.
+
+    Parameters
+    ----------
+    jacobians : sequence of (m, n) arrays
+        Scaled Jacobians at assembled configurations.
+    rank : int
+        Rank of the constraints.
+    prefer : sequence of int
+        Columns to choose first where the worst conditioning stays within a factor of 100 of the best possible.
+
+    Returns
+    -------
+    (n - rank,) array of int
+        Columns in ascending order.
+    """
+    n = jacobians[0].shape[1]
+    size = n - rank
+    order = list(dict.fromkeys([*prefer, *range(n)]))  # earlier wins among equals
+
+    def worst(columns: Sequence[int]) -> float:
+        return min(conditioning(J, columns) for J in jacobians)
+
+    if comb(n, size) <= ENUMERATED:
+        sets: list[tuple[int, ...]] = list(combinations(order, size))
+    else:
+        sets = [_eliminate(J, rank, order) for J in jacobians]
+        if len(prefer) >= size:
+            sets.append(tuple(order[:size]))
+    scores = [worst(columns) for columns in sets]
+    limit = max(scores)
+    favoured = set(prefer)
+    good = [(s, c) for s, c in zip(scores, sets, strict=True) if s >= PREFERENCE * limit]
+    most = max(len(favoured.intersection(c)) for _, c in good)
+    best = max((s for s, c in good if len(favoured.intersection(c)) == most), default=limit)
+    for score, columns in good:
+        if len(favoured.intersection(columns)) == most and score >= 0.999999 * best:
+            return np.array(sorted(columns), dtype=np.intp)
+    return np.array(sorted(sets[int(np.argmax(scores))]), dtype=np.intp)
+
+
+def _eliminate(J: Array, rank: int, order: Sequence[int]) -> tuple[int, ...]:
+    """Independent columns by column pivoting from the back of `order`, so that its front stays independent."""
+    work = np.array(J)
+    dependent: list[int] = []
+    backwards = list(reversed(order))
+    for _ in range(rank):
+        length = np.linalg.norm(work, axis=0)
+        length[dependent] = 0.0
+        column = next(c for c in backwards if length[c] >= 0.3 * length.max() and c not in dependent)
+        dependent.append(column)
+        direction = work[:, column] / (length[column] or 1.0)
+        work -= np.outer(direction, direction @ work)
+    return tuple(c for c in order if c not in dependent)

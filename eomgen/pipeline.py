@@ -1,0 +1,217 @@
+"""The one road, in order: describe -> kinematics -> equations -> program -> emit -> compilation -> runtime.
+
+Each stage is a package whose functions take frozen values and return frozen values; only this file knows their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .derivation import Equations
+from .equations import METHODS, TreeEquations
+from .errors import EomgenError, EvaluationError, ModelError, Problem, UsageError
+from .graph.evaluate import evaluate
+from .kinematics import Kinematics, analyse
+from .kinematics.mobility import ConstraintFunctions, Mobility, judge
+from .kinematics.report import MechanismReport, report
+
+if TYPE_CHECKING:
+    from .describe.mechanism import Mechanism
+    from .describe.model import Model
+    from .program.program import Program
+    from .runtime.module import Module
+
+TARGETS = ("cython", "numpy", "c")
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    start = perf_counter()
+    yield
+    seconds[stage] = perf_counter() - start
+
+
+def choose_method(mechanism: Mechanism, method: str) -> str:
+    """Resolve ``auto``; refuse a method that is not there or does not fit."""
+    bare = mechanism.lagrangian is not None
+    if method == "auto":
+        return "lagrange" if bare else "embedding"
+    if method not in METHODS:
+        raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
+    if bare and method != "lagrange":
+        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, lagrange")
+    return method
+
+
+def derive(model: Model, method: str = "auto", independent: Sequence[str] | None = None) -> Equations:
+    """Derive the equations of motion of a model.
+
+    Parameters
+    ----------
+    model : Model
+    method : {'auto', 'embedding', 'lagrange'}
+    independent : names of coordinates, optional
+        The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
+
+    Raises
+    ------
+    ModelError
+        Every fault of the description at once.
+    AssemblyError
+        The loops do not close at the declared initial values.
+    UsageError
+        No such method.
+    """
+    seconds: dict[str, float] = {}
+    with _timed(seconds, "describe"):
+        mechanism = model.mechanism()
+    chosen = choose_method(mechanism, method)
+    with _timed(seconds, "kinematics"):
+        kinematics = analyse(mechanism, independent or ())
+        mobility = judge(kinematics, independent or ())
+    with _timed(seconds, "equations"):
+        tree = METHODS[chosen](kinematics)
+    return Equations(kinematics, mobility, tree, seconds)
+
+
+def check(model: Model) -> MechanismReport:
+    """Everything that can be wrong with a model before code is generated.
+
+    Raises
+    ------
+    ModelError, AssemblyError
+    """
+    equations = derive(model)
+    require_values(equations.kinematics.mechanism)
+    require_inertia(equations.kinematics, equations.mobility, equations.tree)
+    return report(equations.kinematics, equations.mobility)
+
+
+def require_values(mechanism: Mechanism) -> None:
+    """Refuse parameters without a value."""
+    problems = []
+    for p in mechanism.parameters:
+        if p.value is None:
+            path = f"parameters.{p.name}"
+            file, line = mechanism.lines.get(path, ("", 0))
+            problems.append(Problem(path, "has no value", "give one: derive can do without, a run cannot", file, line))
+    if problems:
+        raise ModelError(problems)
+
+
+def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
+    """Refuse a degree of freedom that moves no mass: the embedded mass matrix must be positive definite."""
+    n, m = len(kinematics.q), kinematics.mechanism
+    values = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs} | {"t": 0.0}
+    values |= dict(zip(kinematics.names, mobility.q_reference, strict=True)) | dict.fromkeys(
+        (name + "_dot" for name in kinematics.names), 0.0
+    )
+    flat = evaluate([x for row in tree.mass_matrix for x in row], values)
+    mass = np.array(flat, dtype=float).reshape(n, n)
+    basis = np.eye(n)
+    scales = np.ones(n)
+    if kinematics.constraints.values:
+        numbers = {k: v for k, v in values.items() if k not in kinematics.names and not k.endswith("_dot") and k != "t"}
+        functions = ConstraintFunctions(kinematics, numbers)
+        J = functions.scaled_jacobian(np.array(mobility.q_reference))
+        basis = np.linalg.svd(J)[2][mobility.rank :].T
+        scales = functions.scales.q
+    if not basis.shape[1]:
+        return
+    embedded = basis.T @ (mass * np.outer(scales, scales)) @ basis
+    if not np.isfinite(embedded).all():
+        raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
+    sizes, modes = np.linalg.eigh(embedded)
+    if sizes[0] > 1e-12 * max(sizes[-1], 1e-300) and sizes[0] > 0.0:
+        return
+    motion = np.abs(basis @ modes[:, 0])
+    culprits = [kinematics.names[j] for j in np.argsort(-motion) if motion[j] > 0.3 * motion.max()]
+    problems = []
+    for name in culprits:
+        spec = next((j for j in m.joints if name in j.coordinates), None)
+        path = f"joints.{spec.name}" if spec else f"lagrangian.{name}"
+        file, line = m.lines.get(path, ("", 0))
+        what = "negative inertia" if sizes[0] < -1e-12 * abs(sizes[-1]) else "no inertia"
+        message = f"coordinate {name!r} has {what} behind it: a motion along it moves no mass"
+        problems.append(Problem(path, message, "give the body it moves a mass or an inertia", file, line))
+    raise ModelError(problems)
+
+
+def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
+    """The functions to generate for a target."""
+    from .program.build import build_program
+    from .program.collect import collect_metadata, collect_terms
+
+    if target not in TARGETS:
+        raise UsageError(f"no target {target!r}; there are: {', '.join(TARGETS)}")
+    kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
+    require_values(kinematics.mechanism)
+    require_inertia(kinematics, mobility, tree)
+    metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
+    return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels)
+
+
+def compile_equations(
+    equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
+) -> Module:
+    """Generate, compile and load; see :meth:`eomgen.derivation.Equations.compile`."""
+    from .emit import emit_c, emit_numpy
+    from .runtime.module import Module
+
+    seconds = equations.seconds
+    if target == "c":
+        raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")
+    with _timed(seconds, "program"):
+        program = build(equations, target, kernels)
+    if target == "numpy":
+        from .compilation.numpy_module import load_numpy
+
+        if options:
+            raise UsageError(f"target 'numpy' has no options, given: {', '.join(options)}")
+        with _timed(seconds, "emit"):
+            sources = emit_numpy(program)
+        with _timed(seconds, "load"):
+            return Module(load_numpy(sources, equations.name))
+    from .compilation import compile_sources, load_core, make_options
+
+    with _timed(seconds, "emit"):
+        sources = emit_c(program)
+    with _timed(seconds, "compile"):
+        artifact = compile_sources(sources, equations.name, make_options(**options))
+    with _timed(seconds, "load"):
+        return Module(load_core(artifact))
+
+
+def generate(
+    model: Model,
+    directory: Path | str,
+    method: str = "auto",
+    target: str = "cython",
+    independent: Sequence[str] | None = None,
+) -> Path:
+    """Write a package that stands alone into ``directory/<name>/`` and return that path.
+
+    Raises
+    ------
+    EomgenError
+        The folder exists and holds something that eomgen did not write.
+    """
+    from .emit import emit_package
+
+    equations = derive(model, method, independent)
+    program = build(equations, target)
+    sources = emit_package(program, target)
+    folder = Path(directory) / equations.name
+    if folder.exists() and any(folder.iterdir()) and not (folder / "model.json").exists():
+        raise EomgenError(f"{folder} exists and is not a generated package; choose another --out or remove it")
+    for name, text in sources.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return folder

@@ -1,0 +1,20 @@
+"""Stage program: SystemTerms -> Program (functions with typed ports, hoisted and counted)."""
+
+from .build import ABI, build_program
+from .kernels import KERNELS, Kernel, Sizes
+from .program import Block, Driver, Limits, Port, Program
+from .terms import SystemTerms
+
+__all__ = [
+    "ABI",
+    "KERNELS",
+    "Block",
+    "Driver",
+    "Kernel",
+    "Limits",
+    "Port",
+    "Program",
+    "Sizes",
+    "SystemTerms",
+    "build_program",
+]

@@ -1,0 +1,202 @@
+"""Stage program: SystemTerms -> straight-line blocks, one function per block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from itertools import chain
+
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian, jvp
+from ..graph.substitute import substitute, symbols_of
+from ..graph.traverse import reachable
+from .factor import factorize, positivity, solve
+from .kernels import KERNELS, Sizes
+from .program import Block, Limits, Port
+from .terms import Row, SystemTerms
+
+
+def flat(rows: Sequence[Row]) -> Row:
+    """Rows one after the other."""
+    return tuple(chain.from_iterable(rows))
+
+
+class BlockMaker:
+    """Makes the blocks of one system, each when it is asked for."""
+
+    def __init__(self, terms: SystemTerms, sizes: Sizes, limits: Limits) -> None:
+        self.terms = terms
+        self.sizes = sizes
+        self.limits = limits
+
+    # -- choices --------------------------------------------------------------------------------------------------
+    @property
+    def has_loops(self) -> bool:
+        """Whether there are constraint rows."""
+        return self.sizes.n_c > 0
+
+    @property
+    def unrolled(self) -> bool:
+        """Whether the right-hand side is straight-line code."""
+        return not self.has_loops and self.sizes.n_v <= self.limits.unrolled
+
+    @cached_property
+    def outputs_need_accelerations(self) -> bool:
+        """Whether an output depends on an acceleration."""
+        return not symbols_of(self.terms.outputs).isdisjoint(self.terms.a)
+
+    @cached_property
+    def by_direction(self) -> bool:
+        """Whether the Jacobian of the residuals is too large to be written out."""
+        residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
+        nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
+        return 2 * self.sizes.n_v * nodes > self.limits.jacobian_nodes
+
+    # -- shared expressions ---------------------------------------------------------------------------------------
+    @cached_property
+    def _accelerations(self) -> tuple[list[Expr], list[Expr]]:
+        """v' of a tree in terms of (q, v), and the conditions for it to exist."""
+        terms = self.terms
+        factor = factorize(terms.mass_matrix, terms.parent)
+        checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
+        return solve(factor, [-h for h in terms.bias]), checks
+
+    def _symbols(self, names: Sequence[str]) -> list[Expr]:
+        return [self.terms.graph.symbol(name) for name in names]
+
+    @cached_property
+    def _force_residual(self) -> list[Expr]:
+        """r1 = M a + h + C_q^T l"""
+        terms = self.terms
+        r1 = list(terms.inverse_dynamics)
+        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
+            r1 = [r + c * l for r, c in zip(r1, row, strict=True)]
+        return r1
+
+    @cached_property
+    def _acceleration_residual(self) -> list[Expr]:
+        """r2 = C_q a + gamma"""
+        terms = self.terms
+        a = self._symbols(terms.a)
+        r2 = []
+        for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
+            for c, x in zip(row, a, strict=True):
+                r = r + c * x
+            r2.append(r)
+        return r2
+
+    # -- blocks ---------------------------------------------------------------------------------------------------
+    def port(self, name: str) -> Port:
+        """The symbols behind the name of a port."""
+        terms = self.terms
+        independent = terms.preferred
+        symbols: Mapping[str, tuple[str, ...]] = {
+            "q": terms.q,
+            "v": terms.v,
+            "a": terms.a,
+            "q_i": tuple(terms.q[i] for i in independent),
+            "v_i": tuple(terms.v[i] for i in independent),
+            "a_i": tuple(terms.a[i] for i in independent),
+            "q_guess": tuple(f"guess({q})" for q in terms.q),
+            "multipliers": terms.multipliers,
+            "dq": tuple(f"d({q})" for q in terms.q),
+            "dv": tuple(f"d({v})" for v in terms.v),
+        }
+        return Port(name, symbols[name])
+
+    def _internal(self, name: str, ports: str, outputs: Sequence[Expr]) -> Block:
+        return Block(name, tuple(map(self.port, ports.split())), tuple(outputs), (len(outputs),), public=False)
+
+    def public(self, name: str) -> Block | None:
+        """The public kernel of this name if it is straight-line code for this system, else None."""
+        kernel = next(k for k in KERNELS if k.name == name)
+        terms = self.terms
+        always: dict[str, Callable[[], Sequence[Expr]]] = {
+            "mass_matrix": lambda: flat(terms.mass_matrix),
+            "bias": lambda: terms.bias,
+            "inverse_dynamics": lambda: terms.inverse_dynamics,
+            "energy": lambda: (terms.kinetic, terms.potential),
+            "constraints": lambda: terms.constraints,
+            "constraint_jacobian": lambda: flat(terms.constraint_jacobian),
+            "velocity_constraints": lambda: terms.velocity_constraints,
+            "poses": lambda: terms.poses,
+            "loop_coordinates": lambda: terms.loop_coordinates,
+            "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
+            "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
+        }
+        trees: dict[str, Callable[[], Sequence[Expr]]] = {
+            "project": lambda: self._symbols((*terms.q, *terms.v)),
+            "embedded_mass_matrix": lambda: [terms.mass_matrix[i][k] for i in terms.preferred for k in terms.preferred],
+            "kinematics": lambda: self._symbols((*terms.q, *terms.v, *terms.a)),
+        }
+        checks: list[Expr] = []
+        if name in always:
+            outputs = always[name]()
+        elif name in trees and not self.has_loops:
+            outputs = trees[name]()
+        elif name == "rhs" and self.unrolled:
+            accelerations, checks = self._accelerations
+            outputs = [*self._symbols(terms.v), *accelerations]
+        elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
+            outputs = terms.outputs
+        elif name == "outputs" and self.unrolled:
+            accelerations, checks = self._accelerations
+            outputs = substitute(terms.outputs, dict(zip(self._symbols(terms.a), accelerations, strict=True)))
+        else:
+            return None
+        ports = tuple(map(self.port, kernel.inputs))
+        return Block(name, ports, tuple(outputs), kernel.shape(self.sizes), tuple(checks))
+
+    def drivers_need(self, name: str) -> tuple[str, ...]:
+        """Names of the blocks behind a public kernel that is not straight-line code."""
+        residual = "residual_tangent" if self.by_direction else "residual_jacobian"
+        if not self.has_loops:
+            return {
+                "rhs": ("terms", "scales"),
+                "jacobian": ("terms", "scales", residual),
+                "outputs": ("terms", "scales", "accelerated_outputs"),
+            }[name]
+        project = ("scales", "position", "rate")
+        accelerate = ("terms",) if self.outputs_need_accelerations else ()
+        return {
+            "rhs": (*project, "terms"),
+            "jacobian": (*project, "terms", residual),
+            "embedded_mass_matrix": ("scales", "position", "mass_matrix"),
+            "project": project,
+            "outputs": (*project, *accelerate, "accelerated_outputs"),
+            "kinematics": (*project, "terms"),
+        }[name]
+
+    def internal(self, name: str) -> Block:
+        """A block that only drivers call; layouts in INTERFACES of the program stage (see the generated source)."""
+        terms, n = self.terms, self.sizes.n_v
+        match name:
+            case "terms":  # M lower packed, h, C_q, gamma
+                lower = [terms.mass_matrix[i][k] for i in range(n) for k in range(i + 1)]
+                return self._internal(
+                    name, "q v", [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
+                )
+            case "position":  # C, C_q
+                return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
+            case "rate":  # C_t
+                return self._internal(name, "q", terms.constraint_rate)
+            case "accelerated_outputs":
+                return self._internal(name, "q v a", terms.outputs)
+            case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
+                return self._internal(name, "q v a multipliers", self._residual_jacobian())
+            case "residual_tangent":  # dr1, dr2, dr3 along (dq, dv)
+                residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
+                seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
+                along = dict(zip(self._symbols((*terms.q, *terms.v)), self._symbols(seeds), strict=True))
+                return self._internal(name, "q v a multipliers dq dv", jvp(residuals, along))
+        raise KeyError(name)
+
+    def _residual_jacobian(self) -> list[Expr]:
+        terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero
+        residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
+        entries = jacobian(residuals, self._symbols((*terms.q, *terms.v)))
+        result = []
+        for first, size, columns in ((0, n, (0, n)), (n, m, (0, n)), (n + m, m, (0,))):
+            for start in columns:
+                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(n)]
+        return result

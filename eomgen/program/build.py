@@ -1,0 +1,147 @@
+"""Stage program: SystemTerms -> Program: what functions to generate, hoisted, counted.
+
+Public kernels that can be are straight-line blocks; the rest are drivers that the target's own code computes from
+blocks (Newton iterations, factorisations of the embedded system).  Trees up to :attr:`Limits.unrolled` velocities have
+their right-hand side wholly on the graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from difflib import get_close_matches
+from typing import Any
+
+from ..errors import UsageError
+from ..graph.substitute import symbols_of
+from .blocks import BlockMaker
+from .hoist import count_apart, hoist
+from .kernels import KERNELS, Kernel, Sizes
+from .program import Block, Driver, Limits, Program
+from .terms import SystemTerms
+
+#: Version of the generated functions' signatures and of the table that describes them.
+ABI = 1
+
+
+def build_program(
+    terms: SystemTerms,
+    metadata: dict[str, Any],
+    *,
+    kernels: Sequence[str] | None = None,
+    limits: Limits | None = None,
+) -> Program:
+    """Decide what functions to generate.
+
+    Parameters
+    ----------
+    terms : SystemTerms
+        The equations.
+    metadata : dict
+        JSON-able; ``name`` is the prefix of all functions.  A copy is completed with ``abi``, the sizes,
+        ``kernels`` (shapes by name) and ``operations`` (counts per block; hoisted work under ``precompute``).
+    kernels : sequence of str, optional
+        Public kernels wanted; all by default.
+    limits : Limits, optional
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    UsageError
+        Sizes contradict each other, an unknown kernel, or a name that is no C identifier.
+    """
+    terms.check_shapes()
+    name = str(metadata["name"])
+    if not (name.isidentifier() and name.isascii()):
+        raise UsageError(f"{name!r} cannot name a generated module; letters, digits and _ are allowed")
+    limits = limits or Limits()
+    sizes = _measure(terms)
+    maker = BlockMaker(terms, sizes, limits)
+    wanted = _select(kernels)
+    blocks: dict[str, Block] = {}
+    drivers: list[Driver] = []
+    needed: dict[str, None] = {}
+    for kernel in wanted:
+        block = maker.public(kernel.name)
+        if block is not None:
+            blocks[kernel.name] = block
+            continue
+        behind = maker.drivers_need(kernel.name)
+        needed.update(dict.fromkeys(behind))
+        drivers.append(Driver(kernel.name, tuple(map(maker.port, kernel.inputs)), kernel.shape(sizes), behind))
+    for other in needed:
+        if other not in blocks:
+            public = maker.public(other) if any(k.name == other for k in KERNELS) else None
+            blocks[other] = public or maker.internal(other)
+    kernel_shapes = {
+        k.name: list(k.shape(sizes)) for k in KERNELS if k in wanted or (k.name in blocks and blocks[k.name].public)
+    }
+
+    roots = [y for block in blocks.values() for y in (*block.outputs, *block.checks)]
+    hoisted, parameter_only = hoist(terms.graph, roots, terms.p)
+    counts = {b.name: count_apart((*b.outputs, *b.checks), parameter_only) for b in blocks.values()}
+    counts["precompute"] = count_apart(hoisted, frozenset())
+    complete = {
+        **metadata,
+        "abi": ABI,
+        **asdict(sizes),
+        "kernels": kernel_shapes,
+        "operations": {key: value.as_dict() for key, value in counts.items()},
+    }
+    _check_symbols(terms, blocks.values())
+    return Program(
+        name=name,
+        metadata=complete,
+        graph=terms.graph,
+        time=terms.t,
+        coordinates=terms.q,
+        velocities=terms.v,
+        parameters=terms.p,
+        inputs=terms.u,
+        sizes=sizes,
+        blocks=tuple(blocks.values()),
+        drivers=tuple(drivers),
+        hoisted=hoisted,
+        parameter_only=parameter_only,
+        preferred=terms.preferred,
+        parent=terms.parent,
+        counts=counts,
+        limits=limits,
+    )
+
+
+def _measure(terms: SystemTerms) -> Sizes:
+    return Sizes(
+        n_q=len(terms.q),
+        n_v=terms.n_v,
+        n_x=len(terms.q) + terms.n_v,
+        n_u=len(terms.u),
+        n_p=len(terms.p),
+        n_y=len(terms.outputs),
+        n_c=terms.n_c,
+        n_dof=terms.n_dof,
+        n_bodies=len(terms.poses) // 16,
+        n_k=terms.n_k,
+    )
+
+
+def _select(kernels: Sequence[str] | None) -> list[Kernel]:
+    known = [k.name for k in KERNELS]
+    for name in kernels or ():
+        if name not in known:
+            near = get_close_matches(name, known, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise UsageError(f"no kernel is named {name!r}{hint}; there are {', '.join(known)}")
+    return [k for k in KERNELS if kernels is None or k.name in kernels]
+
+
+def _check_symbols(terms: SystemTerms, blocks: Iterable[Block]) -> None:
+    """A symbol that is no input of the function it stands in is a fault of the equations."""
+    for block in blocks:
+        known = {terms.t, *terms.p, *terms.u, *block.inputs}
+        unknown = sorted(symbols_of((*block.outputs, *block.checks)) - known)
+        if unknown:
+            raise UsageError(f"{block.name} depends on {', '.join(unknown)}, which it is not given")

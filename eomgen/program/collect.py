@@ -1,0 +1,141 @@
+"""Stage program: Kinematics, Mobility and TreeEquations -> SystemTerms and the metadata of model.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..equations.equations import TreeEquations
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import substitute
+from ..kinematics import Kinematics
+from ..kinematics.mobility import Mobility
+from .terms import SystemTerms
+
+
+def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> SystemTerms:
+    """Put together every expression that functions are generated from."""
+    c, loop = kinematics.constraints, kinematics.loop_coordinates
+    names = kinematics.names
+    length = kinematics.length_scale
+    scale = {"length": length, "angle": kinematics.graph.one}
+    return SystemTerms(
+        graph=kinematics.graph,
+        t="t",
+        q=names,
+        v=tuple(n + "_dot" for n in names),
+        a=tuple(n + "_ddot" for n in names),
+        multipliers=tuple(f"lambda[{i}]" for i in range(len(c.values))),
+        u=kinematics.input_names,
+        p=kinematics.parameter_names,
+        mass_matrix=equations.mass_matrix,
+        bias=equations.bias,
+        inverse_dynamics=equations.inverse_dynamics,
+        kinetic=equations.kinetic_energy,
+        potential=equations.potential_energy,
+        constraints=c.values,
+        constraint_jacobian=c.jacobian,
+        constraint_rate=c.time_derivative,
+        velocity_constraints=c.velocity,
+        gamma=c.gamma,
+        poses=tuple(_poses(kinematics)),
+        outputs=tuple(resolved_outputs(kinematics, equations)),
+        loop_coordinates=(*loop.values, *loop.rates, *loop.accelerations),
+        loop_coordinate_jacobian=loop.jacobian,
+        coordinate_scales=tuple(scale[kind] for kind in kinematics.kinds),
+        constraint_scales=tuple(scale[kind] for kind in c.kinds),
+        n_dof=mobility.n_dof,
+        preferred=tuple(names.index(n) for n in mobility.independent),
+        parent=kinematics.parent,
+    )
+
+
+def _poses(kinematics: Kinematics) -> list[Expr]:
+    """Body frames in ground axes as 4 x 4 matrices, row by row, in the order the bodies were declared."""
+    graph = kinematics.graph
+    entries: list[Expr] = []
+    for k, body in enumerate(kinematics.mechanism.bodies):
+        origin = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+        pose = kinematics.poses.marker(origin)
+        for row, x in zip(pose.rotation, pose.position, strict=True):
+            entries += [*row, x]
+        entries += [graph.zero, graph.zero, graph.zero, graph.one]
+    return entries
+
+
+def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
+    """Outputs in terms of the tree's q, v, a."""
+    expressions = kinematics.resolve([o.expression for o in kinematics.mechanism.outputs])
+    graph = kinematics.graph
+    energies = {
+        graph.symbol("kinetic_energy"): equations.kinetic_energy,
+        graph.symbol("potential_energy"): equations.potential_energy,
+    }
+    return substitute(expressions, energies)
+
+
+def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> dict[str, Any]:
+    """What a module knows of itself without any expression; sizes and kernels are added by the program."""
+    m, c, loop = kinematics.mechanism, kinematics.constraints, kinematics.loop_coordinates
+    names = kinematics.names
+    velocities = [n + "_dot" for n in names]
+    units = {n: {"angle": "rad", "length": "m"}[kind] for n, kind in zip(names, kinematics.kinds, strict=True)}
+    units |= {n: {"angle": "rad", "length": "m"}[kind] for n, kind in zip(loop.names, loop.kinds, strict=True)}
+    if m.lagrangian is not None:
+        units = {}
+    docs = {}
+    for item in (*m.parameters, *m.inputs, *m.outputs):
+        if item.unit:
+            units[item.name] = item.unit
+        if item.doc:
+            docs[item.name] = item.doc
+    rows = mobility.independent_rows
+    return {
+        "name": m.name,
+        "doc": m.doc,
+        "method": equations.method,
+        "q_names": list(names),
+        "v_names": velocities,
+        "x_names": [*names, *velocities],
+        "u_names": list(kinematics.input_names),
+        "p_names": list(kinematics.parameter_names),
+        "y_names": [o.name for o in m.outputs],
+        "body_names": [b.name for b in m.bodies],
+        "joint_names": [j.name for j in m.joints],
+        "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
+        "loop_names": list(loop.names),
+        "loop_kinds": list(loop.kinds),
+        "coordinate_kinds": list(kinematics.kinds),
+        "constraint_labels": list(c.labels),
+        "constraint_kinds": list(c.kinds),
+        "p_values": [p.value for p in m.parameters],
+        "u_values": [u.value for u in m.inputs],
+        "units": units,
+        "docs": docs,
+        "independent": [names.index(n) for n in mobility.independent],
+        "independent_rows": list(rows),
+        "redundant_rows": [i for i in range(len(c.values)) if i not in rows],
+        "q_reference": list(mobility.q_reference),
+        "initial": _numbers(kinematics, "initial"),
+        "guess": _numbers(kinematics, "guess"),
+        "length_scale": mobility.length_scale,
+        "simulation": {
+            "end": m.simulation.end,
+            "method": m.simulation.method,
+            "rtol": m.simulation.rtol,
+            "atol": m.simulation.atol,
+        },
+    }
+
+
+def _numbers(kinematics: Kinematics, which: str) -> dict[str, float]:
+    """Initial values or guesses at the declared parameter values."""
+    given = getattr(kinematics.mechanism, which)
+    values = {p.name: p.value for p in kinematics.mechanism.parameters if p.value is not None}
+    values |= {u.name: u.value for u in kinematics.mechanism.inputs}
+    if not given:
+        return {}
+    numbers = compile_evaluator(list(given.values()), tuple(values))(list(values.values()))
+    return {name: float(x) for name, x in zip(given, numbers, strict=True)}

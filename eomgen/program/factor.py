@@ -1,0 +1,92 @@
+"""Stage program: mass matrix on the graph + its branch-induced pattern -> straight-line L^T D L solution on the graph.
+
+R. Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 6.5: M = L^T D L with L unit lower triangular and
+L[i, j] non-zero only where j lies on the path from i to ground, so that branches never fill in.  No square roots, one
+reciprocal per pivot, and zeros of M that the pattern does not know fold as everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..graph.core import Expr
+
+#: A pivot at most this part of the largest diagonal entry means that no inertia is behind some motion.
+SINGULAR = 1e-13
+
+
+@dataclass(frozen=True)
+class Factor:
+    """M = L^T D L.
+
+    Attributes
+    ----------
+    lower : tuple of dict
+        Row i: {j: L[i, j]} for j on the path from i to ground.
+    pivots, reciprocals : tuple of Expr
+        D and 1 / D.
+    """
+
+    lower: tuple[dict[int, Expr], ...]
+    pivots: tuple[Expr, ...]
+    reciprocals: tuple[Expr, ...]
+
+
+def path(parent: Sequence[int], index: int) -> list[int]:
+    """Indices on the path from `index` (excluded) to ground, nearest first."""
+    result = []
+    while (index := parent[index]) >= 0:
+        result.append(index)
+    return result
+
+
+def factorize(matrix: Sequence[Sequence[Expr]], parent: Sequence[int]) -> Factor:
+    """Factor a symmetric matrix with the branch-induced pattern of `parent`; only its lower triangle is read."""
+    n = len(matrix)
+    H = {(i, j): matrix[i][j] for i in range(n) for j in (i, *path(parent, i))}
+    lower: list[dict[int, Expr]] = [{} for _ in range(n)]
+    reciprocals: list[Expr] = [matrix[i][i] for i in range(n)]
+    for k in reversed(range(n)):
+        above = [i for i in path(parent, k) if not H[k, i].is_zero]
+        reciprocals[k] = 1.0 / H[k, k]
+        for i in above:
+            ratio = H[k, i] * reciprocals[k]
+            for j in above:
+                if j <= i:
+                    H[i, j] = H[i, j] - ratio * H[k, j]
+            lower[k][i] = ratio
+    return Factor(tuple(lower), tuple(H[k, k] for k in range(n)), tuple(reciprocals))
+
+
+def solve(factor: Factor, right: Sequence[Expr]) -> list[Expr]:
+    """x with L^T D L x = right."""
+    x = list(right)
+    n = len(x)
+    for i in reversed(range(n)):
+        for j, ratio in factor.lower[i].items():
+            x[j] = x[j] - ratio * x[i]
+    for i in range(n):
+        x[i] = x[i] * factor.reciprocals[i]
+        for j, ratio in factor.lower[i].items():
+            x[i] = x[i] - ratio * x[j]
+    return x
+
+
+def positivity(matrix: Sequence[Sequence[Expr]], factor: Factor, scales: Sequence[Expr]) -> list[Expr]:
+    """Conditions (each 1.0 or 0.0) that all hold exactly where the matrix is safely positive definite.
+
+    Each pivot, made dimensionless by the scales of the coordinates, must exceed 1e-13 of the largest diagonal entry.
+    """
+    if not matrix:
+        return []
+    graph = matrix[0][0].graph
+    if len(matrix) == 1:
+        return [graph.apply("lt", 0.0, matrix[0][0])]
+    squares = [s * s for s in scales]
+    largest, *rest = (matrix[i][i] * squares[i] for i in range(len(matrix)))
+    for entry in rest:  # plain comparison, not "max": NaN is caught with the result, and this is one instruction
+        largest = graph.apply("select", graph.apply("lt", largest, entry), entry, largest)
+    limit = largest * SINGULAR
+    conditions = [graph.apply("lt", limit, d * s) for d, s in zip(factor.pivots, squares, strict=True)]
+    return conditions

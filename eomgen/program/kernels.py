@@ -1,0 +1,64 @@
+"""Stage program: the table of public kernels: what each takes and gives, for every model alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The sizes that shapes are made of, by the names used in metadata and headers."""
+
+    n_q: int
+    n_v: int
+    n_x: int
+    n_u: int
+    n_p: int
+    n_y: int
+    n_c: int
+    n_dof: int
+    n_bodies: int
+    n_k: int
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One public function.
+
+    Attributes
+    ----------
+    name : str
+    inputs : tuple of str
+        Ports that make up ``x``, in order: q v a, q_i v_i a_i (independent coordinates), q_guess.
+    shape : callable
+        Sizes -> shape of the result for one state.
+    result : str
+        What the result is, one line for headers and documentation.
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    shape: Callable[[Sizes], tuple[int, ...]]
+    result: str
+
+
+KERNELS: tuple[Kernel, ...] = (
+    Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
+    Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
+    Kernel("mass_matrix", ("q",), lambda s: (s.n_v, s.n_v), "M of the spanning tree, row-major"),
+    Kernel("embedded_mass_matrix", ("q",), lambda s: (s.n_dof, s.n_dof), "M of the independent coordinates, row-major"),
+    Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
+    Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
+    Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
+    Kernel("constraints", ("q",), lambda s: (s.n_c,), "loop residuals C, all rows (m, rad)"),
+    Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
+    Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows"),
+    Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
+    Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
+    Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
+    Kernel("kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (3 * s.n_v,), "[q; v; a] of the whole tree"),
+    Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
+    Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
+    Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
+)

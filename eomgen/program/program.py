@@ -1,0 +1,149 @@
+"""Stage program: frozen types: which functions to generate, of which inputs, sharing which precomputed values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any
+
+from ..graph.core import Expr, Graph
+from ..graph.count import Operations
+from .kernels import Sizes
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Sizes at which the generated code changes its form; every field changes the sources."""
+
+    unrolled: int = 24  #: trees with at most so many velocities get a straight-line rhs, larger ones loops
+    jacobian_nodes: int = 20_000  #: above so many estimated operations the Jacobian is made direction by direction
+    statements: int = 1500  #: statements in one generated function at most
+
+
+@dataclass(frozen=True)
+class Port:
+    """A named group of inputs of a function, in order."""
+
+    name: str
+    symbols: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A straight-line function of the concatenated inputs of its ports.
+
+    Attributes
+    ----------
+    checks : tuple of Expr
+        Must all be > 0 at run time, or the function reports a singular mass matrix (status 2).
+    public : bool
+        Whether users call it; else only drivers do.
+    """
+
+    name: str
+    ports: tuple[Port, ...]
+    outputs: tuple[Expr, ...]
+    shape: tuple[int, ...]
+    checks: tuple[Expr, ...] = ()
+    public: bool = True
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Symbol names of x, in order."""
+        return tuple(s for port in self.ports for s in port.symbols)
+
+    @property
+    def n_in(self) -> int:
+        """Length of x."""
+        return sum(len(port.symbols) for port in self.ports)
+
+    @property
+    def n_out(self) -> int:
+        """Length of out."""
+        return len(self.outputs)
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A public function that target code with loops and Newton iterations computes from blocks.
+
+    Attributes
+    ----------
+    blocks : tuple of str
+        Names of the blocks it calls.
+    """
+
+    name: str
+    ports: tuple[Port, ...]
+    shape: tuple[int, ...]
+    blocks: tuple[str, ...]
+
+    @property
+    def n_in(self) -> int:
+        """Length of x."""
+        return sum(len(port.symbols) for port in self.ports)
+
+    @property
+    def n_out(self) -> int:
+        """Length of out."""
+        return prod(self.shape)
+
+
+@dataclass(frozen=True)
+class Program:
+    """Everything a target needs.
+
+    Attributes
+    ----------
+    name : str
+        Prefix of all public functions.
+    metadata : dict
+        What model.json says: names, sizes, units, values, shapes and operations of the kernels.
+    hoisted : tuple of Expr
+        Values of parameters only, computed once per parameter set and kept in ``c[n_p:]``.
+    parameter_only : frozenset of int
+        Ids of all nodes that no block evaluates: the hoisted values and what they are made of.
+    counts : mapping of str to Operations
+        Per block, hoisted work apart under ``precompute``.
+    """
+
+    name: str
+    metadata: dict[str, Any]
+    graph: Graph
+    time: str
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+    parameters: tuple[str, ...]
+    inputs: tuple[str, ...]
+    sizes: Sizes
+    blocks: tuple[Block, ...]
+    drivers: tuple[Driver, ...]
+    hoisted: tuple[Expr, ...]
+    parameter_only: frozenset[int]
+    preferred: tuple[int, ...]
+    parent: tuple[int, ...]
+    counts: Mapping[str, Operations]
+    limits: Limits = field(default_factory=Limits)
+
+    @property
+    def has_loops(self) -> bool:
+        """Whether there are constraint rows, so that states are projected."""
+        return self.sizes.n_c > 0
+
+    @property
+    def large(self) -> bool:
+        """Whether the tree is too large for a straight-line rhs."""
+        return self.sizes.n_v > self.limits.unrolled
+
+    @property
+    def block_names(self) -> frozenset[str]:
+        """Names of all blocks."""
+        return frozenset(b.name for b in self.blocks)
+
+    @property
+    def kernels(self) -> tuple[Block | Driver, ...]:
+        """The public functions, in the order of the metadata."""
+        found: dict[str, Block | Driver] = {b.name: b for b in self.blocks if b.public}
+        found.update((d.name, d) for d in self.drivers)
+        return tuple(found[name] for name in self.metadata["kernels"])

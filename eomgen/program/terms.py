@@ -1,0 +1,106 @@
+"""Stage program: the input of :func:`~.build.build_program`: every expression and name that functions are made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..errors import UsageError
+from ..graph.core import Expr, Graph
+
+Row = tuple[Expr, ...]
+
+
+@dataclass(frozen=True)
+class SystemTerms:
+    """A mechanism's equations as expressions of one graph, with the names of their symbols.
+
+    n is the number of velocities (and of coordinates: q' = v), m the number of constraint rows, redundant ones
+    included.  Quantities at acceleration level use the symbols `a`, multipliers do not appear in any expression.
+    """
+
+    graph: Graph
+    t: str  #: symbol of time
+    q: tuple[str, ...]  #: n coordinates
+    v: tuple[str, ...]  #: n velocities
+    a: tuple[str, ...]  #: n accelerations
+    multipliers: tuple[str, ...]  #: m names for the multipliers, one per row
+    u: tuple[str, ...]  #: inputs
+    p: tuple[str, ...]  #: parameters
+
+    mass_matrix: tuple[Row, ...]  #: (n, n) of q
+    bias: Row  #: (n,) h of (q, v): M a + h = 0 for a tree
+    inverse_dynamics: Row  #: (n,) M a + h of (q, v, a)
+    kinetic: Expr  #: T of (q, v)
+    potential: Expr  #: V of q
+
+    constraints: Row  #: (m,) C of q and t
+    constraint_jacobian: tuple[Row, ...]  #: (m, n) C_q
+    constraint_rate: Row  #: (m,) C_t, the partial derivative by t
+    velocity_constraints: Row  #: (m,) C_q v + C_t
+    gamma: Row  #: (m,) of (q, v): C'' = C_q a + gamma
+
+    poses: Row  #: (16 * bodies,) homogeneous matrices body -> ground, row-major
+    outputs: Row  #: (n_y,) of (q, v, a)
+    loop_coordinates: Row  #: (3 n_k,) y, y' and y'' of the coordinates of cut joints, of (q, v, a)
+    loop_coordinate_jacobian: tuple[Row, ...]  #: (n_k, n) dy/dq
+
+    coordinate_scales: Row  #: (n,) typical size of each coordinate, of parameters only
+    constraint_scales: Row  #: (m,) typical size of each row's residual, of parameters only
+    n_dof: int  #: degrees of freedom; n - n_dof is the rank of C_q
+    preferred: tuple[int, ...]  #: n_dof indices into v: independent coordinates, in the order of q_i
+    parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
+
+    @property
+    def n_v(self) -> int:
+        """Number of velocities."""
+        return len(self.v)
+
+    @property
+    def n_c(self) -> int:
+        """Number of constraint rows, redundant ones included."""
+        return len(self.constraints)
+
+    @property
+    def n_k(self) -> int:
+        """Number of coordinates of cut joints."""
+        return len(self.loop_coordinate_jacobian)
+
+    def check_shapes(self) -> None:
+        """Refuse terms whose sizes contradict each other.
+
+        Raises
+        ------
+        UsageError
+            Names the field and the sizes.
+        """
+        n, m = self.n_v, self.n_c
+        sizes = {
+            "q": (len(self.q), n),
+            "a": (len(self.a), n),
+            "multipliers": (len(self.multipliers), m),
+            "mass_matrix": (len(self.mass_matrix), n),
+            "bias": (len(self.bias), n),
+            "inverse_dynamics": (len(self.inverse_dynamics), n),
+            "constraint_jacobian": (len(self.constraint_jacobian), m),
+            "constraint_rate": (len(self.constraint_rate), m),
+            "velocity_constraints": (len(self.velocity_constraints), m),
+            "gamma": (len(self.gamma), m),
+            "loop_coordinates": (len(self.loop_coordinates), 3 * self.n_k),
+            "coordinate_scales": (len(self.coordinate_scales), n),
+            "constraint_scales": (len(self.constraint_scales), m),
+            "preferred": (len(self.preferred), self.n_dof),
+            "parent": (len(self.parent), n),
+        }
+        wrong = [f"{field} has {given} entries, {expected} expected" for field, (given, expected) in sizes.items()
+                 if given != expected]  # fmt: skip
+        for name in ("mass_matrix", "constraint_jacobian", "loop_coordinate_jacobian"):
+            wrong += [f"row {k} of {name} has {len(row)} entries, {n} expected"
+                      for k, row in enumerate(getattr(self, name)) if len(row) != n]  # fmt: skip
+        if m == 0 and self.n_dof != n:
+            wrong.append(f"n_dof is {self.n_dof}, but {n} coordinates have no constraints")
+        if not 0 <= self.n_dof <= n or not set(self.preferred) <= set(range(n)):
+            wrong.append(f"preferred {self.preferred} are not {self.n_dof} indices below {n}")
+        if any(not -1 <= parent < k for k, parent in enumerate(self.parent)):
+            wrong.append(f"parent {self.parent} has an entry that is not smaller than its own index")
+        if wrong:
+            raise UsageError("; ".join(wrong))

@@ -1,0 +1,74 @@
+"""Stage runtime: status code of a kernel, time, state -> a named exception that says where, what and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..errors import STATUS, EvaluationError
+from ..numeric.scales import Array
+from .layout import KERNELS, Layout
+
+SHOWN = 8  #: coordinates listed in a message
+
+WORDS = {
+    1: ("the result is not finite", "look for a division by zero, or a root or logarithm of a negative number"),
+    2: (
+        "the mass matrix of the degrees of freedom is not positive definite",
+        "give the bodies behind the named coordinates mass or inertia",
+    ),
+    3: (
+        "the state could not be brought onto the constraints",
+        "start from an assembled state (x0), or look for a position the mechanism cannot reach",
+    ),
+    4: (
+        "the independent coordinates cannot move the mechanism here (dead centre or singular position)",
+        "choose other independent coordinates",
+    ),
+}
+
+
+class Fail:
+    """Raises the exception for a failed kernel; what cores call as ``fail(name, status, t, x)``.
+
+    Parameters
+    ----------
+    layout : Layout
+    culprit : callable, optional
+        (status, t, x) -> words that name what is to blame, or an empty string.
+    """
+
+    def __init__(self, layout: Layout, culprit: Callable[[int, float, Array], str] | None = None) -> None:
+        self.layout = layout
+        self.culprit = culprit
+
+    def __call__(self, name: str, status: int, t: float, x: Array) -> None:
+        raise self.exception(name, status, t, x)
+
+    def exception(self, name: str, status: int, t: float, x: Array) -> EvaluationError:
+        """The exception, not raised."""
+        what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
+        names = self._names(name)
+        blame = ""
+        if not np.isfinite(x).all() and names:
+            bad = [n for n, value in zip(names, x, strict=True) if not np.isfinite(value)]
+            blame, remedy = (
+                f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not",
+                "check the state given",
+            )
+        elif self.culprit is not None and names:
+            found = self.culprit(status, t, x)
+            blame = f": {found}" if found else ""
+        error = STATUS.get(status, EvaluationError)
+        return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
+
+    def _names(self, kernel: str) -> Sequence[str]:
+        kind = KERNELS[kernel][0] if kernel in KERNELS else ""
+        return {"x": self.layout.x, "q": self.layout.q, "motion": self.layout.x + self.layout.a}.get(kind, ())
+
+
+def place(names: Sequence[str], x: Array) -> str:
+    """``, theta = 0.3, s = 0.4``: the first coordinates of a state."""
+    shown = [f"{name} = {value:.6g}" for name, value in zip(names, x, strict=False)][:SHOWN]
+    return "".join(f", {item}" for item in shown) + (", ..." if len(names) > SHOWN else "")

@@ -1,0 +1,298 @@
+"""Stage runtime: values by name -> an assembled position or state.
+
+Values given explicitly are held exactly.  Declared initial values are held too, as long as the given ones leave them
+room: one after the other in the order of the model, each if it is independent of those before.  The way from the
+model's reference position is walked in small steps, so that the mechanism stays on its branch; where that way is
+blocked, the loops are closed from the nearest guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import AssemblyError
+from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
+from ..numeric.closure import Equations, System, close, closed
+from ..numeric.continuation import follow
+from ..numeric.projection import largest
+from ..numeric.rank import rank
+from ..numeric.scales import Array
+from .kernels import Kernels
+from .names import UnknownNameError, unknown
+
+INDEPENDENT = 1e-6  #: a further row counts when it keeps this part of its length after the others are taken out
+SAME = 1e-6  #: scaled distance below which two positions are one
+
+
+class Given(NamedTuple):
+    """Values by the name of a coordinate, its rate, a loop coordinate or its rate."""
+
+    positions: dict[str, float]
+    rates: dict[str, float]
+
+
+class Initial:
+    """Assembly of one model with one set of parameters at one time.
+
+    Parameters
+    ----------
+    kernels : Kernels
+    t : float
+        Time; matters for driven constraints only.
+    """
+
+    def __init__(self, kernels: Kernels, t: float = 0.0) -> None:
+        self.kernels = kernels
+        self.layout = layout = kernels.layout
+        self.t = t
+        self.scales = layout.scales
+        self._C = kernels.state("constraints", nan=True)
+        self._C_q = kernels.state("constraint_jacobian", nan=True)
+        self._loop = kernels.motion("loop_coordinates") if layout.n_k else None
+        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
+        self._alignment = kernels.state("alignment", nan=True) if layout.n_a else None
+        self.coordinates = layout.q + layout.loops
+
+    def sort(self, values: Mapping[str, float]) -> Given:
+        """Split values into positions and rates; raises UsageError for a name that is neither."""
+        layout = self.layout
+        rates = layout.v + layout.loop_rates
+        for name in values:
+            if name in layout.p:
+                raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
+            if name not in self.coordinates and name not in rates:
+                raise unknown("coordinate or rate", name, self.coordinates + rates)
+        return Given(
+            {n: x for n, x in values.items() if n in self.coordinates},
+            {n: x for n, x in values.items() if n in rates},
+        )
+
+    # functions of q
+
+    def position(self, q: Array) -> tuple[Array, Array]:
+        """C (n_c,), C_q (n_c, n), all rows."""
+        return self._C(q, t=self.t), self._C_q(q, t=self.t)
+
+    def rate(self, q: Array) -> Array:
+        """C_t (n_c,)."""
+        x = np.concatenate([q, np.zeros(self.layout.n_v)])
+        return self.kernels.state("velocity_constraints")(x, t=self.t)
+
+    def loops(self, q: Array) -> tuple[Array, Array]:
+        """Coordinates y (n_k,) of the cut joints and y_q (n_k, n)."""
+        assert self._loop is not None and self._loop_q is not None
+        zero = np.zeros(self.layout.n_v)
+        return self._loop(q, zero, zero, t=self.t)[0], self._loop_q(q, t=self.t)
+
+    def aligned(self, q: Array) -> bool:
+        """Whether no joint closes with its axes flipped."""
+        return self._alignment is None or bool((self._alignment(q, t=self.t) > 0.0).all())
+
+    def _equations(self, values: Mapping[str, float]) -> Equations | None:
+        layout = self.layout
+        names = [name for name in values if name in layout.loops]
+        if not names:
+            return None
+        chosen = np.array([layout.loops.index(name) for name in names])
+
+        def evaluate(q: Array) -> tuple[Array, Array]:
+            y, y_q = self.loops(q)
+            return y[chosen], y_q[chosen]
+
+        wanted = np.array([values[name] for name in names])
+        return Equations(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
+
+    # positions
+
+    def close(self, guess: Array, held: Mapping[str, float], restarts: int = 24) -> Assembly:
+        """Close the loops from a guess with some values exact."""
+        layout = self.layout
+        start = self._with(guess, held)
+        indices = [layout.q.index(name) for name in held if name in layout.q]
+        return assemble(
+            self.position,
+            start,
+            self.scales,
+            held=indices,
+            equations=self._equations(held),
+            alignment=(lambda q: self._alignment(q, t=self.t)) if self._alignment is not None else None,
+            names=layout.q,
+            labels=layout.constraint_labels,
+            restarts=restarts,
+        )
+
+    def walk(self, start: Array, held: Mapping[str, float]) -> Array:
+        """From a closed position steadily to held values; raises AssemblyError when blocked."""
+        names = [name for name in held if name in self.layout.q]
+        indices = np.array([self.layout.q.index(name) for name in names], dtype=np.intp)
+        values = np.array([held[name] for name in names])
+        q = follow(self.position, start, self.scales, indices, values, self._equations(held))
+        if not self.aligned(q):
+            raise AssemblyError("a joint's axes flipped on the way")
+        return q
+
+    def reference(self) -> Array:
+        """The reference position, closed again for these parameters and this time."""
+        declared = self.sort(self.layout.initial).positions
+        try:
+            return self.close(self.layout.q_reference, declared, restarts=2).q
+        except AssemblyError:
+            return self.close(self.layout.q_reference, {}).q
+
+    def assembled(self, given: Mapping[str, float]) -> Array:
+        """Position with the given values exact, and the declared ones where they leave room."""
+        layout = self.layout
+        declared = self.sort(layout.initial).positions
+        if not layout.n_c:
+            return self._with(self._with(layout.q_reference, declared), given)
+        if not given:
+            return self.close(layout.q_reference, declared).q
+        rest = {name: value for name, value in declared.items() if name not in given}
+        try:
+            start = self.reference()
+        except AssemblyError:
+            return self.close(layout.q_reference, given).q  # these parameters close somewhere else, if anywhere
+        soft = self.compatible(start, given, rest)
+        for held in ({**given, **soft}, given):
+            try:
+                return self.walk(start, held)
+            except AssemblyError:
+                continue
+        if soft:
+            try:
+                return self.close(start, {**given, **soft}, restarts=4).q
+            except AssemblyError:
+                pass
+        return self.close(start, given).q
+
+    def from_guess(self, guess: Mapping[str, float]) -> Array:
+        """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
+        layout = self.layout
+        if not layout.n_c:
+            return self.assembled(guess)
+        favoured = [layout.q[i] for i in layout.independent]
+        ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
+        if set(guess) <= set(favoured):
+            try:
+                return self.assembled(guess)
+            except AssemblyError:
+                pass
+        declared = {**layout.guess, **self.sort(layout.initial).positions}
+        start = self._with(self._with(layout.q_reference, declared), guess)
+        soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
+        for held in (soft, {k: v for k, v in soft.items() if k in guess}):
+            try:
+                return self.close(start, held, restarts=0).q
+            except AssemblyError:
+                continue
+        return self.close(start, {}).q
+
+    def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
+        """Every position found that holds the given values; `first` comes first."""
+        layout = self.layout
+        free = np.ones(layout.n_q)
+        free[[layout.q.index(name) for name in given if name in layout.q]] = 0.0
+        system = System(self.position, self.scales, free, self._equations(given))
+        found = [first]
+        for start in starts(first, free * self.scales.q, tries):
+            with np.errstate(all="ignore"):
+                q, residual = close(system, start)
+            if closed(residual) and self.aligned(q) and all(self._apart(q, other) for other in found):
+                found.append(q)
+        return found
+
+    def _apart(self, a: Array, b: Array) -> bool:
+        kinds = self.layout.metadata["coordinate_kinds"]
+        gap = [
+            abs((x - y + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x - y)
+            for x, y, kind in zip(a, b, kinds, strict=True)
+        ]
+        return largest(np.array(gap) / self.scales.q) > SAME
+
+    def side(self, q: Array) -> float:
+        """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
+        layout = self.layout
+        J = self.scales.jacobian(self._C_q(q, t=self.t))
+        dependent = np.setdiff1d(np.arange(layout.n_v), layout.independent)
+        return float(np.linalg.det(J[np.ix_(layout.rows, dependent)])) if len(layout.rows) else 1.0
+
+    # velocities
+
+    def velocities(self, q: Array, given: Mapping[str, float] | None) -> Array:
+        """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact."""
+        declared = self.sort(self.layout.initial).rates
+        if given is None:
+            return self._solve_rates(q, declared).v
+        rest = {name: value for name, value in declared.items() if name not in given}
+        return self._solve_rates(q, {**given, **self.compatible(q, given, rest)}).v
+
+    def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
+        layout = self.layout
+        v = np.zeros(layout.n_v)
+        indices = []
+        for name, value in held.items():
+            if name in layout.v:
+                indices.append(layout.v.index(name))
+                v[indices[-1]] = value
+        loops = [name for name in held if name in layout.loop_rates]
+        equations = None
+        if loops:
+            assert self._loop is not None
+            chosen = np.array([layout.loop_rates.index(name) for name in loops])
+            zero = np.zeros(layout.n_v)
+            y_t = self._loop(q, zero, zero, t=self.t)[1]
+            values = np.array([held[name] for name in loops])
+            y_q = self.loops(q)[1]
+            equations = VelocityEquations(y_q[chosen], y_t[chosen], values, layout.loop_scales[chosen], loops)
+        return assemble_velocity(
+            self._C_q(q, t=self.t),
+            self.rate(q),
+            self.scales,
+            guess=v,
+            held=indices,
+            equations=equations,
+            names=layout.v,
+            labels=layout.constraint_labels,
+        )
+
+    # which values can be held together
+
+    def compatible(self, q: Array, given: Iterable[str], rest: Mapping[str, float]) -> dict[str, float]:
+        """Those of `rest`, in order, that are independent of the constraints, of `given` and of each other at q."""
+        rows = list(self.scales.jacobian(self._C_q(q, t=self.t))) + [self._row(q, name) for name in given]
+        basis: Array = np.empty((0, self.layout.n_v))
+        if rows:
+            stacked = np.array(rows)
+            count = rank(stacked).rank
+            basis = np.linalg.svd(stacked)[2][:count]
+        kept = {}
+        for name, value in rest.items():
+            row = self._row(q, name)
+            length = np.linalg.norm(row)
+            left = row - basis.T @ (basis @ row)
+            left -= basis.T @ (basis @ left)
+            size = np.linalg.norm(left)
+            if length > 0.0 and size > INDEPENDENT * length:
+                basis = np.vstack([basis, left / size])
+                kept[name] = value
+        return kept
+
+    def _row(self, q: Array, name: str) -> Array:
+        """The scaled gradient of a coordinate or rate."""
+        layout = self.layout
+        for names in (layout.q, layout.v):
+            if name in names:
+                return np.asarray(np.eye(layout.n_v)[names.index(name)])
+        index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)
+        return np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])
+
+    def _with(self, q: Array, values: Mapping[str, float]) -> Array:
+        result = np.array(q)
+        for name, value in values.items():
+            if name in self.layout.q:
+                result[self.layout.q.index(name)] = value
+        return result
+

@@ -1,0 +1,259 @@
+"""Stage runtime: a core (compiled or NumPy), parameters and inputs -> the calls of one model.
+
+A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
+makers ``timed``, ``state`` and ``motion``; see :class:`Core`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .failure import Fail
+from .layout import Layout
+
+
+class Timed(Protocol):
+    """A kernel of time and state."""
+
+    failure: tuple[int, float, Array] | None  #: with NaN for failures: (status, t, x) of the last one
+
+    def __call__(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array: ...
+
+
+class State(Protocol):
+    """A kernel of the state, or of the coordinates, alone."""
+
+    failure: tuple[int, float, Array] | None
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> Array: ...
+
+
+class Motion(Protocol):
+    """A kernel of coordinates, velocities and accelerations."""
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> Array: ...
+
+
+class Core(Protocol):
+    """What both targets give Python: the Cython extension module ``_core``, or a :class:`~.numpy_core.NumpyCore`."""
+
+    metadata: str
+    names: tuple[str, ...]
+
+    def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Any: ...
+    def timed(
+        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
+    ) -> Any: ...
+    def state(
+        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
+    ) -> Any: ...
+    def motion(
+        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
+    ) -> Any: ...
+
+
+class Kernels:
+    """The calls of one model, sharing one set of parameters and inputs.
+
+    Parameters
+    ----------
+    core : Core
+    layout : Layout
+    p, u : arrays, optional
+        Parameters (n_p,) and inputs (n_u,); the declared values by default.
+    """
+
+    def __init__(self, core: Core, layout: Layout, p: Array | None = None, u: Array | None = None) -> None:
+        self.core = core
+        self.layout = layout
+        self.context = core.context(p, u, UsageError)
+        self.fail = Fail(layout, self._culprit)
+        self.constraints = Rows(self.state("constraints"), layout.rows)
+        self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
+
+    def timed(self, name: str, nan: bool = False) -> Timed:
+        """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
+        kernel: Timed = self._make(self.core.timed, name, nan)
+        return kernel
+
+    def state(self, name: str, nan: bool = False) -> State:
+        """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
+        layout = self.layout
+        if name not in self.core.names:
+            if layout.shape(name)[0] == 0:
+                return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
+            if layout.rank == 0 and name == "project":
+                return Identity(layout.n_x)
+            if layout.rank == 0 and name == "embedded_mass_matrix":
+                return Selected(self.state("mass_matrix", nan), layout.independent)
+        kernel: State = self._make(self.core.state, name, nan)
+        return kernel
+
+    def motion(self, name: str) -> Motion:
+        """A kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
+        kernel: Motion = self._make(self.core.motion, name, False)
+        return kernel
+
+    def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
+        if name not in self.core.names:
+            raise UsageError(f"model {self.layout.name!r} was generated without the kernel {name!r}")
+        return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
+
+    def _culprit(self, status: int, t: float, x: Array) -> str:
+        """Names what a failure at a state is due to, as far as it can be told."""
+        layout, q = self.layout, x[: self.layout.n_q]
+        if status == 2:
+            M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
+            if not np.isfinite(M).all():
+                return ""
+            values, vectors = np.linalg.eigh(M)
+            weights = np.abs(vectors[:, 0])
+            names = [layout.q[i] for i, w in zip(layout.independent, weights, strict=True) if w > 0.1 * weights.max()]
+            moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
+            return f"moving {moving} meets no inertia (smallest eigenvalue {values[0]:.2g})"
+        if status == 3:
+            e = self.state("constraints", nan=True)(q, t=t)
+            if not np.isfinite(e).all() or not e.size:
+                return ""
+            worst = int(np.abs(e / layout.scales.c).argmax())
+            return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
+        if status == 4:
+            return f"independent are {', '.join(layout.q[i] for i in layout.independent)}"
+        return ""
+
+
+class Rows:
+    """A constraint kernel that gives the independent rows, or all of them."""
+
+    def __init__(self, every: State, independent: Sequence[int] | np.ndarray[Any, Any]) -> None:
+        self.every = every
+        self.independent = independent
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+        rows: str = "independent",
+    ) -> Array:
+        """Evaluate.
+
+        Parameters
+        ----------
+        q : (n_q,) or (n_q, k) array
+        p, u : arrays, optional
+        out : array, optional
+        t : float
+        rows : {"independent", "all"}
+        """
+        if rows == "all":
+            return self.every(q, p=p, u=u, out=out, t=t)
+        if rows != "independent":
+            raise UsageError(f"rows must be 'independent' or 'all', not {rows!r}")
+        result = self.every(q, p=p, u=u, t=t)[self.independent]
+        if out is None:
+            return result
+        return _write(out, result)
+
+
+class Constant:
+    """A kernel whose result has no entries, such as the constraints of a tree."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, value: Array, n_in: int) -> None:
+        self.value = value
+        self.n_in = n_in
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> Array:
+        """An empty array, with a last axis for a batch."""
+        shape = np.shape(x)
+        if shape[:1] != (self.n_in,) or len(shape) > 2:
+            raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
+        return np.zeros(self.value.shape + shape[1:]) if out is None else out
+
+
+class Identity(Constant):
+    """The projection of a tree: nothing to do."""
+
+    def __init__(self, n_in: int) -> None:
+        super().__init__(np.zeros(n_in), n_in)
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> Array:
+        """A copy of x."""
+        result = super().__call__(x, out=out)
+        return _write(result, np.asarray(x, dtype=float))
+
+
+class Selected:
+    """Rows and columns of a matrix kernel in another order."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, every: State, order: np.ndarray[Any, Any]) -> None:
+        self.every = every
+        self.order = order
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+        t: ArrayLike = 0.0,
+    ) -> Array:
+        """The matrix of the chosen coordinates."""
+        result = self.every(x, p=p, u=u, t=t)[np.ix_(self.order, self.order)]
+        return result if out is None else _write(out, result)
+
+
+def _write(out: Array, result: Array) -> Array:
+    if out.shape != result.shape:
+        raise UsageError(f"out must have shape {result.shape}, not {out.shape}")
+    out[...] = result
+    return out

@@ -1,0 +1,145 @@
+"""Stage runtime: the metadata of a model (model.json) -> names, sizes and the shapes of its kernels."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array, Scales
+from .names import check_names
+
+ABI = 1  #: layout of the metadata this file reads
+
+
+class Layout:
+    """What a model calls its numbers, and in which order they lie.
+
+    Parameters
+    ----------
+    metadata : str or mapping
+        The JSON text of model.json, or what it holds.
+    """
+
+    def __init__(self, metadata: str | Mapping[str, Any]) -> None:
+        data: dict[str, Any] = json.loads(metadata) if isinstance(metadata, str) else dict(metadata)
+        if data.get("abi") != ABI:
+            raise UsageError(f"the model's metadata has layout {data.get('abi')} and this version reads {ABI}")
+        self.metadata = data
+        self.name: str = data["name"]
+        self.q: tuple[str, ...] = tuple(data["q_names"])
+        self.v: tuple[str, ...] = tuple(data["v_names"])
+        self.x: tuple[str, ...] = tuple(data.get("x_names") or self.q + self.v)
+        self.u: tuple[str, ...] = tuple(data["u_names"])
+        self.p: tuple[str, ...] = tuple(data["p_names"])
+        self.y: tuple[str, ...] = tuple(data["y_names"])
+        self.bodies: tuple[str, ...] = tuple(data["body_names"])
+        self.loops: tuple[str, ...] = tuple(data.get("loop_names", ()))
+        self.a = tuple(acceleration_name(name) for name in self.v)
+        self.loop_rates = tuple(f"{name}_dot" for name in self.loops)
+        self.loop_accelerations = tuple(f"{name}_ddot" for name in self.loops)
+        self.constraint_labels: tuple[str, ...] = tuple(data.get("constraint_labels", ()))
+        self.alignment_labels: tuple[str, ...] = tuple(data.get("alignment_labels", ()))
+        self.n_q, self.n_v, self.n_x = len(self.q), len(self.v), len(self.q) + len(self.v)
+        self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
+        self.n_c: int = data.get("n_c", 0)
+        self.n_dof: int = data.get("n_dof", self.n_v)
+        self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
+        self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
+        self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
+        self.rank = self.n_v - self.n_dof
+        self.length: float = float(data.get("length_scale") or 1.0)
+        self.scales = Scales.of_kinds(data["coordinate_kinds"], data.get("constraint_kinds", ()), self.length)
+        self.units: dict[str, str] = data.get("units", {})
+        kinds: Sequence[str] = data.get("loop_kinds") or [
+            "length" if self.units.get(name) == "m" else "angle" for name in self.loops
+        ]
+        self.loop_angles = np.array([kind != "length" for kind in kinds], dtype=bool)
+        self.loop_scales = np.where(self.loop_angles, 1.0, self.length)
+        self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
+        self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
+        reference = data.get("q_reference")
+        self.q_reference = np.zeros(self.n_q) if reference is None else np.array(reference, dtype=float)
+
+    def inputs(self, kernel: str) -> int:
+        """Length of the vector x a kernel takes."""
+        return {"q": self.n_q, "x": self.n_x, "motion": self.n_q + 2 * self.n_v, "none": 0}.get(
+            KERNELS[kernel][0], 3 * self.n_dof + self.n_q
+        )
+
+    def shape(self, kernel: str) -> tuple[int, ...]:
+        """Shape of a kernel's result for one state."""
+        sums = {"n_q+2n_v": self.n_q + 2 * self.n_v, "n_v+n_c": self.n_v + self.n_c}
+        return tuple(
+            size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
+            for size in KERNELS[kernel][1]
+        )
+
+    def unit(self, name: str) -> str:
+        """Unit of a quantity, derived for rates and accelerations; empty when unknown."""
+        if name in self.units:
+            return self.units[name]
+        if name in ("T", "V", "energy"):
+            return "J"
+        for suffix, per in (("_ddot", "s^2"), ("_dot", "s")):
+            base = name.removesuffix(suffix)
+            if base != name and base in self.units:
+                return f"{self.units[base]}/{per}"
+        return "s" if name == "t" else ""
+
+    def values(self, what: str, names: Sequence[str], given: object, current: Array) -> Array:
+        """A full vector from a mapping of names (the others keep their current values) or from an array."""
+        if given is None:
+            return current
+        if isinstance(given, Mapping):
+            check_names(what, given, names)
+            result = np.array(current, dtype=float)
+            for name, value in given.items():
+                result[names.index(name)] = number(f"{what} {name}", value)
+            return result
+        result = np.asarray(given, dtype=float)
+        if result.shape != (len(names),):
+            raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
+        return result
+
+
+def number(label: str, value: object) -> float:
+    """One finite number, or a UsageError that names it."""
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise UsageError(f"{label} must be a number, not {value!r}") from None
+    if not np.isfinite(result):
+        raise UsageError(f"{label} must be finite, not {result}")
+    return result
+
+
+def acceleration_name(velocity: str) -> str:
+    """``theta_dot`` -> ``theta_ddot``; ``w`` -> ``w_dot``."""
+    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
+
+
+#: What each kernel takes, and the shape of what it returns for one state.
+KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
+    "rhs": ("x", ("n_x",)),
+    "jacobian": ("x", ("n_x", "n_x")),
+    "mass_matrix": ("q", ("n_v", "n_v")),
+    "embedded_mass_matrix": ("q", ("n_dof", "n_dof")),
+    "bias": ("x", ("n_v",)),
+    "inverse_dynamics": ("motion", ("n_v",)),
+    "energy": ("x", (2,)),
+    "constraints": ("q", ("n_c",)),
+    "constraint_jacobian": ("q", ("n_c", "n_v")),
+    "velocity_constraints": ("x", ("n_c",)),
+    "project": ("x", ("n_x",)),
+    "poses": ("q", ("n_bodies", 4, 4)),
+    "outputs": ("x", ("n_y",)),
+    "kinematics": ("independent", ("n_q+2n_v",)),
+    "loop_coordinates": ("motion", (3, "n_k")),
+    "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
+    "alignment": ("q", ("n_a",)),
+    "scales": ("none", ("n_v+n_c",)),
+}

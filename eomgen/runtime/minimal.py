@@ -1,0 +1,180 @@
+"""Stage runtime: x = [q_i; v_i] of the degrees of freedom alone -> its derivative, for integrators that want no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import PartitionError, UsageError
+from ..numeric.scales import Array
+from .paths import STEP, Path
+
+if TYPE_CHECKING:
+    from .module import Module
+
+AMPLIFIED = 10.0  #: v_d / v_i above which a dead centre is near
+SUDDEN = 3.0  #: a change of velocity this many times what the accelerations explain is a change of branch
+
+
+class Minimal:
+    """The strictly minimal form of a model.
+
+    The set of independent coordinates is fixed.  The dependent ones are solved by Newton's iteration, starting from the
+    last converged position, which is the only memory a call leaves; :meth:`reset` sets it.  A step that would end on
+    another branch of the mechanism is refused.
+
+    Attributes
+    ----------
+    x_names : tuple of str
+        Names of the entries of x = [q_i; v_i].
+    q_names, v_names : tuple of str
+        Their two halves.
+    n_x : int
+    """
+
+    def __init__(self, module: Module) -> None:
+        layout = module.layout
+        self._module = module
+        self._layout = layout
+        self._path = Path(module.kernels)
+        self.q_names = tuple(layout.q[i] for i in layout.independent)
+        self.v_names = tuple(layout.v[i] for i in layout.independent)
+        self.x_names = self.q_names + self.v_names
+        self.n_x = len(self.x_names)
+        self._q: Array | None = None
+        self._last: tuple[float, Array] | None = None  # time and x' of the last call
+
+    def __repr__(self) -> str:
+        return f"<minimal form of {self._layout.name}: x = [{', '.join(self.x_names)}]>"
+
+    def reset(self, q: ArrayLike | None = None) -> None:
+        """Set the position from which the next Newton iteration starts.
+
+        Parameters
+        ----------
+        q : (n_q,) array, optional
+            Position of the whole tree, closed or nearly; the assembled initial position by default.
+        """
+        start = self._module.assemble() if q is None else np.array(q, dtype=float)
+        if start.shape != (self._layout.n_q,):
+            raise UsageError(f"q must have shape ({self._layout.n_q},), not {start.shape}")
+        self._q, self._last = start, None
+
+    def x0(self, values: Mapping[str, float] | None = None, /, *, t: float = 0.0, **named: float) -> Array:
+        """Assembled initial state (n_x,), from the same named values as ``Module.x0``; calls :meth:`reset`."""
+        x = self._module.x0(values, t=t, **named)
+        self.reset(x[: self._layout.n_q])
+        return self.reduce(x)
+
+    def reduce(self, x: ArrayLike) -> Array:
+        """The independent part (n_x,) or (n_x, k) of full states (2 n,) or (2 n, k)."""
+        full = np.asarray(x, dtype=float)
+        chosen = self._layout.independent
+        return np.concatenate([full[chosen], full[self._layout.n_q + chosen]])
+
+    def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
+        """Full states from minimal ones.
+
+        Parameters
+        ----------
+        x_min : (n_x,) or (n_x, k) array
+            Columns are taken one after the other, each starting from the position of the one before.
+        t : float or (k,) array
+
+        Returns
+        -------
+        (2 n,) or (2 n, k) array
+
+        Raises
+        ------
+        ProjectionError, PartitionError
+            A position out of reach, or at a dead centre of the independent coordinates.
+        """
+        x = np.asarray(x_min, dtype=float)
+        if x.shape[:1] != (self.n_x,) or x.ndim > 2:
+            raise UsageError(f"x must have shape ({self.n_x},) or ({self.n_x}, k), not {x.shape}")
+        if x.ndim == 1:
+            return self._solve(float(np.asarray(t)), x)
+        times = np.broadcast_to(np.asarray(t, dtype=float), x.shape[1:])
+        result = np.empty((self._layout.n_x, x.shape[1]))
+        for j in range(x.shape[1]):
+            result[:, j] = self._solve(float(times[j]), x[:, j])
+        self._last = None
+        return result
+
+    def rhs(self, t: float, x: ArrayLike, p: Any = None, u: ArrayLike | None = None) -> Array:
+        """Derivative (n_x,) of x = [q_i; v_i].
+
+        Parameters
+        ----------
+        t : float
+        x : (n_x,) array
+        p : None
+            Parameters belong to the module: ``module.bind(p=...).minimal``.
+        u : (n_u,) array, optional
+            Inputs.
+
+        Raises
+        ------
+        PartitionError
+            The independent coordinates cannot move the mechanism here, or a dead centre was crossed.
+        ProjectionError
+            The position is out of reach.
+        """
+        if p is not None:
+            raise UsageError("the minimal form takes its parameters from its module: module.bind(p=...).minimal")
+        state = np.asarray(x, dtype=float)
+        if state.shape != (self.n_x,):
+            raise UsageError(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
+        before = self._q
+        full = self._solve(t, state)
+        x_dot = self._module.rhs(t, full, u=u)
+        self._check_crossing(t, x_dot, state, before)
+        self._last = (t, x_dot)
+        return self.reduce(x_dot)
+
+    def _solve(self, t: float, x: Array) -> Array:
+        n, k = self._layout.n_q, self._layout.n_dof
+        if self._q is None:
+            self.reset()
+        assert self._q is not None
+        q_i, v_i = x[:k], x[k:]
+        way = np.abs((q_i - self._q[self._layout.independent]) / self._path.scales_i)
+        near = self._q
+        if way.size and not way.max() <= STEP:
+            if not np.isfinite(way).all():
+                raise UsageError(f"x is not finite: {x}")
+            near = self._path.walk(near, q_i, t)
+        near = self._path.advance(near, q_i, t)
+        full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: n + self._layout.n_v]
+        self._q = full[:n].copy()
+        return full
+
+    def _check_crossing(self, t: float, x_dot: Array, x: Array, before: Array | None) -> None:
+        """Refuse a reflection at a dead centre of the independent coordinates.
+
+        Near it they look the same on both sides, so an integrator can step across and come back on the old branch: the
+        dependent velocities then reverse at once, which no acceleration explains.
+        """
+        layout, last = self._layout, self._last
+        if last is None or t == last[0] or before is None or not layout.rank:
+            return
+        scales = layout.scales.q
+        v, v_last = x_dot[: layout.n_q] / scales, last[1][: layout.n_q] / scales
+        gap = abs(t - last[0])
+        own = max(np.abs(v[layout.independent]).max(), np.abs(v_last[layout.independent]).max())
+        fast = min(np.abs(v).max(), np.abs(v_last).max())
+        if fast <= AMPLIFIED * own or v @ v_last >= 0.0 or fast * gap > 1.0:
+            return
+        a = max(np.abs(x_dot[layout.n_q :] / scales).max(), np.abs(last[1][layout.n_q :] / scales).max())
+        if np.abs(v - v_last).max() > SUDDEN * a * gap:
+            self._q = before
+            raise PartitionError(
+                f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
+                "choose other independent coordinates, or integrate the full state",
+                t,
+                x,
+            )

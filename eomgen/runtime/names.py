@@ -1,0 +1,51 @@
+"""Stage runtime: a name that does not fit -> an error that suggests the nearest ones."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from types import ModuleType
+
+from ..errors import MissingDependencyError, UsageError
+
+
+class UnknownNameError(UsageError, KeyError):
+    """A key that does not exist; also a KeyError, so that mappings behave as expected."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
+    """The error for an unknown name, with near misses or, if there are none, what there is."""
+    from difflib import get_close_matches  # only needed when something went wrong
+
+    choice = list(dict.fromkeys(allowed))
+    near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
+    if near:
+        hint = f"did you mean {' or '.join(near)}?"
+    elif not choice:
+        hint = "there are none"
+    else:
+        shown = ", ".join(choice[:20])
+        hint = f"there {'is' if len(choice) == 1 else 'are'} {shown}{' ...' if len(choice) > 20 else ''}"
+    return UnknownNameError(f"no {what} {name!r}; {hint}")
+
+
+def check_names(what: str, given: Mapping[str, object], allowed: Collection[str]) -> None:
+    """Raise :class:`UnknownNameError` for the first name of `given` that is not allowed."""
+    for name in given:
+        if name not in allowed:
+            raise unknown(what, name, allowed)
+
+
+def require(module: str, extra: str, purpose: str) -> ModuleType:
+    """Import an optional package, or say in one line what to install."""
+    from importlib import import_module
+
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        if error.name is not None and error.name.partition(".")[0] != package:
+            raise  # the package is there and something it needs is not
+        raise MissingDependencyError(f"{purpose} needs {package}: pip install {extra}") from error

@@ -1,0 +1,265 @@
+"""Stage runtime: emitted NumPy blocks and metadata -> a core with the interface of the compiled one.
+
+A block is a function ``f(t, x, u, c) -> out`` of plain arrays: x (n_in,) or (n_in, k), out (n_out,) or (n_out, k).  It
+may raise one of :data:`~..errors.STATUS`.  Straight-line kernels are blocks themselves; those of closed loops are put
+together in :mod:`.numpy_drivers`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import STATUS, EvaluationError
+from ..numeric.scales import Array
+from .layout import KERNELS, Layout
+from .numpy_drivers import Drivers
+
+#: f(t, x, u, c) -> out
+Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
+
+CODES = {error: status for status, error in STATUS.items()}
+
+
+class Context:
+    """Parameters and inputs bound to a model, with the constants that follow from the parameters."""
+
+    def __init__(self, p: Array, u: Array, c: Array) -> None:
+        self.p, self.u, self.c = p, u, c
+
+
+class NumpyCore:
+    """A model whose kernels are NumPy functions.
+
+    Parameters
+    ----------
+    metadata : str or mapping
+        The JSON text of model.json, or what it holds.
+    blocks : mapping of str to callable
+        ``f(t, x, u, c) -> (n_out, ...)``: kernels of :data:`~.layout.KERNELS`, and the inner blocks ``terms``,
+        ``position``, ``rate``, ``residual_jacobian`` or ``residual_tangent``, ``accelerated_outputs``.
+    precompute : callable, optional
+        ``p -> c``, constants that follow from the parameters, c[:n_p] = p; without it c = p.
+
+    Attributes
+    ----------
+    metadata : str
+    names : tuple of str
+        Kernels that can be made.
+    """
+
+    def __init__(
+        self,
+        metadata: str | Mapping[str, Any],
+        blocks: Mapping[str, Block],
+        precompute: Callable[[Array], Array] | None = None,
+    ) -> None:
+        self.layout = Layout(metadata)
+        self.metadata = metadata if isinstance(metadata, str) else json.dumps(dict(metadata))
+        self.blocks = dict(blocks)
+        self.precompute = precompute
+        self.drivers = Drivers(self.layout, self.blocks)
+        self.names = tuple(name for name in KERNELS if name in self.blocks or name in self.drivers.names)
+
+    def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Context:
+        """Bind parameters (n_p,) and inputs (n_u,), the declared values by default.
+
+        Raises
+        ------
+        error
+            For a wrong shape, or constants that are not finite.
+        """
+        data = self.layout.metadata
+        p = _vector(data["p_values"] if p is None else p, self.layout.n_p, "p", error)
+        u = _vector(data["u_values"] if u is None else u, self.layout.n_u, "u", error)
+        return Context(p, u, self.constants(p, error))
+
+    def constants(self, p: Array, error: type[Exception]) -> Array:
+        """The constants handed to the blocks."""
+        if self.precompute is None:
+            return p
+        with np.errstate(all="ignore"):
+            c = np.asarray(self.precompute(p), dtype=float)
+        if not np.isfinite(c).all() and np.isfinite(p).all():
+            raise error(f"the constants that follow from the parameters cannot be computed; p = {p}")
+        return c
+
+    def timed(
+        self, name: str, context: Context, shape: Any, fail: Any, nan: bool = False, error: Any = ValueError
+    ) -> NumpyTimed:
+        """Bind a kernel called as ``f(t, x, p=None, u=None, out=None)``.
+
+        Parameters
+        ----------
+        name : str
+        context : Context
+        shape : tuple of int
+            Shape of the result for one state.
+        fail : callable
+            Called as ``fail(name, status, t, x)`` when the kernel fails; it must raise.
+        nan : bool
+            Fill the result with NaN at a recoverable failure and record it in ``failure`` instead.
+        error : type
+            Exception raised for arguments that do not fit.
+        """
+        return NumpyTimed(self, name, context, shape, fail, nan, error)
+
+    def state(
+        self, name: str, context: Context, shape: Any, fail: Any, nan: bool = False, error: Any = ValueError
+    ) -> NumpyState:
+        """Bind a kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``; arguments as for :meth:`timed`."""
+        return NumpyState(self, name, context, shape, fail, nan, error)
+
+    def motion(
+        self, name: str, context: Context, shape: Any, fail: Any, nan: bool = False, error: Any = ValueError
+    ) -> NumpyMotion:
+        """Bind a kernel called as ``f(q, v, a, p=None, u=None, out=None, t=0.0)``; arguments as for :meth:`timed`."""
+        return NumpyMotion(self, name, context, shape, fail, nan, error)
+
+
+class NumpyKernel:
+    """A kernel bound to a context.
+
+    Attributes
+    ----------
+    name : str
+    shape : tuple of int
+        Shape of the result for one state.
+    nan : bool
+        Whether a recoverable failure fills the result with NaN instead of raising.
+    failure : tuple or None
+        With ``nan``: (status, t, x) of the last failure.
+    """
+
+    def __init__(
+        self, core: NumpyCore, name: str, context: Context, shape: Any, fail: Any, nan: bool, error: Any
+    ) -> None:
+        if name not in core.names:
+            raise error(f"model {core.layout.name!r} has no kernel {name!r}; it has {', '.join(core.names)}")
+        self.core, self.name, self.context, self.shape = core, name, context, tuple(shape)
+        self.fail, self.nan, self.error = fail, nan, error
+        self.failure: tuple[int, float, Array] | None = None
+        self.n_in = core.layout.inputs(name)
+        block = core.blocks.get(name)
+        self.vectorised = block is not None
+        self.call: Block = block if block is not None else core.drivers.make(name)
+
+    def evaluate(self, t: Any, x: Array, p: Any, u: Any, out: Array | None) -> Array:
+        """One state or a batch."""
+        layout = self.core.layout
+        if x.shape[:1] != (self.n_in,) or x.ndim > 2:
+            raise self.error(f"x of {self.name} must have shape ({self.n_in},) or ({self.n_in}, k), not {x.shape}")
+        c = self.context.c
+        if p is not None:
+            c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
+        force = self.context.u if u is None else _real(u, "u", self.error)
+        if force.shape not in ((layout.n_u,), (layout.n_u, *x.shape[1:])):
+            raise self.error(
+                f"u of {self.name} must have shape ({layout.n_u},) or ({layout.n_u}, k), not {force.shape}"
+            )
+        t = np.asarray(t, dtype=float)
+        if t.shape not in ((), x.shape[1:]):
+            raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
+        expected = (*self.shape, *x.shape[1:])
+        if out is not None and (out.shape != expected or out.dtype != np.float64):
+            raise self.error(f"out of {self.name} must be a float64 array of shape {expected}, not {out.shape}")
+        with np.errstate(all="ignore"):
+            if x.ndim == 1 or self.vectorised:
+                result = self._batch(t, x, force, c, expected)
+            else:
+                result = np.empty(expected)
+                for j in range(x.shape[1]):
+                    column = force if force.ndim == 1 else force[:, j]
+                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c)
+        if out is None:
+            return result
+        out[...] = result
+        return out
+
+    def _batch(self, t: Array, x: Array, u: Array, c: Array, expected: tuple[int, ...]) -> Array:
+        if x.ndim == 1:
+            return self._single(t, x, u, c)
+        try:
+            result = np.asarray(self.call(t, x, u, c), dtype=float).reshape(expected)
+        except EvaluationError:
+            result = np.full(expected, np.nan)
+        if not np.isfinite(result).all():
+            for j in range(x.shape[1]):  # one by one, to find out which and why
+                if not np.isfinite(result[..., j]).all():
+                    column = u if u.ndim == 1 else u[:, j]
+                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c)
+        return result
+
+    def _single(self, t: Any, x: Array, u: Array, c: Array) -> Array:
+        time = float(t)
+        try:
+            result = np.asarray(self.call(time, x, u, c), dtype=float).reshape(self.shape)
+            status = 0 if np.isfinite(result).all() else self.core.drivers.singular(self.name, time, x, u, c)
+        except EvaluationError as error:
+            status = CODES.get(type(error), 1)
+        if status:
+            result = np.full(self.shape, np.nan)
+            if not self.nan:
+                self.fail(self.name, status, time, np.array(x))
+            self.failure = (status, time, np.array(x))
+        return result
+
+
+class NumpyTimed(NumpyKernel):
+    """A kernel of time and state."""
+
+    def __call__(self, t: Any, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
+        """Evaluate at time t, or one time for each state (k,), and state x (n,) or k states as columns (n, k)."""
+        return self.evaluate(t, _real(x, "x", self.error), p, u, out)
+
+
+class NumpyState(NumpyKernel):
+    """A kernel of the state alone."""
+
+    def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
+        """Evaluate at state x; arguments as for :class:`NumpyTimed`."""
+        return self.evaluate(t, _real(x, "x", self.error), p, u, out)
+
+
+class NumpyMotion(NumpyKernel):
+    """A kernel of coordinates, velocities and accelerations."""
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        p: Any = None,
+        u: Any = None,
+        out: Array | None = None,
+        t: Any = 0.0,
+    ) -> Array:
+        """Evaluate at q, v, a of shapes (n_q,), (n_v,), (n_v,) or with a last axis k."""
+        layout = self.core.layout
+        parts = [_real(part, label, self.error) for part, label in ((q, "q"), (v, "v"), (a, "a"))]
+        columns = max((part.shape[1:] for part in parts), key=len)
+        for part, label, size in zip(parts, "qva", (layout.n_q, layout.n_v, layout.n_v), strict=True):
+            if part.shape not in ((size,), (size, *columns)):
+                raise self.error(f"{label} of {self.name} must have shape ({size},) or ({size}, k), not {part.shape}")
+        x = [part if part.shape[1:] == columns else np.repeat(part[:, None], columns[0], axis=1) for part in parts]
+        return self.evaluate(t, np.concatenate(x), p, u, out)
+
+
+def _real(value: object, label: str, error: Any) -> Array:
+    array = np.asarray(value)
+    if array.dtype.kind not in "biufO":
+        raise error(f"{label} must hold real numbers, not {array.dtype}")
+    return array.astype(float, copy=False)
+
+
+def _vector(value: object, n: int, label: str, error: Any) -> Array:
+    if isinstance(value, list):
+        value = [np.nan if item is None else item for item in value]
+    array = np.array(_real(value, label, error))
+    if array.shape != (n,):
+        raise error(f"{label} must have shape ({n},), not {array.shape}")
+    return array

@@ -1,0 +1,196 @@
+"""Stage runtime: inner NumPy blocks of one model -> its kernels that need linear algebra or iterations.
+
+Each driver has the signature of a block for a single state: ``f(t, x, u, c) -> out``.  The algorithms are those of
+:mod:`..numeric`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..errors import SingularMassMatrixError
+from ..numeric import embedded, projection
+from ..numeric import kinematics as kinematics_of
+from ..numeric.scales import Array, Scales
+from .layout import Layout
+
+#: driver -> blocks it is made from; a tree needs neither position nor rate
+NEEDS = {
+    "rhs": ("terms",),
+    "jacobian": ("terms",),
+    "mass_matrix": ("terms",),
+    "embedded_mass_matrix": (),
+    "bias": ("terms",),
+    "constraints": ("position",),
+    "constraint_jacobian": ("position",),
+    "velocity_constraints": ("position", "rate"),
+    "project": (),
+    "outputs": ("accelerated_outputs",),
+    "kinematics": (),
+}
+
+
+class Drivers:
+    """The kernels of one model that are not straight-line.
+
+    Parameters
+    ----------
+    layout : Layout
+    blocks : mapping of str to callable
+        ``f(t, x, u, c) -> (n_out, ...)``.
+    """
+
+    def __init__(self, layout: Layout, blocks: Mapping[str, Callable[..., Any]]) -> None:
+        self.layout = layout
+        self.blocks = blocks
+        loops = layout.n_c > 0
+        names = [name for name, needs in NEEDS.items() if all(block in blocks for block in needs)]
+        if "residual_jacobian" not in blocks and "residual_tangent" not in blocks:
+            names = [name for name in names if name != "jacobian"]
+        if not loops:
+            names = [n for n in names if n not in ("constraints", "constraint_jacobian", "velocity_constraints")]
+        elif "position" not in blocks or "rate" not in blocks:
+            names = [n for n in names if n not in ("rhs", "jacobian", "project", "outputs", "kinematics")]
+        if "terms" not in blocks and "rhs" not in blocks:
+            names = [n for n in names if n != "outputs"]
+        if "terms" not in blocks and (loops or "mass_matrix" not in blocks):
+            names = [n for n in names if n != "embedded_mass_matrix"]
+        if loops and "terms" not in blocks:
+            names = [n for n in names if n != "kinematics"]
+        self.names = tuple(names)
+        self._scales: tuple[Array, Scales] | None = None
+
+    def make(self, name: str) -> Callable[..., Array]:
+        """The driver of a kernel."""
+        driver: Callable[..., Array] = getattr(self, f"_{name}")
+        return driver
+
+    def singular(self, name: str, t: float, x: Array, u: Array, c: Array) -> int:
+        """The status of a result that is not finite: 2 if a singular mass matrix is why, else 1."""
+        if name in ("rhs", "jacobian", "outputs") and "mass_matrix" in self.blocks and not self.layout.n_c:
+            n = self.layout.n_v
+            M = np.asarray(self.blocks["mass_matrix"](t, x[: self.layout.n_q], u, c), dtype=float).reshape(n, n)
+            if np.isfinite(M).all() and np.linalg.eigvalsh(M)[0] <= embedded.SINGULAR * M.diagonal().max():
+                return 2
+        return 1
+
+    # what numeric/ wants as functions of q and v, at one time and with one set of constants
+
+    def scales(self, c: Array) -> Scales:
+        """The scales for a set of constants; the last ones are kept."""
+        if "scales" not in self.blocks:
+            return self.layout.scales
+        if self._scales is None or self._scales[0] is not c:
+            values = np.asarray(self.blocks["scales"](0.0, np.empty(0), np.empty(0), c), dtype=float)
+            self._scales = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :]))
+        return self._scales[1]
+
+    def position(self, t: float, u: Array, c: Array, q: Array) -> tuple[Array, Array]:
+        """C (m,), C_q (m, n)."""
+        m, n = self.layout.n_c, self.layout.n_v
+        if not m:
+            return np.empty(0), np.empty((0, n))
+        flat = np.asarray(self.blocks["position"](t, q, u, c), dtype=float)
+        return flat[:m], flat[m:].reshape(m, n)
+
+    def rate(self, t: float, u: Array, c: Array, q: Array) -> Array:
+        """C_t (m,)."""
+        return np.asarray(self.blocks["rate"](t, q, u, c), dtype=float) if self.layout.n_c else np.empty(0)
+
+    def terms(self, t: float, u: Array, c: Array, q: Array, v: Array) -> embedded.Terms:
+        """M, h, C_q, gamma."""
+        flat = np.asarray(self.blocks["terms"](t, np.concatenate([q, v]), u, c), dtype=float)
+        return embedded.unpack_terms(flat, self.layout.n_v, self.layout.n_c)
+
+    def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:  # noqa: E741
+        """The derivatives of the residuals."""
+        n, m = self.layout.n_v, self.layout.n_c
+        x = np.concatenate([q, v, a, l])
+        if "residual_jacobian" in self.blocks:
+            flat = np.asarray(self.blocks["residual_jacobian"](t, x, u, c), dtype=float)
+            parts = np.split(flat, np.cumsum([n * n, n * n, m * n, m * n]))
+            return embedded.Residuals(*(part.reshape(-1, n) for part in parts))
+        directions = np.eye(2 * n)
+        x = np.vstack([np.repeat(x[:, None], 2 * n, axis=1), directions])
+        flat = np.asarray(self.blocks["residual_tangent"](t, x, u, c), dtype=float)
+        r1, r2, r3 = np.split(flat, [n, n + m])
+        return embedded.Residuals(r1[:, :n], r1[:, n:], r2[:, :n], r2[:, n:], r3[:, :n])
+
+    def _bound(self, t: float, u: Array, c: Array) -> tuple[Any, Any, Any]:
+        return (partial(f, t, u, c) for f in (self.terms, self.position, self.rate))  # type: ignore[return-value]
+
+    # drivers
+
+    def _rhs(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        n, layout = self.layout.n_q, self.layout
+        terms, position, rate = self._bound(t, u, c)
+        return embedded.rhs(terms, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent)
+
+    def _jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        n, layout = self.layout.n_q, self.layout
+        terms, position, rate = self._bound(t, u, c)
+        residuals = partial(self.residuals, t, u, c)
+        return embedded.jacobian(
+            terms, residuals, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent
+        )
+
+    def _mass_matrix(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self.terms(t, u, c, x, np.zeros(self.layout.n_v)).M
+
+    def _bias(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self.terms(t, u, c, x[: self.layout.n_q], x[self.layout.n_q :]).h
+
+    def _embedded_mass_matrix(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        layout = self.layout
+        if "mass_matrix" in self.blocks:
+            M = np.asarray(self.blocks["mass_matrix"](t, x, u, c), dtype=float).reshape(layout.n_v, layout.n_v)
+        else:
+            M = self._mass_matrix(t, x, u, c)
+        C_q = self.position(t, u, c, x)[1]
+        return embedded.embedded_mass(M, C_q, self.scales(c), layout.rank, layout.independent)
+
+    def _constraints(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self.position(t, u, c, x)[0]
+
+    def _constraint_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self.position(t, u, c, x)[1]
+
+    def _velocity_constraints(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        q, v = x[: self.layout.n_q], x[self.layout.n_q :]
+        return np.asarray(self.position(t, u, c, q)[1] @ v + self.rate(t, u, c, q))
+
+    def _project(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        n = self.layout.n_q
+        _, position, rate = self._bound(t, u, c)
+        return np.concatenate(projection.project(position, rate, x[:n], x[n:], self.scales(c)))
+
+    def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        x = self._project(t, x, u, c)
+        x_dot = self.blocks["rhs"](t, x, u, c) if "rhs" in self.blocks else self._rhs(t, x, u, c)
+        a = np.asarray(x_dot, dtype=float)[self.layout.n_q :]
+        if not np.isfinite(a).all() and self.singular("outputs", t, x, u, c) == 2:
+            raise SingularMassMatrixError("the mass matrix is singular")
+        return np.asarray(self.blocks["accelerated_outputs"](t, np.concatenate([x, a]), u, c), dtype=float)
+
+    def _kinematics(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        layout, k = self.layout, self.layout.n_dof
+        q_i, v_i, a_i, guess = x[:k], x[k : 2 * k], x[2 * k : 3 * k], x[3 * k :]
+        terms, position, rate = self._bound(t, u, c)
+        return np.concatenate(
+            kinematics_of(
+                position,
+                rate,
+                lambda q, v: terms(q, v).gamma,
+                q_i,
+                v_i,
+                a_i,
+                guess,
+                self.scales(c),
+                layout.rank,
+                layout.independent,
+            )
+        )

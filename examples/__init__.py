@@ -1,0 +1,1 @@
+"""Example models, shipped as the package ``eomgen.examples``; ``eomgen examples`` lists them."""

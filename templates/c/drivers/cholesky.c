@@ -1,0 +1,42 @@
+/* G = L L^T in place, lower triangle of the M x M matrix; status 3 where G is not positive definite. */
+static int cholesky(double *restrict g)
+{
+    for (int j = 0; j < M; j++) {
+        double d = g[j * M + j];
+        for (int k = 0; k < j; k++) {
+            d -= g[j * M + k] * g[j * M + k];
+        }
+        if (!(d > 0.0)) {
+            return EOMGEN_PROJECTION_FAILED;
+        }
+        d = sqrt(d);
+        g[j * M + j] = d;
+        for (int i = j + 1; i < M; i++) {
+            double s = g[i * M + j];
+            for (int k = 0; k < j; k++) {
+                s -= g[i * M + k] * g[j * M + k];
+            }
+            g[i * M + j] = s / d;
+        }
+    }
+    return 0;
+}
+
+/* b = G^-1 b */
+static void cholesky_solve(const double *restrict g, double *restrict b)
+{
+    for (int i = 0; i < M; i++) {
+        double s = b[i];
+        for (int k = 0; k < i; k++) {
+            s -= g[i * M + k] * b[k];
+        }
+        b[i] = s / g[i * M + i];
+    }
+    for (int i = M - 1; i >= 0; i--) {
+        double s = b[i];
+        for (int k = i + 1; k < M; k++) {
+            s -= g[k * M + i] * b[k];
+        }
+        b[i] = s / g[i * M + i];
+    }
+}

@@ -1,0 +1,36 @@
+/* Brings x = [q; v] onto the constraints, position level first; result in w + AT_X. */
+static int close_loops(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                       double *restrict w)
+{
+    double *const q = w + AT_X, *const v = w + AT_X + N, *const r = w + AT_RATE, *const s = w + AT_SCALES;
+    (void)block_scales(t, x, u, c, s, w);
+    for (int k = 0; k < 2 * N; k++) {
+        q[k] = x[k];
+    }
+    const int status = close_position(t, q, u, c, w);
+    if (status != 0) {
+        return status;
+    }
+    (void)block_rate(t, q, u, c, r, w);
+    for (int i = 0; i < M; i++) {
+        r[i] /= s[N + i];
+    }
+    for (int k = 0; k < N; k++) {
+        v[k] /= s[k];
+    }
+    correct_linear(r, v, w);
+    for (int k = 0; k < N; k++) {
+        v[k] *= s[k];
+    }
+    return 0;
+}
+
+static int drive_project(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                         double *restrict out, double *restrict w)
+{
+    const int status = close_loops(t, x, u, c, w);
+    for (int k = 0; k < 2 * N; k++) {
+        out[k] = w[AT_X + k];
+    }
+    return status;
+}

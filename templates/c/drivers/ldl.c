@@ -1,0 +1,42 @@
+/* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is not safely positive. */
+static int ldl_factor(double *restrict a)
+{
+    double largest = 0.0;
+    for (int i = 0; i < F; i++) {
+        largest = a[i * F + i] > largest ? a[i * F + i] : largest;
+    }
+    for (int j = 0; j < F; j++) {
+        double d = a[j * F + j];
+        for (int k = 0; k < j; k++) {
+            d -= a[j * F + k] * a[j * F + k] * a[k * F + k];
+        }
+        if (!(d > 1e-13 * largest)) {
+            return EOMGEN_SINGULAR_MASS_MATRIX;
+        }
+        a[j * F + j] = d;
+        for (int i = j + 1; i < F; i++) {
+            double s = a[i * F + j];
+            for (int k = 0; k < j; k++) {
+                s -= a[i * F + k] * a[j * F + k] * a[k * F + k];
+            }
+            a[i * F + j] = s / d;
+        }
+    }
+    return 0;
+}
+
+/* b = M_e^-1 b */
+static void ldl_solve(const double *restrict a, double *restrict b)
+{
+    for (int i = 0; i < F; i++) {
+        for (int k = 0; k < i; k++) {
+            b[i] -= a[i * F + k] * b[k];
+        }
+    }
+    for (int i = F - 1; i >= 0; i--) {
+        b[i] /= a[i * F + i];
+        for (int k = i + 1; k < F; k++) {
+            b[i] -= a[k * F + i] * b[k];
+        }
+    }
+}

@@ -1,0 +1,10 @@
+static int drive_outputs(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                         double *restrict out, double *restrict w)
+{
+    partition parts;
+    int status = close_loops(t, x, u, c, w);
+    if (status == 0) {
+        status = accelerate(t, u, c, N + 1, &parts, w + AT_X + 2 * N, w);
+    }
+    return status != 0 ? status : block_accelerated_outputs(t, w + AT_X, u, c, out, w);
+}

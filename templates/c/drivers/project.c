@@ -1,0 +1,80 @@
+/* G = J J^T + 1e-12 max(diag) I, factored. */
+static int factor_gram(const double *restrict J, double *restrict G)
+{
+    double largest = 0.0;
+    for (int i = 0; i < M; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < N; k++) {
+                sum += J[i * N + k] * J[j * N + k];
+            }
+            G[i * M + j] = sum;
+        }
+        largest = G[i * M + i] > largest ? G[i * M + i] : largest;
+    }
+    for (int i = 0; i < M; i++) {
+        G[i * M + i] += 1e-12 * largest;
+    }
+    return cholesky(G);
+}
+
+/* x -= J^T G^-1 (J x + r), twice so that the term 1e-12 leaves no trace: the nearest x with J x + r = 0. */
+static void correct_linear(const double *restrict r, double *restrict x, double *restrict w)
+{
+    const double *const J = w + AT_J;
+    double *const e = w + AT_E;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < M; i++) {
+            e[i] = r[i];
+            for (int k = 0; k < N; k++) {
+                e[i] += J[i * N + k] * x[k];
+            }
+        }
+        cholesky_solve(w + AT_G, e);
+        for (int i = 0; i < M; i++) {
+            for (int k = 0; k < N; k++) {
+                x[k] -= J[i * N + k] * e[i];
+            }
+        }
+    }
+}
+
+/* The nearest q with C(q) = 0, in place; leaves C and C_q, J and the factor of G there in w. */
+static int close_position(double t, double *restrict q, const double *restrict u, const double *restrict c,
+                          double *restrict w)
+{
+    const double *const s = w + AT_SCALES, *const C = w + AT_POSITION, *const J = w + AT_J;
+    double *const e = w + AT_E, *const dz = w + AT_STEP;
+    double before = 0.0;
+    for (int step = 0; step <= 25; step++) {
+        (void)block_position(t, q, u, c, w + AT_POSITION, w);
+        const double size = largest_residual(C, s);
+        if (!isfinite(size)) {
+            return EOMGEN_NON_FINITE;
+        }
+        scale_jacobian(C + M, s, w + AT_J);
+        const int status = factor_gram(J, w + AT_G);
+        if (status != 0 || has_settled(step, size, before)) {
+            return status;
+        }
+        if (step == 25) {
+            return size <= 1e-10 ? 0 : EOMGEN_PROJECTION_FAILED;
+        }
+        for (int i = 0; i < M; i++) {
+            e[i] = C[i] / s[N + i];
+        }
+        cholesky_solve(w + AT_G, e);
+        for (int k = 0; k < N; k++) {
+            dz[k] = 0.0;
+            for (int i = 0; i < M; i++) {
+                dz[k] += J[i * N + k] * e[i];
+            }
+        }
+        const double part = damping(dz, N);
+        for (int k = 0; k < N; k++) {
+            q[k] -= s[k] * part * dz[k];
+        }
+        before = size;
+    }
+    return EOMGEN_PROJECTION_FAILED;
+}

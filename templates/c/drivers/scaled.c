@@ -1,0 +1,41 @@
+/* Scaled quantities: q / s_q, C / s_c, J = diag(1/s_c) C_q diag(s_q). */
+EOMGEN_SHARED void scale_jacobian(const double *restrict C_q, const double *restrict s, double *restrict J)
+{
+    for (int i = 0; i < M; i++) {
+        for (int k = 0; k < N; k++) {
+            J[i * N + k] = C_q[i * N + k] * s[k] / s[N + i];
+        }
+    }
+}
+
+/* The largest |C / s_c|; NaN if an entry is NaN. */
+EOMGEN_SHARED double largest_residual(const double *restrict C, const double *restrict s)
+{
+    double largest = 0.0;
+    for (int i = 0; i < M; i++) {
+        const double size = fabs(C[i] / s[N + i]);
+        if (!(size <= largest)) {
+            largest = size;
+        }
+        if (!isfinite(size)) {
+            return NAN;
+        }
+    }
+    return largest;
+}
+
+/* Newton has arrived: exactly, or within 1e-12 and no longer getting closer. */
+EOMGEN_SHARED int has_settled(int step, double size, double before)
+{
+    return size <= 1e-14 || (step > 0 && size <= 1e-12 && size > 0.5 * before);
+}
+
+/* Limits the largest entry of a scaled Newton step to 0.5. */
+EOMGEN_SHARED double damping(const double *restrict step, int length)
+{
+    double longest = 0.0;
+    for (int k = 0; k < length; k++) {
+        longest = fabs(step[k]) > longest ? fabs(step[k]) : longest;
+    }
+    return longest > 0.5 ? 0.5 / longest : 1.0;
+}

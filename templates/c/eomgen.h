@@ -1,0 +1,61 @@
+/* The model-independent part of every generated module: the table that describes its functions. */
+#ifndef EOMGEN_H
+#define EOMGEN_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define EOMGEN_ABI 1
+
+/* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed). */
+enum {
+    EOMGEN_SUCCESS = 0,
+    EOMGEN_NON_FINITE = 1,           /* a result is NaN or infinite */
+    EOMGEN_SINGULAR_MASS_MATRIX = 2, /* a motion has no inertia behind it */
+    EOMGEN_PROJECTION_FAILED = 3,    /* the state could not be brought onto the constraints */
+    EOMGEN_PARTITION_BAD = 4         /* the independent coordinates cannot move the mechanism here */
+};
+
+/* t: time; x: the inputs one after the other; u: inputs over time; c: constants made by precompute;
+   out: the result (NULL: not wanted); w: n_work doubles of work. No argument may overlap another. */
+typedef int (*eomgen_function)(double t, const double *x, const double *u, const double *c, double *out, double *w);
+
+typedef struct {
+    const char *name;
+    eomgen_function call;
+    int n_in;  /* length of x */
+    int n_out; /* length of out */
+} eomgen_kernel;
+
+typedef struct {
+    int abi;
+    const char *name;
+    int n_p;     /* parameters */
+    int n_u;     /* inputs */
+    int n_const; /* length of c */
+    int n_work;  /* length of w */
+    int n_kernels;
+    const eomgen_kernel *kernels;
+    int (*precompute)(const double *p, double *c);
+    const char *metadata; /* JSON: names, units, values */
+} eomgen_model;
+
+/* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */
+const eomgen_model *eomgen_model_table(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+/* APART keeps pieces of very long code apart, so that compile time stays proportional to its length;
+   SHARED marks a helper that not every model uses. */
+#if defined(__GNUC__)
+#define EOMGEN_APART __attribute__((noinline))
+#define EOMGEN_SHARED static __attribute__((unused))
+#else
+#define EOMGEN_APART
+#define EOMGEN_SHARED static
+#endif
+
+#endif

@@ -1,0 +1,421 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, embedsignature=True
+# distutils: define_macros=NPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION
+"""Cython layer: the C table of one model (eomgen_model_table) -> Python callables on NumPy arrays.
+
+The text is the same for every model. It is compiled once and linked with a model's C source; everything it knows about
+the model it reads from the table and from the model's JSON metadata.
+
+Threads: contexts never change, and each call has its work array to itself, on the stack when small and on the heap
+otherwise. So any number of threads may call one object at once. Only ``failure`` is shared: it holds the last failure
+of any thread. Batches and long kernels run without the GIL.
+"""
+cimport numpy as cnp
+from cpython.pycapsule cimport PyCapsule_New
+from libc.math cimport NAN
+from libc.stdint cimport uintptr_t
+from libc.string cimport memcpy
+
+import json
+
+import numpy as np
+
+cnp.import_array()
+
+cdef extern from "eomgen.h" nogil:
+    ctypedef int (*eomgen_function)(double, const double *, const double *, const double *,
+                                    double *, double *) noexcept nogil
+    ctypedef struct eomgen_kernel:
+        const char *name
+        eomgen_function call
+        int n_in, n_out
+    ctypedef struct eomgen_model:
+        int abi
+        const char *name
+        int n_p, n_u, n_const, n_work, n_kernels
+        const eomgen_kernel *kernels
+        int (*precompute)(const double *, double *) noexcept nogil
+        const char *metadata
+    const eomgen_model *eomgen_model_table() noexcept
+
+cdef enum:
+    STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
+    MAX_DIMENSIONS = 8
+
+cdef const eomgen_model *MODEL = eomgen_model_table()
+if MODEL.abi != 1:
+    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 1: generate both again")
+
+metadata = MODEL.metadata.decode()
+names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])
+sizes = {"n_p": MODEL.n_p, "n_u": MODEL.n_u, "n_const": MODEL.n_const, "n_work": MODEL.n_work}
+_FACTS = json.loads(metadata)
+#: Operations from which on a call lets other threads run: about 5 microseconds, a hundred times what that costs.
+_LONG = 20_000
+
+
+cdef int find(str name, object error) except -1:
+    """Index of a kernel in the table."""
+    if name not in names:
+        raise error(f"model {MODEL.name.decode()!r} has no kernel {name!r}; it has {', '.join(names)}")
+    return names.index(name)
+
+
+cdef cnp.ndarray doubles(object value, str label, object error):
+    """The value as an aligned float64 array: itself if it is one, whatever its strides; else a converted copy."""
+    cdef cnp.ndarray array = cnp.PyArray_FROM_O(value)
+    if cnp.PyArray_TYPE(array) == cnp.NPY_DOUBLE and cnp.PyArray_ISBEHAVED_RO(array):
+        return array
+    if array.dtype.kind not in "biufO":
+        raise error(f"{label} must hold real numbers, not {array.dtype}")
+    return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)
+
+
+cdef cnp.ndarray vector(object value, int n, str label, object error):
+    """The value as a contiguous float64 vector of n numbers."""
+    cdef cnp.ndarray array = cnp.PyArray_GETCONTIGUOUS(doubles(value, label, error))
+    if array.ndim != 1 or cnp.PyArray_DIM(array, 0) != n:
+        raise error(f"{label} must have shape ({n},), not {(<object>array).shape}")
+    return array
+
+
+cdef cnp.ndarray copy(const double *data, cnp.npy_intp n):
+    cdef cnp.ndarray array = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)
+    memcpy(cnp.PyArray_DATA(array), data, n * sizeof(double))
+    return array
+
+
+cdef cnp.ndarray compute_constants(cnp.ndarray p, object error):
+    """The constants (n_const,) that follow from the parameters (n_p,)."""
+    cdef cnp.npy_intp n = MODEL.n_const
+    cdef cnp.ndarray constants = cnp.PyArray_ZEROS(1, &n, cnp.NPY_DOUBLE, 0)
+    cdef int status = MODEL.precompute(<double *>cnp.PyArray_DATA(p), <double *>cnp.PyArray_DATA(constants))
+    if status != 0:
+        raise error(f"the constants that follow from the parameters cannot be computed (status {status}); p = {p}")
+    return constants
+
+
+cdef class Context:
+    """Parameters and inputs bound to a model, with the constants that follow from them; never changes.
+
+    Parameters
+    ----------
+    p : (n_p,) array_like, optional
+        Parameters in the order of ``p_names``; the declared values by default.
+    u : (n_u,) array_like, optional
+        Inputs in the order of ``u_names``; the declared values by default.
+    error : type
+        Exception raised for values that do not fit.
+
+    Attributes
+    ----------
+    p, u, c : ndarray
+        Parameters, inputs and the constants handed to kernels; read-only.
+    """
+
+    cdef readonly cnp.ndarray p, u, c
+
+    def __cinit__(self, p=None, u=None, error=ValueError):
+        p = _FACTS.get("p_values", ()) if p is None else p
+        u = _FACTS.get("u_values", ()) if u is None else u
+        self.p = np.array(vector(p, MODEL.n_p, "p", error))
+        self.u = np.array(vector(u, MODEL.n_u, "u", error))
+        self.c = compute_constants(self.p, error)
+        for array in (self.p, self.u, self.c):
+            array.flags.writeable = False
+
+
+cdef struct Piece:
+    # One input of a kernel: n numbers `row` bytes apart, states `column` bytes apart.
+    char *data
+    cnp.npy_intp n, row, column
+
+
+cdef struct Batch:
+    # One call of a kernel for `columns` states; w, x, y and u belong to this call.
+    eomgen_function call
+    Piece[3] pieces
+    Piece time, inputs
+    int n_pieces, n_out
+    cnp.npy_intp columns
+    bint nan
+    const double *c
+    double *w
+    double *x
+    double *y
+    double *u
+
+
+cdef inline void gather(const Piece *piece, cnp.npy_intp column, double *target) noexcept nogil:
+    cdef char *data = piece.data + column * piece.column
+    cdef cnp.npy_intp i
+    for i in range(piece.n):
+        target[i] = (<double *>data)[0]
+        data += piece.row
+
+
+cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
+    """Gather the state and the inputs of one column; returns its time."""
+    cdef double *x = batch.x
+    cdef double t
+    cdef int i
+    for i in range(batch.n_pieces):
+        gather(&batch.pieces[i], column, x)
+        x += batch.pieces[i].n
+    gather(&batch.inputs, column, batch.u)
+    gather(&batch.time, column, &t)
+    return t
+
+
+cdef cnp.npy_intp sweep(const Batch *batch, double *result, int *status) noexcept nogil:
+    """Evaluate all columns into the (n_out, columns) result; returns the first column that failed, or -1."""
+    cdef cnp.npy_intp failed = -1, j
+    cdef int i, code
+    cdef double t
+    for j in range(batch.columns):
+        t = load(batch, j)
+        code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
+        for i in range(batch.n_out):
+            result[i * batch.columns + j] = batch.y[i] if code == 0 else NAN
+        if code != 0 and (failed < 0 or code < 0):
+            failed, status[0] = j, code
+        if code < 0 or (code != 0 and not batch.nan):
+            break
+    return failed
+
+
+cdef class Kernel:
+    """A kernel of the model, bound to a context; call it with arrays.
+
+    Parameters
+    ----------
+    name : str
+        Name of the kernel, one of ``names``.
+    context : Context
+        Parameters and inputs used when a call gives none.
+    shape : tuple of int
+        Shape of the result for one state.
+    fail : callable
+        Called as ``fail(name, status, t, x)`` when the kernel fails; it must raise.
+    nan : bool
+        At a recoverable failure (status > 0) fill the result with NaN and remember instead.
+    error : type
+        Exception raised for arguments that do not fit.
+
+    Attributes
+    ----------
+    failure : tuple or None
+        With ``nan``: (status, t, x) of the last failure. Assign None to forget it.
+    """
+
+    cdef eomgen_function call
+    cdef const double *c
+    cdef const double *u
+    cdef int n_in, n_out, ndim
+    cdef bint long
+    cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
+    cdef object fail, error
+    cdef readonly str name
+    cdef readonly tuple shape
+    cdef readonly bint nan
+    cdef readonly Context context
+    cdef public object failure
+
+    def __cinit__(self, str name not None, Context context not None, shape, fail, bint nan=False, error=ValueError):
+        cdef int index = find(name, error)
+        self.name, self.context, self.fail, self.nan, self.error = name, context, fail, nan, error
+        self.call = MODEL.kernels[index].call
+        self.n_in, self.n_out = MODEL.kernels[index].n_in, MODEL.kernels[index].n_out
+        self.c = <const double *>cnp.PyArray_DATA(context.c)
+        self.u = <const double *>cnp.PyArray_DATA(context.u)
+        self.shape = tuple(shape)
+        self.ndim = len(self.shape)
+        if self.ndim > MAX_DIMENSIONS or np.prod(self.shape, dtype=int) != self.n_out:
+            raise error(f"shape {self.shape} does not hold the {self.n_out} numbers of kernel {name!r}")
+        for i in range(self.ndim):
+            self.dims[i] = self.shape[i]
+        counts = _FACTS.get("operations", {}).get(name, {}).values()
+        self.long = sum([count for count in counts if isinstance(count, (int, float))]) > _LONG
+
+    def __repr__(self):
+        return f"<{type(self).__name__} kernel {self.name} of {MODEL.name.decode()}: ({self.n_in},) -> {self.shape}>"
+
+    cdef inline bint is_plain(self, object x) noexcept:
+        """Whether x can be used as it is: float64, one state, contiguous."""
+        return (cnp.PyArray_Check(x) and cnp.PyArray_TYPE(<cnp.ndarray>x) == cnp.NPY_DOUBLE
+                and cnp.PyArray_NDIM(<cnp.ndarray>x) == 1 and cnp.PyArray_DIM(<cnp.ndarray>x, 0) == self.n_in
+                and cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x))
+
+    cdef inline bint is_target(self, cnp.ndarray out, const double *x) noexcept:
+        """Whether the kernel can write into out: float64, right shape, contiguous, apart from x."""
+        cdef const double *data = <const double *>cnp.PyArray_DATA(out)
+        cdef int i
+        if (cnp.PyArray_TYPE(out) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(out) != self.ndim
+                or not cnp.PyArray_ISCARRAY(out) or (data < x + self.n_in and x < data + self.n_out)):
+            return False
+        for i in range(self.ndim):
+            if cnp.PyArray_DIM(out, i) != self.dims[i]:
+                return False
+        return True
+
+    cdef object evaluate(self, double t, const double *x, object out):
+        """The fast way: one plain state with the context's values; None if out needs the general way."""
+        cdef double[STACK] stack
+        cdef double *w = stack
+        cdef double *data
+        cdef cnp.npy_intp n_work = MODEL.n_work
+        cdef int status, i
+        if out is None:
+            out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
+        elif not (cnp.PyArray_Check(out) and self.is_target(<cnp.ndarray>out, x)):
+            return None
+        data = <double *>cnp.PyArray_DATA(<cnp.ndarray>out)
+        if n_work > STACK:
+            heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
+            w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
+        if self.long:
+            with nogil:
+                status = self.call(t, x, self.u, self.c, data, w)
+        else:
+            status = self.call(t, x, self.u, self.c, data, w)
+        if status != 0:
+            for i in range(self.n_out):
+                data[i] = NAN
+            self.report(status, t, copy(x, self.n_in))
+        return out
+
+    cdef int report(self, int status, double t, cnp.ndarray x) except -1:
+        """Remember a recoverable failure where NaN is wanted, else raise."""
+        if self.nan and status > 0:
+            self.failure = (status, t, x)
+            return 0
+        self.fail(self.name, status, t, x)
+        raise RuntimeError(f"kernel {self.name!r} failed with status {status} at t = {t}")
+
+    cdef object general(self, object t, list values, object p, object u, object out):
+        """Any arrays: values are (label, length, array_like) in the order the kernel wants them, at most three."""
+        cdef Batch batch
+        cdef cnp.npy_intp columns = -2, failed = -1
+        cdef int i, status = 0
+        cdef double now = 0
+        cdef list held = []
+        batch.call, batch.c, batch.nan = self.call, self.c, self.nan
+        batch.n_pieces, batch.n_out = len(values), self.n_out
+        for i in range(batch.n_pieces):
+            label, length, value = values[i]
+            held.append(self.read(value, length, label, &batch.pieces[i], &columns))
+        batch.time = Piece(<char *>&now, 1, 0, 0)
+        if isinstance(t, (np.ndarray, list, tuple)) and np.ndim(t) > 0:
+            held.append(self.read(np.expand_dims(t, 0), 1, "t", &batch.time, &columns))
+        else:
+            now = t
+        batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)
+        if u is not None:
+            held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))
+        if p is not None:
+            held.append(compute_constants(vector(p, MODEL.n_p, "p", self.error), self.error))
+            batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>held[-1])
+        cdef cnp.ndarray result = self.target(out, held, columns)
+        batch.columns = 1 if columns < 0 else columns
+        cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
+        cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
+        batch.w = <double *>cnp.PyArray_DATA(heap)
+        batch.x = batch.w + MODEL.n_work
+        batch.y = batch.x + self.n_in
+        batch.u = batch.y + self.n_out
+        if self.long or columns > 1:
+            with nogil:
+                failed = sweep(&batch, <double *>cnp.PyArray_DATA(result), &status)
+        else:
+            failed = sweep(&batch, <double *>cnp.PyArray_DATA(result), &status)
+        if failed >= 0:
+            now = load(&batch, failed)
+            self.report(status, now, copy(batch.x, self.n_in))
+        if out is None or out is result:
+            return result
+        out[...] = result
+        return out
+
+    cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):
+        """Describe an input of shape (n,) or (n, k) by a piece; columns is k, -1 for a vector, -2 while unknown."""
+        cdef cnp.ndarray array = doubles(value, label, self.error)
+        cdef cnp.npy_intp k = cnp.PyArray_DIM(array, 1) if array.ndim == 2 else -1
+        if columns[0] == -2:
+            columns[0] = k
+        if array.ndim not in (1, 2) or cnp.PyArray_DIM(array, 0) != n or k not in (-1, columns[0]):
+            batch = "k" if columns[0] < 0 else columns[0]
+            raise self.error(f"{label} of {self.name} must have shape ({n},) or ({n}, {batch}), "
+                             f"not {(<object>array).shape}")
+        piece.data, piece.n, piece.row = cnp.PyArray_BYTES(array), n, cnp.PyArray_STRIDE(array, 0)
+        piece.column = cnp.PyArray_STRIDE(array, 1) if k >= 0 else 0
+        return array
+
+    cdef cnp.ndarray target(self, object out, list held, cnp.npy_intp columns):
+        """Where the kernel writes: out itself if it is contiguous and apart from the inputs, else a new array."""
+        cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims = self.dims
+        cdef int ndim = self.ndim
+        if columns >= 0:
+            dims[ndim] = columns
+            ndim += 1
+        if out is not None:
+            shape = tuple([dims[i] for i in range(ndim)])
+            if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
+                given = f"{out.dtype} array of shape {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+                raise self.error(f"out of {self.name} must be a float64 array of shape {shape}, not {given}")
+            if not out.flags.writeable:
+                raise self.error(f"out of {self.name} is read-only")
+            if out.flags.carray and not any([np.may_share_memory(out, array) for array in held]):
+                return out
+        return cnp.PyArray_EMPTY(ndim, dims, cnp.NPY_DOUBLE, 0)
+
+
+cdef class Timed(Kernel):
+    """A kernel of time and state: ``f(t, x, p=None, u=None, out=None)``."""
+
+    def __call__(self, t, x, p=None, u=None, out=None):
+        """Evaluate at time t, a float or (k,), and state x, (n,) or (n, k) for k states as columns.
+
+        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's; out is a float64 array of the result's shape,
+        ``shape`` or ``(*shape, k)``.
+        """
+        if p is None and u is None and self.is_plain(x):
+            result = self.evaluate(t, <const double *>cnp.PyArray_DATA(<cnp.ndarray>x), out)
+            if result is not None:
+                return result
+        return self.general(t, [("x", self.n_in, x)], p, u, out)
+
+
+cdef class State(Kernel):
+    """A kernel of the state alone: ``f(x, p=None, u=None, out=None, t=0.0)``."""
+
+    def __call__(self, x, p=None, u=None, out=None, t=0.0):
+        """Evaluate at state x; arguments as for Timed."""
+        if p is None and u is None and self.is_plain(x):
+            result = self.evaluate(t, <const double *>cnp.PyArray_DATA(<cnp.ndarray>x), out)
+            if result is not None:
+                return result
+        return self.general(t, [("x", self.n_in, x)], p, u, out)
+
+
+cdef class Motion(Kernel):
+    """A kernel of coordinates, velocities, accelerations: ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
+
+    def __call__(self, q, v, a, p=None, u=None, out=None, t=0.0):
+        """Evaluate at q (n_q,), v and a (n_v,), or with a last axis k; other arguments as for Timed."""
+        cdef int n_v = _FACTS.get("n_v", self.n_in // 3)
+        return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
+
+
+context, timed, state, motion = Context, Timed, State, Motion
+
+
+def address(str name not None):
+    """Address of a kernel's C function, for ctypes, Numba or another extension.
+
+    Its type is ``int (double t, const double *x, const double *u, const double *c, double *out, double *w)``.
+    """
+    return <uintptr_t>MODEL.kernels[find(name, KeyError)].call
+
+
+def capsule(str name not None):
+    """The same address as a capsule named ``eomgen_function``."""
+    return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)

@@ -1,0 +1,87 @@
+"""Trees of every joint type against Pinocchio: mass matrix, bias, inverse dynamics, energies, body poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from mechanisms import Random, random_mechanism
+
+from eomgen.equations import METHODS
+from eomgen.frames import Frame, Marker
+from eomgen.graph import evaluate, vectors
+from eomgen.kinematics import analyse
+
+STEPS = {
+    "revolute": "RZ",
+    "prismatic": "PZ",
+    "cylindrical": "PZ RZ",
+    "planar": "PX PY RZ",
+    "spherical": "RX RY RZ",
+    "free": "PX PY PZ RX RY RZ",
+    "weld": "",
+}
+
+
+def pinocchio_model(made: Random, bodies: list[int]) -> tuple[pin.Model, dict[int, int]]:
+    """The same tree in Pinocchio, its bodies in the given order (depth first, as it demands), and their frames."""
+    model = pin.Model()
+    model.gravity.linear = made.gravity
+    holders: dict[int, tuple[int, pin.SE3]] = {}
+    frames: dict[int, int] = {}
+    for k in bodies:
+        joint, base = holders[made.parents[k]] if made.parents[k] >= 0 else (0, pin.SE3.Identity())
+        at = base * pin.SE3(made.outer[k].rotation, made.outer[k].position)
+        for s, step in enumerate(STEPS[made.kinds[k]].split()):
+            joint = model.addJoint(joint, getattr(pin, f"JointModel{step}")(), at, f"j{k}_{s}")
+            at = pin.SE3.Identity()
+        body = at * pin.SE3(made.inner[k].rotation, made.inner[k].position).inverse()
+        model.appendBodyToJoint(joint, pin.Inertia(made.masses[k], made.centers[k], made.inertias[k]), body)
+        holders[k] = joint, body
+        frames[k] = model.addFrame(pin.Frame(f"b{k}", joint, body, pin.FrameType.OP_FRAME))
+    return model, frames
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
+    made = random_mechanism(seed, bodies=1 + seed % 6, planar=planar, forces=False)
+    kinematics = analyse(made.mechanism)
+    tree = METHODS[method](kinematics)
+    model, frames = pinocchio_model(made, [b.body for b in kinematics.topology.branches])
+    data = model.createData()
+    n = model.nv
+    assert n == len(kinematics.q)
+    random = np.random.default_rng(seed + 1000)
+    offsets: list[float] = []
+    for _ in range(3):
+        q, v, a = random.uniform(-1, 1, (3, n))
+        values = {"t": 0.0}
+        for names, x in (("", q), ("_dot", v), ("_ddot", a)):
+            values |= {name + names: float(x[i]) for i, name in enumerate(kinematics.names)}
+
+        def number(expressions: object, values: dict[str, float] = values) -> np.ndarray:
+            return np.array(evaluate(list(expressions), values), dtype=float)  # type: ignore[call-overload]
+
+        mass = number(x for row in tree.mass_matrix for x in row).reshape(n, n)
+        expected = pin.crba(model, data, q)
+        expected = np.triu(expected) + np.triu(expected, 1).T
+        assert np.abs(mass - expected).max() <= 1e-13 * np.abs(expected).max()
+        for ours, theirs in (
+            (tree.bias, pin.nonLinearEffects(model, data, q, v)),
+            (tree.inverse_dynamics, pin.rnea(model, data, q, v, a)),
+        ):
+            assert np.abs(number(ours) - theirs).max() <= 1e-12 * max(1.0, np.abs(theirs).max())
+        kinetic, potential = number([tree.kinetic_energy, tree.potential_energy])
+        assert kinetic == pytest.approx(pin.computeKineticEnergy(model, data, q, v), rel=1e-12, abs=1e-12)
+        # Pinocchio leaves out bodies welded to ground, a constant
+        offsets.append(potential - pin.computePotentialEnergy(model, data, q))
+        assert offsets[-1] == pytest.approx(offsets[0], abs=1e-11)
+        pin.framesForwardKinematics(model, data, q)
+        graph = made.mechanism.graph
+        for k, index in frames.items():
+            pose = kinematics.poses.marker(Marker(k, Frame(vectors.identity(graph), vectors.zero(graph)), ""))
+            assert np.abs(number(pose.position) - data.oMf[index].translation).max() <= 1e-13 * 10
+            rotation = number(x for row in pose.rotation for x in row).reshape(3, 3)
+            assert np.abs(rotation - data.oMf[index].rotation).max() <= 1e-14 * 10

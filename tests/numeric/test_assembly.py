@@ -1,0 +1,187 @@
+"""Assembly of positions and velocities, kinematics over a full turn, rank and redundancy."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from eomgen.errors import AssemblyError, PartitionError, ProjectionError
+from eomgen.numeric import (
+    VelocityEquations,
+    assemble,
+    assemble_velocity,
+    choose_independent,
+    conditioning,
+    follow,
+    independent_rows,
+    kinematics,
+    rank,
+    redundant_rows,
+)
+from eomgen.numeric.closure import Equations
+
+NAMES, LABELS = ["theta", "beta", "s"], ["C.x", "C.y", "C.x again"]
+REFERENCE = Path(__file__).parents[1] / "reference" / "slider_crank_kinematics.json"
+
+
+def put_together(c, guess, **options):
+    return assemble(c.position, np.array(guess, dtype=float), c.scales, names=NAMES, labels=LABELS, **options)
+
+
+def test_a_rough_guess_closes_and_held_values_stay(crank):
+    c = crank(copies=2)
+    rng = np.random.default_rng(3)
+    for theta in rng.uniform(-3, 3, 30):
+        guess = [theta, rng.uniform(-1.2, 1.2), rng.uniform(0, 0.6)]
+        found = put_together(c, guess, held=[0])
+        assert found.q[0] == theta
+        assert np.abs(c.position(found.q)[0]).max() < 1e-12
+
+
+def test_a_symmetric_guess_needs_another_start(crank):
+    found = put_together(crank(), [0.0, 0.0, 0.3], held=[2])
+    assert found.restarts > 0
+    assert np.abs(crank().position(found.q)[0]).max() < 1e-10
+    assert put_together(crank(), [0.0, 0.0, 0.3], held=[2]).q.tolist() == found.q.tolist()
+
+
+def test_the_guess_is_moved_as_little_as_possible(crank):
+    c = crank()
+    q = c.closed(0.7)
+    found = put_together(c, q + np.array([1e-4, -1e-4, 1e-4]))
+    assert found.distance < 5e-4
+    assert found.restarts == 0
+
+
+def test_the_dead_centre_can_be_held_exactly(crank):
+    c = crank()
+    found = put_together(c, [0.3, -0.1, c.p.l1 + c.p.l2], held=[2])
+    assert found.q[2] == c.p.l1 + c.p.l2
+    assert abs(found.q[0]) < 1e-4
+
+
+def test_messages_tell_the_three_ways_to_fail_apart(crank):
+    c = crank()
+    with pytest.raises(
+        AssemblyError, match=r"theta = 0\.3, s = 0\.2 are inconsistent: 2 values for 1 degree of freedom"
+    ):
+        put_together(c, [0.3, 0.0, 0.2], held=[0, 2])
+    with pytest.raises(AssemblyError, match=r"cannot close with s = 2: .*C\.x.*nearby has s = 0\.4"):
+        put_together(c, [0.3, 0.0, 2.0], held=[2])
+    with pytest.raises(AssemblyError, match=r"do not close from the given guess \(25 starts tried\): .*C\.y"):
+        put_together(crank(e=1.0), [0.3, 0.0, 0.4])
+
+
+def test_consistent_values_may_be_more_than_needed(crank):
+    c = crank()
+    q = c.closed(0.7)
+    assert put_together(c, q, held=[0, 1, 2]).q.tolist() == q.tolist()
+
+
+def test_functions_of_the_coordinates_reach_their_values(crank):
+    c = crank()
+    equations = Equations(
+        lambda q: (-q[1:2], np.array([[0.0, -1.0, 0.0]])), np.array([0.2 + 2 * np.pi]), np.ones(1), [True], ["psi"]
+    )
+    found = put_together(c, c.closed(0.1), equations=equations)
+    assert found.q[1] == pytest.approx(-0.2, abs=1e-12)
+    with pytest.raises(AssemblyError, match="psi = "):
+        put_together(c, c.closed(0.1), equations=equations._replace(values=np.array([1.5])))
+
+
+def test_flipped_positions_are_refused(crank):
+    c = crank()
+    upright = put_together(c, [0.5, 3.0, 0.0], held=[0])
+    assert np.cos(upright.q[1]) < 0
+    found = put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q: np.cos(q[1:2]))
+    assert np.cos(found.q[1]) > 0
+    with pytest.raises(AssemblyError, match="axes of a joint flipped"):
+        put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q: np.array([-1.0]))
+
+
+def test_following_a_held_value_stays_on_the_branch(crank):
+    c = crank()
+    start = c.closed(0.1)
+    q = follow(c.position, start, c.scales, np.array([0]), np.array([9.0]))
+    np.testing.assert_allclose(q, c.closed(9.0), atol=1e-12)
+    with pytest.raises(AssemblyError, match="blocked"):
+        follow(c.position, start, c.scales, np.array([2]), np.array([0.6]))
+
+
+def test_velocities_given_are_exact_and_contradictions_are_told(crank):
+    c = crank(t=0.1, a=0.02, w=5.0)
+    q = c.closed(0.7)
+    C_q, C_t = c.position(q)[1], c.rate(q)
+    names = ["theta_dot", "beta_dot", "s_dot"]
+    rates = assemble_velocity(C_q, C_t, c.scales, guess=np.array([3.0, 0, 0]), held=[0], names=names, labels=LABELS)
+    assert rates.v[0] == 3.0
+    np.testing.assert_allclose(C_q @ rates.v + C_t, 0, atol=1e-13)
+    with pytest.raises(AssemblyError, match=r"theta_dot = 3, s_dot = 1 are inconsistent with 1 degree of freedom"):
+        assemble_velocity(C_q, C_t, c.scales, guess=np.array([3.0, 0, 1.0]), held=[0, 2], names=names, labels=LABELS)
+    equations = VelocityEquations(np.array([[0.0, -1.0, 0.0]]), np.zeros(1), np.array([0.5]), np.ones(1), ["psi_dot"])
+    assert assemble_velocity(C_q, C_t, c.scales, equations=equations).v[1] == pytest.approx(-0.5, abs=1e-13)
+
+
+def test_nothing_given_means_the_smallest_velocities(crank):
+    c = crank()
+    q = c.closed(0.7)
+    C_q, C_t = c.position(q)[1], c.rate(q)
+    assert assemble_velocity(C_q, C_t, c.scales).v.tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("case", ["inline", "offset"])
+def test_kinematics_equal_the_closed_form(crank, case):
+    """Reference: slider_crank_kinematics.json (closed form, 17 digits)."""
+    data = json.loads(REFERENCE.read_text())["reference"][case]
+    c = crank(l1=float(data["r"]), l2=float(data["l"]), e=float(data["e"]))
+    for degrees, row in data["rows"].items():
+        theta = np.deg2rad(float(degrees))
+        expected = {key: float(value) for key, value in row.items()}
+        q, v, a = kinematics(
+            c.position,
+            c.rate,
+            c.gamma,
+            np.array([theta]),
+            np.array([10.0]),
+            np.array([3.0]),
+            np.array([0.0, 0.1, 0.3]),
+            c.scales,
+            2,
+            [0],
+        )
+        np.testing.assert_allclose(q, [theta, expected["rod_angle"], expected["x"]], atol=1e-14)
+        np.testing.assert_allclose(v, [10.0, expected["rod_omega"], expected["v"]], atol=1e-12)
+        np.testing.assert_allclose(a, [3.0, expected["rod_alpha"], expected["a"]], atol=1e-11)
+
+
+def test_kinematics_out_of_reach_or_at_a_dead_centre(crank):
+    c = crank()
+    still = np.zeros(1)
+    with pytest.raises((ProjectionError, PartitionError)):
+        kinematics(c.position, c.rate, c.gamma, np.array([0.6]), still, still, c.closed(0.4), c.scales, 2, [2])
+    with pytest.raises(PartitionError):
+        kinematics(
+            c.position, c.rate, c.gamma, np.array([c.p.l1 + c.p.l2]), still, still, c.closed(0.0), c.scales, 2, [2]
+        )
+
+
+def test_rank_and_redundancy(crank):
+    c = crank(copies=2)
+    J = c.scales.jacobian(c.position(c.closed(0.7))[1])
+    found = rank(J)
+    assert found.rank == 2
+    assert found.clear
+    assert independent_rows(J, 2).tolist() == [0, 1]
+    assert redundant_rows(J, 2, LABELS) == ["C.x again"]
+    assert rank(np.zeros((2, 3))).rank == 0
+
+
+def test_the_crank_is_chosen_as_independent(crank):
+    c = crank()
+    jacobians = [c.scales.jacobian(c.position(c.closed(theta))[1]) for theta in (0.0, 0.5, np.pi / 2, 3.0)]
+    assert choose_independent(jacobians, 2).tolist() == [0]
+    assert choose_independent(jacobians, 2, prefer=[1]).tolist() == [0]  # the rod stops turning at theta = pi/2
+    assert choose_independent(jacobians[1:2], 2, prefer=[2]).tolist() == [2]
+    assert conditioning(jacobians[0], [2]) < 1e-12
+    assert conditioning(jacobians[0], [0]) > 0.1
