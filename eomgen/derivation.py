@@ -34,8 +34,8 @@ class Equations:
     q, v, parameters : tuple of sympy.Symbol
         Coordinates of the spanning tree, their velocities, and the parameters.
     mass_matrix, force : sympy.Matrix
-        ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being the
-        accelerations of ``independent``.  Large ones are written with ``intermediates``.
+        ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being
+        the accelerations of ``independent``.  Large ones are written with ``intermediates``.
     operations : dict of str to Operations
         Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree.
     """
@@ -141,7 +141,7 @@ class Equations:
         """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
         return self._raised[0]
 
-    # -- on the road ----------------------------------------------------------------------------------------------------
+    # -- on the road -------------------------------------------------------------------------------------------------
     def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
         """Generate code, compile it and load it.
 

@@ -178,12 +178,16 @@ def compile_equations(
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
             return Module(load_numpy(sources, equations.name))
-    from .compilation import compile_sources, load_core, make_options
+    from .compilation import Options, compile_sources, load_core
 
+    allowed = Options.__dataclass_fields__
+    unknown = [name for name in options if name not in allowed]
+    if unknown:
+        raise UsageError(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
     with _timed(seconds, "emit"):
         sources = emit_c(program)
     with _timed(seconds, "compile"):
-        artifact = compile_sources(sources, equations.name, make_options(**options))
+        artifact = compile_sources(sources, equations.name, Options(**options))
     with _timed(seconds, "load"):
         return Module(load_core(artifact))
 

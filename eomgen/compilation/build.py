@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import ToolchainError, UsageError
+from ..errors import UsageError
 from .cache import Cache, CacheEntry, cache_directory, compute_key
-from .compiler import CompilerInfo, describe_native, find_compiler, run
+from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
 from .cython_layer import HEADER, SOURCE, build_layer, describe_interpreter, describe_layer, read_layer
 from .options import Options, compile_flags, link_flags, machine_flags
 
@@ -93,7 +91,8 @@ def compile_sources(
         return _artifact(entry, start, from_cache=True)
     layer_object = build_layer(cache, layer, sources[HEADER], compiler, progress).product
     product = f"_core{describe_interpreter()['suffix']}"
-    entry = _build(cache, key, "extension", name, sources, flags, product, [str(layer_object)], options, compiler, progress)
+    objects = [str(layer_object)]
+    entry = _build(cache, key, "extension", name, sources, flags, product, objects, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
 
 
@@ -134,7 +133,9 @@ def _check(sources: Mapping[str, str], name: str) -> None:
         raise UsageError(f"there is no C file among the sources of {name!r}: {', '.join(sources)}")
 
 
-def _plan(sources: Mapping[str, str], options: Options, compiler: CompilerInfo, *, extension: bool) -> dict[str, list[str]]:
+def _plan(
+    sources: Mapping[str, str], options: Options, compiler: CompilerInfo, *, extension: bool
+) -> dict[str, list[str]]:
     """Flags of every C file, and under "" those of the linker."""
     flags = {
         file: compile_flags(options, compiler, len(text), hidden=extension)
@@ -158,6 +159,8 @@ def _build(
     product: str, objects: Sequence[str], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
     """Compile every file, link, publish."""
+    from concurrent.futures import ThreadPoolExecutor  # not needed by a warm start
+
     tell: Callable[[str], Any] = progress or (lambda line: None)
     with cache.attempt(key) as directory:
         folder = directory / "sources"
@@ -169,7 +172,8 @@ def _build(
 
         def compile_one(file: str) -> None:
             tell(f"compiling {file}")
-            _command([*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"], directory, folder / file)
+            command = [*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"]
+            _command(command, directory, folder / file)
 
         with ThreadPoolExecutor(options.jobs or os.cpu_count()) as pool:
             try:
@@ -188,10 +192,4 @@ def _build(
 def _command(command: Sequence[str], directory: Path, source: Path) -> None:
     result = run(command, directory)
     if result.returncode != 0:
-        said = (result.stderr + result.stdout).strip()
-        raise ToolchainError(
-            f"compiling {source} failed (exit status {result.returncode}):\n{said}\ncommand, run in {directory}:\n"
-            f"{shlex.join(command)}",
-            shlex.join(command),
-            said,
-        )
+        raise_failure(f"compiling {source}", result, directory)

@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -137,14 +136,21 @@ class Cache:
             for directory in (self._entries, self._attempts):
                 directory.mkdir(mode=0o700, exist_ok=True)
             self.sweep()
-            return Path(tempfile.mkdtemp(prefix=f"{key[:16]}-", dir=self._attempts))
+            return self._make_attempt(key[:16])
         except OSError as error:
             raise ToolchainError(
                 f"the cache directory {self.root} cannot be written: {error}. "
                 "Set EOMGEN_CACHE_DIR to a directory that can"
             ) from error
 
-    def publish(self, attempt: Path, key: str, kind: str, name: str, product: str, recipe: Mapping[str, Any]) -> CacheEntry:
+    def _make_attempt(self, prefix: str) -> Path:
+        import tempfile
+
+        return Path(tempfile.mkdtemp(prefix=f"{prefix}-", dir=self._attempts))
+
+    def publish(
+        self, attempt: Path, key: str, kind: str, name: str, product: str, recipe: Mapping[str, Any]
+    ) -> CacheEntry:
         """Make the entry of a key from an attempt, by one rename.
 
         Parameters
@@ -240,7 +246,7 @@ class Cache:
         """Remove an entry, which disappears at once and is then taken apart."""
         try:
             self._attempts.mkdir(mode=0o700, exist_ok=True)
-            away = Path(tempfile.mkdtemp(prefix="removed-", dir=self._attempts))
+            away = self._make_attempt("removed")
             with suppress(FileNotFoundError):
                 os.rename(entry, away / entry.name)
             shutil.rmtree(away, ignore_errors=True)
@@ -266,6 +272,8 @@ def _check_private(root: Path) -> None:
         return
     status = root.stat()
     if status.st_uid not in (os.geteuid(), 0) and os.geteuid() != 0:
-        raise ToolchainError(f"the cache directory {root} belongs to another user; set EOMGEN_CACHE_DIR to one of your own")
+        raise ToolchainError(
+            f"the cache directory {root} belongs to another user; set EOMGEN_CACHE_DIR to one of your own"
+        )
     if status.st_mode & 0o022:
         raise ToolchainError(f"the cache directory {root} can be written by other users; run: chmod go-w {root}")

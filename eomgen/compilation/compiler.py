@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import os
-import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 from ..errors import ToolchainError
 
@@ -66,6 +66,8 @@ def find_compiler(command: str | None = None) -> CompilerInfo:
 
 @functools.lru_cache(maxsize=16)
 def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
+    import shlex
+
     wish = command or variable
     tried = []
     for words in [tuple(shlex.split(wish))] if wish else _candidates():
@@ -120,11 +122,7 @@ def describe_native(compiler: CompilerInfo, flags: tuple[str, ...]) -> str:
     """What the compiler knows of this processor: its predefined macros under the flags that say "native"."""
     result = run([*compiler.command, *flags, "-dM", "-E", "-x", "c", os.devnull])
     if result.returncode != 0:
-        raise ToolchainError(
-            f"{compiler.path} does not accept {shlex.join(flags)}; use native=False",
-            shlex.join(map(str, result.args)),
-            result.stderr,
-        )
+        raise_failure("asking the compiler about this processor (option native)", result, Path.cwd())
     return result.stdout
 
 
@@ -151,4 +149,16 @@ def run(command: Sequence[str], directory: Path | None = None) -> subprocess.Com
         encoding="utf-8",
         errors="replace",
         check=False,
+    )
+
+
+def raise_failure(task: str, result: subprocess.CompletedProcess[str], directory: Path) -> NoReturn:
+    """Raise the ToolchainError of a command that failed, with the command and the compiler's own words."""
+    import shlex
+
+    command, said = shlex.join(result.args), (result.stderr + result.stdout).strip()
+    raise ToolchainError(
+        f"{task} failed (exit status {result.returncode}):\n{said}\nThe command, run in {directory}:\n{command}",
+        command,
+        said,
     )

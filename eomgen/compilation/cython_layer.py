@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.machinery
-import io
 import platform
-import shlex
 import sys
 import threading
 from collections.abc import Callable
@@ -17,7 +14,7 @@ import numpy as np
 
 from ..errors import MissingDependencyError, ToolchainError
 from .cache import Cache, CacheEntry, compute_key
-from .compiler import CompilerInfo, run
+from .compiler import CompilerInfo, raise_failure, run
 from .options import layer_flags
 
 SOURCE = "_core.pyx"
@@ -78,7 +75,7 @@ def build_layer(
         If Python's headers are missing, or Cython or the compiler fails.
     """
     try:
-        from Cython import __version__ as version
+        from Cython.Shadow import __version__ as version
     except ImportError as error:
         raise MissingDependencyError(
             'target="cython" needs Cython to build its layer once: pip install cython. target="numpy" needs neither '
@@ -94,23 +91,23 @@ def build_layer(
         (directory / SOURCE).write_text(text, encoding="utf-8")
         (directory / HEADER).write_text(header, encoding="utf-8")
         _run_cython(directory / SOURCE)
-        command = [*compiler.command, *layer_flags(compiler), "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION", "-I.", *includes]
-        command += ["-c", "_core.c", "-o", _OBJECT]
+        flags = [*layer_flags(compiler), "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION", "-I.", *includes]
+        command = [*compiler.command, *flags, "-c", "_core.c", "-o", _OBJECT]
         result = run(command, directory)
         if result.returncode != 0:
-            raise ToolchainError(
-                f"compiling the Cython layer {directory / '_core.c'} failed:\n{result.stderr}",
-                shlex.join(command),
-                result.stderr,
-            )
+            raise_failure(f"compiling the Cython layer {directory / '_core.c'}", result, directory)
         (directory / "_core.c").unlink()
         return cache.publish(directory, key, "layer", "_core", _OBJECT, {"command": command, "cython": version})
 
 
 def _run_cython(source: Path) -> None:
     """Translate the layer to C in this process; cythonize would want setuptools."""
-    from Cython.Compiler.Main import compile as translate
+    import contextlib
+    import io
 
+    from Cython.Compiler import Main
+
+    translate: Callable[..., Any] = Main.compile
     said = io.StringIO()
     with _lock, contextlib.redirect_stderr(said):
         result = translate(str(source), output_file=str(source.with_suffix(".c")), language_level=3)

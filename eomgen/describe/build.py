@@ -192,7 +192,7 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
     if not isinstance(given, Mapping):
         reader.wrong(section, given, "table")
         return {}
-    known = list(reader.names.of(*kinds))
+    known = dict.fromkeys(reader.names.of(*kinds))
     result: dict[str, Expr] = {}
     for key, value in given.items():
         name = name_of(key)

@@ -64,8 +64,6 @@ def check_bodies(bodies: Sequence[Body], values: Mapping[str, float], faults: Fa
     """Note masses and inertias that no body can have, as far as the declared values of parameters tell."""
     for body in bodies:
         path = f"bodies.{body.name}"
-        if faults.under(path):
-            continue
         mass = _numbers([body.mass], values)
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"

@@ -70,8 +70,16 @@ def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]
             return found
         if not path:
             return ("", 0)
-        shorter = re.sub(r"(\.[^.\[]*|\[\d+\])\Z", "", path)
-        path = shorter if shorter != path else ""
+        path = parent_of(path)
+
+
+_LAST_PART = re.compile(r"(\.[^.\[]*|\[\d+\])\Z")
+
+
+def parent_of(path: str) -> str:
+    """The path without its last key or index; empty for a path of one part."""
+    shorter = _LAST_PART.sub("", path)
+    return shorter if shorter != path else ""
 
 
 class Faults:
@@ -79,21 +87,32 @@ class Faults:
 
     def __init__(self, description: Description) -> None:
         self.lines = description.lines
-        self.problems = list(description.problems)
+        self.problems: list[Problem] = []
+        self._seen: set[Problem] = set()
+        self._paths: set[str] = set()
+        for problem in description.problems:
+            self._take(problem)
 
     def add(self, path: str, message: str, remedy: str = "") -> None:
         """Note a fault at a dotted path."""
-        file, line = place_of(path, self.lines)
-        problem = Problem(path, message, remedy, file, line)
-        if problem not in self.problems:
-            self.problems.append(problem)
+        self._take(Problem(path, message, remedy, *place_of(path, self.lines)))
+
+    def _take(self, problem: Problem) -> None:
+        if problem in self._seen:
+            return
+        self._seen.add(problem)
+        self.problems.append(problem)
+        path = problem.path
+        while path and path not in self._paths:
+            self._paths.add(path)
+            path = parent_of(path)
 
     def __len__(self) -> int:
         return len(self.problems)
 
     def under(self, path: str) -> bool:
         """Whether a fault was noted at a path or inside it."""
-        return any(p.path == path or p.path.startswith((path + ".", path + "[")) for p in self.problems)
+        return path in self._paths
 
     def sorted(self) -> list[Problem]:
         """All problems; those of a file in the order of its lines."""
@@ -115,9 +134,9 @@ def items(value: Any) -> list[Any] | None:
 
 
 def text_of(value: Any) -> str:
-    """A value as it is shown in labels: numbers short, expressions as written."""
+    """A value as it is shown in labels: numbers exactly, expressions as written."""
     if isinstance(value, float):
-        return f"{value:.12g}"
+        return repr(float(value))
     listed = items(value)
     if listed is not None:
         return "(" + ", ".join(text_of(x) for x in listed) + ")"

@@ -29,7 +29,7 @@ def _summary(entry: Entry) -> str:
             parts.append(reference_text(value))
         elif isinstance(value, Mapping):
             parts.append(f"{key} " + ", ".join(f"{k} {text_of(v)}" for k, v in value.items()))
-        elif value not in ("", "z") and text_of(value) != "(0, 0, 0)":
+        elif text_of(value) not in ("", "z", "(0, 0, 0)"):
             parts.append(f"{key} {text_of(value)}")
     return "; ".join(parts)
 

@@ -112,6 +112,21 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
 
 
+def names_in(text: str) -> list[str]:
+    """Names that a text uses, in order; none if the text is not an allowed expression."""
+    graph, found = Graph(), dict[str, None]()
+
+    def resolve(name: str) -> Expr:
+        found[name] = None
+        return graph.symbol(name)
+
+    try:
+        parse(text, graph, resolve)
+    except ExpressionError:
+        return []
+    return list(found)
+
+
 class _Walker:
     """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
 

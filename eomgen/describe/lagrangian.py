@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import ModelError, Problem
 from .description import Description, items
+from .expressions import names_in
 from .scope import RATES
 from .sympy_face import free_names, function_names, is_sympy, name_of
 
@@ -31,7 +32,7 @@ def describe_lagrangian(
         T - V in coordinates, velocities and t.
     coordinates : sequence
         Generalized coordinates: functions of time ``q(t)`` (``dynamicsymbols``), whose velocities are their
-        derivatives, or plain symbols ``q``, whose velocities are the symbols ``q_dot``.
+        derivatives, or plain symbols (or names) ``q``, whose velocities are the symbols ``q_dot``.
     forces : sequence or mapping, optional
         Generalized forces, one for each coordinate in order, or by coordinate.
     dissipation : sympy.Expr, optional
@@ -91,6 +92,8 @@ def _symbols(given: Mapping[str, Any]) -> list[str]:
     parts += list(forces.values()) if isinstance(forces, Mapping) else items(forces) or []
     constraints = given.get("constraints", ())
     parts += items(constraints) or []
+    found = {name for part in parts if isinstance(part, str) for name in names_in(part)}
     parts = [part for part in parts if is_sympy(part)]
-    functions = set(function_names(parts)) if parts else set()
-    return [s for s in free_names(parts) if s not in functions] if parts else []
+    if parts:
+        found |= set(free_names(parts)) - set(function_names(parts))
+    return sorted(found - {"t"})

@@ -10,7 +10,7 @@ from .description import GROUND_NAME, SECTIONS, Description
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_forces import ForceMethods
 from .model_joints import JointMethods
-from .sympy_face import symbol
+from .sympy_face import name_of, symbol
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -268,6 +268,8 @@ class Model(JointMethods, ForceMethods):
         """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
         from .. import pipeline
 
+        if independent is not None:
+            independent = [name_of(q) for q in ([independent] if isinstance(independent, str) else independent)]
         return pipeline.derive(self, method, independent)
 
     def compile(

@@ -89,6 +89,8 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     import difflib  # only needed once something is wrong
 
     options = list(known)
+    if len(options) > 2000:
+        return ""  # a comparison with each would take long
     near = difflib.get_close_matches(name, options, n=1, cutoff=0.6)
     if not near:
         folded = {option.lower(): option for option in options}
@@ -96,7 +98,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else ""
 
 
-def listing(known: Iterable[str], limit: int = 12) -> str:
+def listing(known: Iterable[str], limit: int = 20) -> str:
     """The names joined by commas, cut after ``limit``; ``"none"`` if there are none."""
     names = list(known)
     shown = ", ".join(names[:limit])

@@ -32,14 +32,13 @@ def sympy_text(expression: Any) -> str:
         def _print_Max(self, e: Any) -> str:
             return f"max({', '.join(self._print(x) for x in e.args)})"
 
+        def _print_Float(self, e: Any) -> str:
+            return repr(float(e))
+
         def _print_Heaviside(self, e: Any) -> str:
+            if 2 * e.args[1] != 1:
+                raise UsageError(f"{e} cannot be written as a text: heaviside is 1/2 at 0")
             return f"heaviside({self._print(e.args[0])})"
-
-        def _print_ExpBase(self, e: Any) -> str:
-            return f"exp({self._print(e.args[0])})"
-
-        def _print_exp(self, e: Any) -> str:
-            return f"exp({self._print(e.args[0])})"
 
         def _print_Exp1(self, e: Any) -> str:
             return "exp(1)"
@@ -71,7 +70,7 @@ def sympy_text(expression: Any) -> str:
         def _print_Derivative(self, e: Any) -> str:
             return function_name(e) or str(e)
 
-    text = str(Printer({"full_prec": True}).doprint(expression))
+    text = str(Printer().doprint(expression))
     graph = Graph()
     try:
         parse(text, graph, graph.symbol, lambda quantity, marker: graph.symbol(f"{quantity}({marker})"))

@@ -63,7 +63,7 @@ def _section(section: str, description: Description) -> list[str]:
 
 def _is_default(key: str, value: Any) -> bool:
     """Whether leaving a value out means the same."""
-    if value is None or value == "" or (isinstance(value, list | tuple | dict) and len(value) == 0):
+    if value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0):
         return True
     if key in ("com", "inertia", "gravity", "rpy"):
         listed = items(value)

@@ -87,17 +87,19 @@ class Document:
         except (YAMLError, RecursionError, ValueError) as error:
             what = str(getattr(error, "reason", "") or error).split("\n")[0]
             raise self._stop(_line_of(error, text), f"not YAML: {what}") from None
-        if len(documents) != 1:
+        if not documents:
             raise self._stop(
-                1, f"{len(documents)} documents in one file" if documents else "the file is empty", "one model"
+                1, "the file is empty", "a model file has a name, bodies and joints, or a name and a lagrangian"
             )
         return documents[0]
 
     def _documents(self) -> list[Any]:
-        documents = []
+        documents: list[Any] = []
         for event in self._events:
             kind = type(event).__name__
             if kind in ("ScalarEvent", "SequenceStartEvent", "MappingStartEvent", "AliasEvent"):
+                if documents:
+                    raise self._stop(event.start_mark.line + 1, "a second document begins", "a file holds one model")
                 documents.append(self._value(event, "", 0))
         return documents
 

@@ -9,7 +9,7 @@ from ..program import KERNELS, Block, Program
 from .c_layout import driver_files, work_areas
 from .c_text import print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
-from .sources import SourceSet, read_template, render
+from .sources import SourceSet, metadata_json, read_template, render
 
 
 def emit_c(program: Program) -> SourceSet:
@@ -29,11 +29,6 @@ def emit_c(program: Program) -> SourceSet:
             "model.json": metadata_json(program),
         }
     )
-
-
-def metadata_json(program: Program) -> str:
-    """The text of model.json."""
-    return json.dumps(program.metadata, indent=1, allow_nan=False) + "\n"
 
 
 def _context(program: Program) -> dict[str, Any]:

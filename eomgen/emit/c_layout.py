@@ -80,7 +80,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("A", n),
             ("Y", f),
         ]
-    areas, start = [], blocks
+    areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))
         start += length

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
+
+from ..program import Program
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -57,3 +60,8 @@ def read_template(name: str) -> str:
     made = environment()
     assert made.loader is not None
     return made.loader.get_source(made, name)[0]
+
+
+def metadata_json(program: Program) -> str:
+    """The text of model.json."""
+    return json.dumps(program.metadata, indent=1, allow_nan=False) + "\n"

@@ -167,9 +167,7 @@ def _coordinate_forces(kinematics: Kinematics) -> list[Expr]:
     return total
 
 
-def _composite_mass_matrix(
-    kinematics: Kinematics, inertias: list[SpatialInertia]
-) -> tuple[tuple[Expr, ...], ...]:
+def _composite_mass_matrix(kinematics: Kinematics, inertias: list[SpatialInertia]) -> tuple[tuple[Expr, ...], ...]:
     """M_ij = s_i . I^c_max(i,j) s_j along each branch, composite inertias summed inwards."""
     graph, links, n = kinematics.graph, kinematics.links, len(kinematics.q)
     composite = list(inertias)

@@ -32,9 +32,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     n = len(q)
     return TreeEquations(
         method="lagrange",
-        mass_matrix=tuple(
-            tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)
-        ),
+        mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
         bias=tuple(d - s - f for d, s, f in zip(drift, slope, applied, strict=True)),
         inverse_dynamics=tuple(d - s - f for d, s, f in zip(total, slope, applied, strict=True)),
         kinetic_energy=kinetic,

@@ -1,4 +1,4 @@
-"""Stage equations: tree equations and constraints -> the embedded system in the independent coordinates, as expressions.
+"""Stage equations: tree equations, constraints -> the embedded system in the independent coordinates, as expressions.
 
 M_e = B^T M B and f_e = -B^T (h + M a_p) with v = B v_i and a = B a_i + a_p (Shabana, sec. 5.7).  For reading: compiled
 modules eliminate numerically with pivoting.  Here the pivots are fixed, chosen by their size at the reference.
@@ -60,7 +60,7 @@ def _eliminate(
     kinematics: Kinematics, mobility: Mobility, bound: Sequence[int], values: Mapping[str, float]
 ) -> dict[int, list[Expr]]:
     """Gauss-Jordan on the independent rows of [C_q | gamma] for the dependent columns, column -> its solved row."""
-    c, n = kinematics.constraints, len(kinematics.q)
+    c = kinematics.constraints
     at = dict(values) | dict(zip(kinematics.names, mobility.q_reference, strict=True))
     at |= {name + "_dot": 0.0 for name in kinematics.names}
     rows = [[*c.jacobian[i], c.gamma[i]] for i in mobility.independent_rows]

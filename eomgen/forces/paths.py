@@ -1,4 +1,4 @@
-"""Force elements, their geometry: a scalar that changes with the motion, its rate, and the loads of a force along it."""
+"""Force elements, their geometry: a scalar of the configuration, its rate, and the loads of a force along it."""
 
 from __future__ import annotations
 

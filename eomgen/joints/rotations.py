@@ -37,7 +37,7 @@ def euler(graph: Graph, sequence: str, angles: Sequence[Expr]) -> Mat3:
 
 
 def euler_rates(graph: Graph, sequence: str, angles: Sequence[Expr]) -> list[Vec3]:
-    """Columns g_k with omega = sum g_k q_k' in the axes of the turned frame (Shabana, eq. 7.30: omega-bar = G-bar theta')."""
+    """Columns g_k with omega = sum g_k q_k' in the turned axes (Shabana, ch. 7: omega-bar = G-bar theta')."""
     columns = []
     for k, letter in enumerate(sequence):
         column = unit(graph, AXES[letter])

@@ -42,7 +42,7 @@ class ForceTerms:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """The tree, its motion, loop constraints and resolved forces, as expressions in (t, q, v, a), inputs and parameters.
+    """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters.
 
     ``q``, ``v``, ``a`` are the coordinates of the spanning tree, their rates and accelerations, in the order of
     ``names``; q' = v.  ``parent[j]`` is the coordinate next to coordinate j towards ground, -1 for none.
@@ -117,9 +117,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     constraints = differentiate_constraints(graph, rows, aligned, (q, v, t))
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))
     coordinates = {n: (q[j], v[j], a[j]) for j, n in enumerate(names)}
-    coordinates |= dict(
-        zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True)
-    )
+    coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, (q, v, a, t), coordinates)
     return Kinematics(
         mechanism=mechanism,

@@ -14,7 +14,7 @@ from .tree import Poses
 
 @dataclass(frozen=True)
 class Constraints:
-    """C(q, t) = 0 and what follows from it (Shabana, sec. 3.4 ff.): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
+    """C(q, t) = 0 and its derivatives (Shabana, ch. 3): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
 
     Rows that vanish identically are left out and listed in ``vanishing``; redundant ones stay.
     """
@@ -50,7 +50,11 @@ def close_loop(spec: JointSpec, poses: Poses) -> tuple[list[Row], list[Expr], li
     gap = vec.sub(inner.position, outer.position)
     position = vec.transpose_times(outer.rotation, gap)
     rows = spec.joint.closure(graph, rotation, position)
-    if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish, so any axes do: those of the base are simplest
+    if {r.label for r in rows} >= {
+        "r_x",
+        "r_y",
+        "r_z",
+    }:  # all three vanish, so any axes do: those of the base are simplest
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)

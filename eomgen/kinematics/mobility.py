@@ -264,7 +264,9 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     r = max(ranks)
     n_dof = n - r
     if len(wanted) > n_dof:
-        message = f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
+        message = (
+            f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
+        )
         raise ModelError([Problem("independent", message, f"choose {n_dof} of {', '.join(names)}")])
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)

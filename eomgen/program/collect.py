@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -81,12 +82,15 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     m, c, loop = kinematics.mechanism, kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     velocities = [n + "_dot" for n in names]
-    units = {n: {"angle": "rad", "length": "m"}[kind] for n, kind in zip(names, kinematics.kinds, strict=True)}
-    units |= {n: {"angle": "rad", "length": "m"}[kind] for n, kind in zip(loop.names, loop.kinds, strict=True)}
+    units: dict[str, str] = {}
+    for name, kind in (*zip(names, kinematics.kinds, strict=True), *zip(loop.names, loop.kinds, strict=True)):
+        unit = {"angle": "rad", "length": "m"}[kind]
+        units |= {name: unit, f"{name}_dot": f"{unit}/s", f"{name}_ddot": f"{unit}/s^2"}
     if m.lagrangian is not None:
         units = {}
-    docs = {}
-    for item in (*m.parameters, *m.inputs, *m.outputs):
+    docs: dict[str, str] = {}
+    described: list[Parameter | Input | Output] = [*m.parameters, *m.inputs, *m.outputs]
+    for item in described:
         if item.unit:
             units[item.name] = item.unit
         if item.doc:

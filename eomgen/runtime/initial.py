@@ -9,6 +9,7 @@ blocked, the loops are closed from the nearest guess.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -83,7 +84,8 @@ class Initial:
 
     def loops(self, q: Array) -> tuple[Array, Array]:
         """Coordinates y (n_k,) of the cut joints and y_q (n_k, n)."""
-        assert self._loop is not None and self._loop_q is not None
+        assert self._loop is not None
+        assert self._loop_q is not None
         zero = np.zeros(self.layout.n_v)
         return self._loop(q, zero, zero, t=self.t)[0], self._loop_q(q, t=self.t)
 
@@ -118,7 +120,7 @@ class Initial:
             self.scales,
             held=indices,
             equations=self._equations(held),
-            alignment=(lambda q: self._alignment(q, t=self.t)) if self._alignment is not None else None,
+            alignment=None if self._alignment is None else partial(self._alignment, t=self.t),
             names=layout.q,
             labels=layout.constraint_labels,
             restarts=restarts,
@@ -295,4 +297,3 @@ class Initial:
             if name in self.layout.q:
                 result[self.layout.q.index(name)] = value
         return result
-

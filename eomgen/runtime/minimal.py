@@ -1,4 +1,4 @@
-"""Stage runtime: x = [q_i; v_i] of the degrees of freedom alone -> its derivative, for integrators that want no more."""
+"""Stage runtime: x = [q_i; v_i] of the degrees of freedom alone -> its derivative, dependent coordinates solved."""
 
 from __future__ import annotations
 
@@ -148,8 +148,7 @@ class Minimal:
             if not np.isfinite(way).all():
                 raise UsageError(f"x is not finite: {x}")
             near = self._path.walk(near, q_i, t)
-        near = self._path.advance(near, q_i, t)
-        full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: n + self._layout.n_v]
+        full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: self._layout.n_x]
         self._q = full[:n].copy()
         return full
 

@@ -106,7 +106,7 @@ class Drivers:
         flat = np.asarray(self.blocks["terms"](t, np.concatenate([q, v]), u, c), dtype=float)
         return embedded.unpack_terms(flat, self.layout.n_v, self.layout.n_c)
 
-    def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:  # noqa: E741
+    def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:
         """The derivatives of the residuals."""
         n, m = self.layout.n_v, self.layout.n_c
         x = np.concatenate([q, v, a, l])

@@ -6,9 +6,12 @@ iteration of the kernel ``kinematics`` from the last point.
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Callable, Sequence
 
-from ..errors import EvaluationError, ProjectionError
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import EvaluationError, ProjectionError, UsageError
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
@@ -24,17 +27,31 @@ class Path:
     def __init__(self, kernels: Kernels) -> None:
         self.layout = layout = kernels.layout
         self.fail = kernels.fail
-        self.kernel = kernels.state("kinematics", nan=True)
+        if layout.rank:
+            self.kernel = kernels.state("kinematics", nan=True)
         self.scales_i = layout.scales.q[layout.independent]
         self._still = np.zeros(2 * layout.n_dof)
 
-    def motion(self, q_i: Array, v_i: Array, a_i: Array, near: Array, t: float) -> Array:
-        """[q, v, a] (3 n,) by one Newton iteration from `near`."""
-        x = np.concatenate([q_i, v_i, a_i, near])
-        result = self.kernel(x, t=t)
+    def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:
+        """[q, v, a] (3 n,) by one Newton iteration from a guess, wherever it leads."""
+        layout = self.layout
+        if not layout.rank:
+            result = np.empty((3, layout.n_v))
+            result[:, layout.independent] = q_i, v_i, a_i
+            return result.ravel()
+        result = self.kernel(np.concatenate([q_i, v_i, a_i, guess]), t=t)
         if not np.isfinite(result).all():
             raise self._failure(q_i)
         return result
+
+    def motion(self, q_i: Array, v_i: Array, a_i: Array, near: Array, t: float) -> Array:
+        """[q, v, a] (3 n,) from a closed position not farther than one step."""
+        if not self.layout.rank:
+            return self.newton(q_i, v_i, a_i, near, t)
+        result = self.kernel(np.concatenate([q_i, v_i, a_i, near]), t=t)
+        if np.abs((result[: self.layout.n_q] - near) / self.layout.scales.q).max() <= JUMP:  # False for NaN
+            return result
+        return self.newton(q_i, v_i, a_i, self.advance(near, q_i, t), t)
 
     def advance(self, q: Array, target: Array, t: float, halvings: int = HALVINGS) -> Array:
         """From a closed q to independent values not farther than one step, in parts where that is too far."""
@@ -49,6 +66,8 @@ class Path:
 
     def walk(self, start: Array, target: Array, t: float) -> Array:
         """From a closed q along the straight line to independent values."""
+        if not self.layout.rank:
+            return start
         origin = start[self.layout.independent]
         way = target - origin
         steps = int(np.ceil(np.abs(way / self.scales_i).max() / STEP)) if way.size else 0
@@ -57,15 +76,14 @@ class Path:
             q = self.advance(q, target if k == steps else origin + k / steps * way, t)
         return q
 
-    def walk_all(self, start: Array, targets: Array, t: Array) -> list[Array]:
-        """The same for columns of targets (n_dof, k).
+    def walk_all(self, start: Array, targets: Array) -> list[Array]:
+        """The same for columns of targets (n_dof, k), at t = 0.
 
         With one degree of freedom all columns lie on one line.  It is walked once, over points at fixed distances from
         the start, so that the result of a column does not depend on the others.
         """
-        still = not np.any(t != t[0])
-        if self.layout.n_dof != 1 or not still:
-            return [self.walk(start, targets[:, j], float(t[j])) for j in range(targets.shape[1])]
+        if self.layout.n_dof != 1 or not self.layout.rank:
+            return [self.walk(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
         known: dict[int, list[Array]] = {1: [start], -1: [start]}
         origin, step = start[self.layout.independent[0]], STEP * self.scales_i[0]
         result = []
@@ -74,15 +92,70 @@ class Path:
             points = known[sign]
             count = int(abs(target - origin) / step)
             while len(points) <= count:
-                points.append(self.advance(points[-1], np.array([origin + sign * len(points) * step]), float(t[0])))
-            result.append(self.advance(points[count], np.array([target]), float(t[0])))
+                points.append(self.advance(points[-1], np.array([origin + sign * len(points) * step]), 0.0))
+            result.append(self.advance(points[count], np.array([target]), 0.0))
         return result
 
     def _failure(self, target: Array) -> EvaluationError:
         names = [self.layout.q[i] for i in self.layout.independent]
         where = place(names, target).removeprefix(", ")
         if self.kernel.failure is None:
-            return ProjectionError(f"the position {where} lies on another branch, or too near to a dead centre", 0.0, target)
+            return ProjectionError(
+                f"the position {where} lies on another branch, or too near to a dead centre", 0.0, target
+            )
         status, t, x = self.kernel.failure
         error = self.fail.exception("kinematics", status, t, x)
         return type(error)(f"the way to {where} is blocked: {error}", t, target)
+
+
+def motions(
+    path: Path,
+    reference: Callable[[float], Array],
+    given: Sequence[ArrayLike | None],
+    guess: Array | None,
+    t: Array,
+) -> Array:
+    """Positions, velocities and accelerations of the whole tree, each column for itself.
+
+    Parameters
+    ----------
+    path : Path
+    reference : callable
+        t -> the closed position (n,) to start from.
+    given : three arrays (n_dof,) or (n_dof, k), or None
+        q_i, v_i, a_i; None is zero.
+    guess : (n,) array, optional
+        Start of Newton's iteration instead of a walk.
+    t : () or (k,) array
+
+    Returns
+    -------
+    (3, n) or (3, n, k) array
+    """
+    layout = path.layout
+    n, size = layout.n_v, layout.n_dof
+    arrays = [None if part is None else np.asarray(part, dtype=float) for part in given]
+    columns = max((part.shape[1:] for part in arrays if part is not None), key=len)
+    parts = []
+    for name, part in zip(("q_i", "v_i", "a_i"), arrays, strict=True):
+        full = np.zeros((size, *columns)) if part is None else part
+        if full.shape not in ((size,), (size, *columns)) or full.ndim > 2:
+            raise UsageError(f"{name} must have shape ({size},) or ({size}, k), not {full.shape}")
+        if not np.isfinite(full).all():
+            raise UsageError(f"{name} must be finite")
+        parts.append(np.broadcast_to(full if full.shape[1:] == columns else full[:, None], (size, *columns)))
+    q, v, a = (part if columns else part[:, None] for part in parts)
+    times = np.broadcast_to(t, q.shape[1:])
+    if guess is not None:
+        if guess.shape != (layout.n_q,):
+            raise UsageError(f"guess must have shape ({layout.n_q},), not {guess.shape}")
+        near = [guess] * q.shape[1]
+    elif (times == 0.0).all():
+        near = path.walk_all(reference(0.0), q)
+    else:  # driven constraints have another reference at each time
+        near = [path.walk(reference(float(time)), q[:, j], float(time)) for j, time in enumerate(times)]
+    solve = path.motion if guess is None else path.newton
+    result = np.empty((3, n, q.shape[1]))
+    for j in range(q.shape[1]):
+        result[..., j] = solve(q[:, j], v[:, j], a[:, j], near[j], float(times[j])).reshape(3, n)
+    return result if columns else result[..., 0]

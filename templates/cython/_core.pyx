@@ -13,10 +13,9 @@ cimport numpy as cnp
 from cpython.pycapsule cimport PyCapsule_New
 from libc.math cimport NAN
 from libc.stdint cimport uintptr_t
-from libc.string cimport memcpy
+from libc.string cimport memcmp, memcpy
 
 import json
-
 import numpy as np
 
 cnp.import_array()
@@ -49,12 +48,10 @@ metadata = MODEL.metadata.decode()
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])
 sizes = {"n_p": MODEL.n_p, "n_u": MODEL.n_u, "n_const": MODEL.n_const, "n_work": MODEL.n_work}
 _FACTS = json.loads(metadata)
-#: Operations from which on a call lets other threads run: about 5 microseconds, a hundred times what that costs.
-_LONG = 20_000
+_LONG = 20_000  # operations from which on a call lets other threads run: 5 microseconds, 100 times what that costs
 
 
 cdef int find(str name, object error) except -1:
-    """Index of a kernel in the table."""
     if name not in names:
         raise error(f"model {MODEL.name.decode()!r} has no kernel {name!r}; it has {', '.join(names)}")
     return names.index(name)
@@ -124,14 +121,12 @@ cdef class Context:
             array.flags.writeable = False
 
 
-cdef struct Piece:
-    # One input of a kernel: n numbers `row` bytes apart, states `column` bytes apart.
+cdef struct Piece:  # one input of a kernel: n numbers `row` bytes apart, states `column` bytes apart
     char *data
     cnp.npy_intp n, row, column
 
 
-cdef struct Batch:
-    # One call of a kernel for `columns` states; w, x, y and u belong to this call.
+cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u belong to this call
     eomgen_function call
     Piece[3] pieces
     Piece time, inputs
@@ -157,7 +152,6 @@ cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
     """Gather the state and the inputs of one column; returns its time."""
     cdef double *x = batch.x
     cdef double t
-    cdef int i
     for i in range(batch.n_pieces):
         gather(&batch.pieces[i], column, x)
         x += batch.pieces[i].n
@@ -168,8 +162,8 @@ cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
 
 cdef cnp.npy_intp sweep(const Batch *batch, double *result, int *status) noexcept nogil:
     """Evaluate all columns into the (n_out, columns) result; returns the first column that failed, or -1."""
-    cdef cnp.npy_intp failed = -1, j
-    cdef int i, code
+    cdef cnp.npy_intp failed = -1, i, j
+    cdef int code
     cdef double t
     for j in range(batch.columns):
         t = load(batch, j)
@@ -211,22 +205,20 @@ cdef class Kernel:
     cdef const double *c
     cdef const double *u
     cdef int n_in, n_out, ndim
-    cdef bint long
+    cdef bint long, tolerant
     cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
     cdef object fail, error
-    cdef readonly str name
-    cdef readonly tuple shape
-    cdef readonly bint nan
-    cdef readonly Context context
+    cdef readonly object name, shape, nan, context
     cdef public object failure
 
-    def __cinit__(self, str name not None, Context context not None, shape, fail, bint nan=False, error=ValueError):
+    def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
         cdef int index = find(name, error)
-        self.name, self.context, self.fail, self.nan, self.error = name, context, fail, nan, error
+        self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
         self.call = MODEL.kernels[index].call
         self.n_in, self.n_out = MODEL.kernels[index].n_in, MODEL.kernels[index].n_out
         self.c = <const double *>cnp.PyArray_DATA(context.c)
         self.u = <const double *>cnp.PyArray_DATA(context.u)
+        self.tolerant = nan
         self.shape = tuple(shape)
         self.ndim = len(self.shape)
         if self.ndim > MAX_DIMENSIONS or np.prod(self.shape, dtype=int) != self.n_out:
@@ -239,57 +231,55 @@ cdef class Kernel:
     def __repr__(self):
         return f"<{type(self).__name__} kernel {self.name} of {MODEL.name.decode()}: ({self.n_in},) -> {self.shape}>"
 
-    cdef inline bint is_plain(self, object x) noexcept:
-        """Whether x can be used as it is: float64, one state, contiguous."""
-        return (cnp.PyArray_Check(x) and cnp.PyArray_TYPE(<cnp.ndarray>x) == cnp.NPY_DOUBLE
-                and cnp.PyArray_NDIM(<cnp.ndarray>x) == 1 and cnp.PyArray_DIM(<cnp.ndarray>x, 0) == self.n_in
-                and cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x))
-
-    cdef inline bint is_target(self, cnp.ndarray out, const double *x) noexcept:
+    cdef inline bint is_target(self, object out, const double *x) noexcept:
         """Whether the kernel can write into out: float64, right shape, contiguous, apart from x."""
-        cdef const double *data = <const double *>cnp.PyArray_DATA(out)
-        cdef int i
-        if (cnp.PyArray_TYPE(out) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(out) != self.ndim
-                or not cnp.PyArray_ISCARRAY(out) or (data < x + self.n_in and x < data + self.n_out)):
+        if not (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
+                and cnp.PyArray_NDIM(<cnp.ndarray>out) == self.ndim and cnp.PyArray_ISCARRAY(<cnp.ndarray>out)
+                and memcmp(cnp.PyArray_DIMS(<cnp.ndarray>out), self.dims, self.ndim * sizeof(cnp.npy_intp)) == 0):
             return False
-        for i in range(self.ndim):
-            if cnp.PyArray_DIM(out, i) != self.dims[i]:
-                return False
-        return True
+        cdef const double *data = <const double *>cnp.PyArray_DATA(<cnp.ndarray>out)
+        return data >= x + self.n_in or x >= data + self.n_out
 
-    cdef object evaluate(self, double t, const double *x, object out):
-        """The fast way: one plain state with the context's values; None if out needs the general way."""
+    cdef object evaluate(self, object t, object x, object p, object u, object out):
+        """The fast way for one contiguous float64 state and the context's values; all else goes the general way."""
         cdef double[STACK] stack
         cdef double *w = stack
         cdef double *data
+        cdef const double *state
+        cdef double now
         cdef cnp.npy_intp n_work = MODEL.n_work
         cdef int status, i
+        if (p is not None or u is not None or not cnp.PyArray_Check(x)
+                or cnp.PyArray_TYPE(<cnp.ndarray>x) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(<cnp.ndarray>x) != 1
+                or cnp.PyArray_DIM(<cnp.ndarray>x, 0) != self.n_in or not cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x)):
+            return self.general(t, [("x", self.n_in, x)], p, u, out)
+        now = t
+        state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
         if out is None:
             out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
-        elif not (cnp.PyArray_Check(out) and self.is_target(<cnp.ndarray>out, x)):
-            return None
+        elif not self.is_target(out, state):
+            return self.general(t, [("x", self.n_in, x)], p, u, out)
         data = <double *>cnp.PyArray_DATA(<cnp.ndarray>out)
         if n_work > STACK:
             heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
         if self.long:
             with nogil:
-                status = self.call(t, x, self.u, self.c, data, w)
+                status = self.call(now, state, self.u, self.c, data, w)
         else:
-            status = self.call(t, x, self.u, self.c, data, w)
+            status = self.call(now, state, self.u, self.c, data, w)
         if status != 0:
             for i in range(self.n_out):
                 data[i] = NAN
-            self.report(status, t, copy(x, self.n_in))
+            self.report(status, now, copy(state, self.n_in))
         return out
 
     cdef int report(self, int status, double t, cnp.ndarray x) except -1:
         """Remember a recoverable failure where NaN is wanted, else raise."""
-        if self.nan and status > 0:
-            self.failure = (status, t, x)
-            return 0
-        self.fail(self.name, status, t, x)
-        raise RuntimeError(f"kernel {self.name!r} failed with status {status} at t = {t}")
+        if not self.tolerant or status < 0:
+            self.fail(self.name, status, t, x)
+            raise RuntimeError(f"kernel {self.name!r} failed with status {status} at t = {t}")
+        self.failure = (status, t, x)
 
     cdef object general(self, object t, list values, object p, object u, object out):
         """Any arrays: values are (label, length, array_like) in the order the kernel wants them, at most three."""
@@ -298,7 +288,7 @@ cdef class Kernel:
         cdef int i, status = 0
         cdef double now = 0
         cdef list held = []
-        batch.call, batch.c, batch.nan = self.call, self.c, self.nan
+        batch.call, batch.c, batch.nan = self.call, self.c, self.tolerant
         batch.n_pieces, batch.n_out = len(values), self.n_out
         for i in range(batch.n_pieces):
             label, length, value = values[i]
@@ -312,15 +302,13 @@ cdef class Kernel:
         if u is not None:
             held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))
         if p is not None:
-            held.append(compute_constants(vector(p, MODEL.n_p, "p", self.error), self.error))
-            batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>held[-1])
+            constants = compute_constants(vector(p, MODEL.n_p, "p", self.error), self.error)
+            batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
         cdef cnp.ndarray result = self.target(out, held, columns)
-        batch.columns = 1 if columns < 0 else columns
         cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
-        batch.x = batch.w + MODEL.n_work
-        batch.y = batch.x + self.n_in
+        batch.columns, batch.x, batch.y = abs(columns), batch.w + MODEL.n_work, batch.w + MODEL.n_work + self.n_in
         batch.u = batch.y + self.n_out
         if self.long or columns > 1:
             with nogil:
@@ -330,10 +318,9 @@ cdef class Kernel:
         if failed >= 0:
             now = load(&batch, failed)
             self.report(status, now, copy(batch.x, self.n_in))
-        if out is None or out is result:
-            return result
-        out[...] = result
-        return out
+        if out is not None and out is not result:
+            out[...] = result
+        return result if out is None else out
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):
         """Describe an input of shape (n,) or (n, k) by a piece; columns is k, -1 for a vector, -2 while unknown."""
@@ -377,11 +364,7 @@ cdef class Timed(Kernel):
         p (n_p,) and u, (n_u,) or (n_u, k), replace the context's; out is a float64 array of the result's shape,
         ``shape`` or ``(*shape, k)``.
         """
-        if p is None and u is None and self.is_plain(x):
-            result = self.evaluate(t, <const double *>cnp.PyArray_DATA(<cnp.ndarray>x), out)
-            if result is not None:
-                return result
-        return self.general(t, [("x", self.n_in, x)], p, u, out)
+        return self.evaluate(t, x, p, u, out)
 
 
 cdef class State(Kernel):
@@ -389,11 +372,7 @@ cdef class State(Kernel):
 
     def __call__(self, x, p=None, u=None, out=None, t=0.0):
         """Evaluate at state x; arguments as for Timed."""
-        if p is None and u is None and self.is_plain(x):
-            result = self.evaluate(t, <const double *>cnp.PyArray_DATA(<cnp.ndarray>x), out)
-            if result is not None:
-                return result
-        return self.general(t, [("x", self.n_in, x)], p, u, out)
+        return self.evaluate(t, x, p, u, out)
 
 
 cdef class Motion(Kernel):

@@ -41,7 +41,8 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     form_transformation(width, parts, w);
     for (int i = 0; i < N; i++) {
         for (int k = 0; k <= i; k++) {
-            mass[i * N + k] = mass[k * N + i] = packed[i * (i + 1) / 2 + k] * s[i] * s[k];
+            mass[i * N + k] = packed[i * (i + 1) / 2 + k] * s[i] * s[k];
+            mass[k * N + i] = mass[i * N + k];
         }
         h[i] = bias[i] * s[i];
         scaled[i] = 0.0;

@@ -23,7 +23,8 @@ static int drive_embedded_mass_matrix(double t, const double *restrict x, const 
     for (int i = 0; i < F; i++) {
         for (int k = 0; k <= i; k++) {
             const double unit = s[parts.independent[i]] * s[parts.independent[k]];
-            out[i * F + k] = out[k * F + i] = embedded[i * F + k] / unit;
+            out[i * F + k] = embedded[i * F + k] / unit;
+            out[k * F + i] = out[i * F + k];
         }
     }
     return 0;

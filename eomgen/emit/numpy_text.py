@@ -1,0 +1,141 @@
+"""Stage emit: a straight-line block -> Python functions of NumPy operations, for one state or k states at once.
+
+Every operation means what :mod:`eomgen.graph.evaluate` makes of it on arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..graph.substitute import symbols_of
+from ..program import Block, Program
+from .straight import CONDITIONS, Piece, Pieces, cut, references
+
+PATTERNS: dict[str, str] = {
+    "add": "{} + {}",
+    "sub": "{} - {}",
+    "mul": "{} * {}",
+    "div": "{} / {}",
+    "neg": "-{}",
+    "pow": "np.power({}, {})",
+    "asin": "np.arcsin({})",
+    "acos": "np.arccos({})",
+    "atan": "np.arctan({})",
+    "atan2": "np.arctan2({}, {})",
+    "min": "np.minimum({}, {})",
+    "max": "np.maximum({}, {})",
+    **{name: f"np.{name}({{}})" for name in
+       ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "abs", "sign")},
+}  # fmt: skip
+
+CONDITION_PATTERNS: dict[str, str] = {
+    "lt": "np.less({}, {})",
+    "le": "np.less_equal({}, {})",
+    "eq": "np.equal({}, {})",
+    "not": "np.logical_not({})",
+    "and": "np.logical_and({}, {})",
+    "or": "np.logical_or({}, {})",
+}
+
+
+class _Printer:
+    def __init__(self, program: Program, references: dict[int, str]) -> None:
+        self._nodes = program.graph.nodes
+        self._fixed = references
+        self._variables: dict[int, str] = {}
+
+    def _name(self, i: int) -> str:
+        return self._variables.setdefault(i, f"v{len(self._variables)}")
+
+    def operand(self, i: int) -> str:
+        node = self._nodes[i]
+        if node[0] == "const":
+            text = repr(node[1])
+            return f"({text})" if text.startswith("-") else text
+        return self._fixed.get(i) or self._name(i)
+
+    def condition(self, i: int, piece: Piece) -> str:
+        if i in piece.inlined:
+            node = self._nodes[i]
+            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+        return f"np.not_equal({self.operand(i)}, 0.0)"
+
+    def _value(self, i: int, piece: Piece) -> str:
+        node = self._nodes[i]
+        if node[0] == "select":
+            return f"np.where({self.condition(node[1], piece)}, {self.operand(node[2])}, {self.operand(node[3])})"
+        if node[0] in CONDITIONS:
+            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:])) + " * 1.0"
+        return PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+
+    def lines(self, piece: Piece) -> list[str]:
+        result = [f"{self._name(i)} = w[{slot}]" for i, slot in sorted(piece.loads.items(), key=lambda pair: pair[1])]
+        for i in piece.statements:
+            if i not in piece.inlined:
+                result.append(f"{self._name(i)} = {self._value(i, piece)}")
+            if i in piece.checks:
+                passed = self.condition(i, piece) if i in piece.inlined else f"np.less(0.0, {self.operand(i)})"
+                result.append(f"good.append({passed})")
+            result += [f"out[{k}] = {self._name(i)}" for k in piece.results.get(i, ())]
+            if i in piece.stores:
+                result.append(f"w[{piece.stores[i]}] = {self._name(i)}")
+        return result
+
+
+def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:
+    body = "\n".join(f"    {line}" for line in [f'"""{doc}"""', *lines])
+    return f"def {name}({arguments}):\n{body}\n"
+
+
+def print_block(program: Program, block: Block) -> str:
+    """The functions of a block, the last of them ``<name>(t, x, u, c)``."""
+    pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
+    printer = _Printer(program, references(program, block.inputs))
+    start = [f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
+    if program.time in symbols_of((*block.outputs, *block.checks)):
+        start.append("t = np.asarray(t, dtype=float)[()]")  # never a Python float, whose division by zero raises
+    if block.checks:
+        start.append("good = []")
+    end = ["for condition in good:", "    out = np.where(condition, out, np.nan)"] if block.checks else []
+    ports = " ".join(port.name for port in block.ports)
+    return _print_pieces(printer, block.name, f"[{ports}] -> ({block.n_out}, ...)", pieces, start, [*end, "return out"])
+
+
+def print_precompute(program: Program) -> str:
+    """``precompute(p)``: the constants c that the blocks read."""
+    graph, n = program.graph, len(program.parameters)
+    pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
+    printer = _Printer(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
+    start = [
+        "t = u = c = None",
+        "x = np.array(p, dtype=float)",
+        f"result = np.concatenate([x, np.empty({len(program.hoisted)})])",
+        f"out = result[{n}:]",
+    ]
+    text = _print_pieces(printer, "precompute", "Constants c from the parameters p.", pieces, start, ["return result"])
+    return text.replace("def precompute(t, x, u, c):", "def precompute(p):")
+
+
+def _print_pieces(
+    printer: _Printer, name: str, doc: str, pieces: Pieces, start: Sequence[str], end: Sequence[str]
+) -> str:
+    main = [*start, *_direct(printer, pieces)]
+    main += [f"good.append(np.less(0.0, {printer.operand(i)}))" for i in pieces.checks]
+    functions = []
+    if len(pieces.pieces) == 1:
+        main += printer.lines(pieces.pieces[0])
+    elif pieces.pieces:
+        good = ", good" if any(line == "good = []" for line in start) else ""
+        main.append(f"w = [None] * {pieces.work}")
+        for k, piece in enumerate(pieces.pieces):
+            arguments = f"t, x, u, c, out, w{good}"
+            functions.append(_function(f"_{name}_{k}", arguments, f"Part {k} of {name}.", printer.lines(piece)))
+            main.append(f"_{name}_{k}({arguments})")
+    functions.append(_function(name, "t, x, u, c", doc, [*main, *end]))
+    return "\n\n".join(functions)
+
+
+def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
+    texts = [(k, printer.operand(i)) for k, i in pieces.direct]
+    lines = [f"out[{k}] = {text}" for k, text in texts if text != "0.0"]
+    return ["out[...] = 0.0", *lines] if len(lines) < len(texts) else lines

@@ -1,0 +1,375 @@
+"""Stage runtime: a core (compiled extension or NumPy) -> Module, the calls a user makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from . import report
+from .initial import Initial
+from .kernels import Core, Kernels, Motion, Rows, State, Timed
+from .layout import Layout, number
+from .minimal import Minimal
+from .paths import Path, motions
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+
+class Module:
+    """A model ready to be evaluated and simulated.
+
+    ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
+    ``x_names``.  Every state may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last
+    axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None``
+    to write into; calls of positions alone take ``t=0.0`` too.  A call that fails raises an
+    :class:`~..errors.EvaluationError` with the time and the state.
+
+    Parameters
+    ----------
+    core : extension module or NumpyCore
+    p, u : mapping of str to float, or arrays (n_p,), (n_u,), optional
+        Parameters and inputs to bind; the declared values by default.
+
+    Attributes
+    ----------
+    name, doc : str
+    q_names, v_names, x_names, u_names, p_names, y_names, body_names : tuple of str
+        What the entries of each vector are called.
+    loop_names : tuple of str
+        Coordinates of the joints that were cut; they can be given as initial values and read from results.
+    n_q, n_v, n_x, n_u, n_p, n_y, n_c, n_dof, n_bodies : int
+        Sizes; n_c counts all constraint rows.
+    p, u : arrays
+        The parameters and inputs bound.
+    rhs : callable
+        ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
+    jacobian : callable
+        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.
+    bias : callable
+        ``bias(t, x)`` -> h (n_v,) in ``M v' + h`` = generalized forces that are not in the model.
+    outputs : callable
+        ``outputs(t, x)`` -> (n_y,).
+    mass_matrix, embedded_mass_matrix : callable
+        ``mass_matrix(q)`` -> (n_v, n_v) of the tree; (n_dof, n_dof) of the independent coordinates.
+    inverse_dynamics : callable
+        ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.
+    energy : callable
+        ``energy(x)`` -> (T, V) in J.
+    constraints, constraint_jacobian : callable
+        ``constraints(q)`` -> (n_c,) in m and rad, (n_c, n_v): independent rows; ``rows="all"`` for all of them.
+    project : callable
+        ``project(x, t=0.0)`` -> the nearest x on the constraints.
+    poses : callable
+        ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
+    """
+
+    rhs: Timed
+    jacobian: Timed
+    bias: Timed
+    outputs: Timed
+    mass_matrix: State
+    embedded_mass_matrix: State
+    energy: State
+    project: State
+    poses: State
+    inverse_dynamics: Motion
+    constraints: Rows
+    constraint_jacobian: Rows
+
+    def __init__(self, core: Core, p: Any = None, u: Any = None) -> None:
+        self.core = core
+        self.layout = layout = Layout(core.metadata)
+        self._setup(core, layout, self._declared("parameter", p), self._declared("input", u))
+
+    def _declared(self, what: str, given: Any) -> Any:
+        layout = self.layout
+        names, key = (layout.p, "p_values") if what == "parameter" else (layout.u, "u_values")
+        if not isinstance(given, Mapping):
+            return given
+        current = np.array([np.nan if value is None else value for value in layout.metadata[key]], dtype=float)
+        return layout.values(what, names, given, current)
+
+    def _setup(self, core: Core, layout: Layout, p: Any, u: Any) -> None:
+        self.kernels = kernels = Kernels(core, layout, p, u)
+        self.metadata = layout.metadata
+        self.name, self.doc = layout.name, str(layout.metadata.get("doc") or "")
+        self.q_names, self.v_names, self.x_names = layout.q, layout.v, layout.x
+        self.u_names, self.p_names, self.y_names = layout.u, layout.p, layout.y
+        self.body_names, self.loop_names = layout.bodies, layout.loops
+        self.n_q, self.n_v, self.n_x, self.n_u, self.n_p = layout.n_q, layout.n_v, layout.n_x, layout.n_u, layout.n_p
+        self.n_y, self.n_c, self.n_dof, self.n_bodies = layout.n_y, layout.n_c, layout.n_dof, layout.n_bodies
+        self.rhs, self.jacobian = kernels.timed("rhs"), kernels.timed("jacobian")
+        self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
+        self.mass_matrix, self.embedded_mass_matrix = (
+            kernels.state("mass_matrix"),
+            kernels.state("embedded_mass_matrix"),
+        )
+        self.energy, self.project, self.poses = (kernels.state(name) for name in ("energy", "project", "poses"))
+        self.inverse_dynamics = kernels.motion("inverse_dynamics")
+        self.constraints, self.constraint_jacobian = kernels.constraints, kernels.constraint_jacobian
+
+    @property
+    def p(self) -> Array:
+        """A copy of the parameters bound, (n_p,)."""
+        return np.array(self.kernels.context.p)
+
+    @property
+    def u(self) -> Array:
+        """A copy of the inputs bound, (n_u,)."""
+        return np.array(self.kernels.context.u)
+
+    def bind(self, p: Any = None, u: Any = None) -> Module:
+        """The same model with other parameters and inputs.
+
+        Parameters
+        ----------
+        p, u : mapping of str to float, or arrays (n_p,), (n_u,), optional
+            A mapping changes those it names; None keeps what is bound here.
+
+        Returns
+        -------
+        Module
+
+        Raises
+        ------
+        UsageError
+            An unknown name or a wrong shape.
+        """
+        layout = self.layout
+        other = object.__new__(type(self))
+        other.core, other.layout = self.core, layout
+        new_p = layout.values("parameter", layout.p, p, self.p)
+        other._setup(self.core, layout, new_p, layout.values("input", layout.u, u, self.u))
+        return other
+
+    # assembly
+
+    def x0(
+        self,
+        values: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> Array:
+        """An assembled state.
+
+        Parameters
+        ----------
+        values, **named : float
+            Coordinates and velocities (``theta``, ``theta_dot``) of the tree or of cut joints, held exactly; the rest
+            is solved.  Without any, the declared initial values are held; else they are kept where they leave room.
+        t : float
+            Time (s); matters for driven constraints only.
+        p, u : optional
+            As for :meth:`bind`.
+
+        Returns
+        -------
+        (n_x,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close with these values, or the values contradict each other.
+        UsageError
+            An unknown name.
+        """
+        initial = self._initial(t, p, u)
+        given = initial.sort(_numbers(values, named))
+        q = initial.assembled(given.positions)
+        v = initial.velocities(q, given.rates if given.positions or given.rates else None)
+        return np.concatenate([q, v])
+
+    def assemble(
+        self,
+        guess: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> Array:
+        """Close the loops from a guess.
+
+        Parameters
+        ----------
+        guess, **named : float
+            Coordinates of the tree or of cut joints.  They are kept as far as the loops allow, the independent ones
+            first; the others tell the branches apart.  What is not named starts from the declared initial position.
+        t, p, u
+            As for :meth:`x0`.
+
+        Returns
+        -------
+        (n_q,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close.
+        """
+        initial = self._initial(t, p, u)
+        values = _numbers(guess, named)
+        given = initial.sort(values)
+        if given.rates:
+            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
+        return initial.from_guess(values) if values else initial.assembled({})
+
+    def branches(
+        self,
+        values: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> list[Array]:
+        """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
+
+        The search is bounded and repeats exactly; it may miss a branch.
+        """
+        initial = self._initial(t, p, u)
+        given = initial.sort(_numbers(values, named)).positions
+        first = initial.assembled(given)
+        return initial.branches(given or initial.sort(self.layout.initial).positions, first)
+
+    def branch(self, x: ArrayLike, t: float = 0.0) -> int:
+        """Which side of the dead centres a state or position lies on.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_q,) array
+
+        Returns
+        -------
+        int
+            1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
+            coordinates.
+        """
+        initial = self._initial(t, None, None)
+        here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
+        there = initial.side(initial.reference())
+        return 0 if abs(here) < 1e-8 else int(np.sign(here * (np.sign(there) or 1.0)))
+
+    def _initial(self, t: float, p: Any, u: Any) -> Initial:
+        module = self if p is None and u is None else self.bind(p, u)
+        return Initial(module.kernels, t)
+
+    # kinematics
+
+    @cached_property
+    def _path(self) -> tuple[Path, Callable[[float], Array]]:
+        return Path(self.kernels), lru_cache(lambda t: Initial(self.kernels, t).reference())
+
+    def kinematics(
+        self,
+        q_i: ArrayLike,
+        v_i: ArrayLike | None = None,
+        a_i: ArrayLike | None = None,
+        guess: ArrayLike | None = None,
+        t: ArrayLike = 0.0,
+        p: Any = None,
+        u: Any = None,
+    ) -> tuple[Array, Array, Array]:
+        """Motion of the whole tree from that of the independent coordinates.
+
+        A pure function: the dependent coordinates are found by leading the independent ones from the declared initial
+        position in small steps along a straight line, so that the branch is that of this position.  Each column of a
+        batch is found for itself.
+
+        Parameters
+        ----------
+        q_i, v_i, a_i : (n_dof,) or (n_dof, k) arrays
+            Independent coordinates (``minimal.q_names``), velocities and accelerations; zero by default.
+        guess : (n_q,) array, optional
+            Start Newton's iteration here instead, and take the branch it leads to.
+        t : float or (k,) array
+        p, u : optional
+            As for :meth:`bind`.
+
+        Returns
+        -------
+        q, v, a : (n,) or (n, k) arrays
+
+        Raises
+        ------
+        ProjectionError, PartitionError
+            The position is out of reach, or the way to it leads through a dead centre.
+        """
+        if p is not None or u is not None:
+            return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
+        path, reference = self._path
+        start = None if guess is None else np.asarray(guess, dtype=float)
+        q, v, a = motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
+        return q, v, a
+
+    @cached_property
+    def minimal(self) -> Minimal:
+        """The strictly minimal form, ``x = [q_i; v_i]``; see :class:`~.minimal.Minimal`."""
+        return Minimal(self)
+
+    # integration
+
+    def simulate(
+        self,
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Mapping[str, Any] | None = None,
+        *,
+        method: Any = None,
+        **options: Any,
+    ) -> Trajectory:
+        """Integrate the equations of motion; see :func:`~.simulate.simulate` for all arguments.
+
+        Parameters
+        ----------
+        span : (float, float) or float, optional
+            Start and end (s); the end alone for a start at 0; the model's own end by default.
+        initial : mapping of str to float, or (n_x,) array, optional
+            Named values as for :meth:`x0`, or a state.
+        parameters : mapping of str to float, or (n_p,) array, optional
+        inputs : mapping of str to number, (times, values) or callable f(t, x), optional
+        method : str or OdeSolver subclass, optional
+        **options
+            rtol, atol, t_eval, events, dense_output, max_step, first_step, progress.
+
+        Returns
+        -------
+        Trajectory
+        """
+        from .simulate import simulate
+
+        return simulate(self, span, initial, parameters, inputs, method=method, **options)
+
+    # description
+
+    def report(self) -> str:
+        """What the model is made of, as text."""
+        return report.text(self)
+
+    def __repr__(self) -> str:
+        n = self.n_dof
+        return (
+            f"<Module {self.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{report.listed(self.x_names)}]>"
+        )
+
+    def _repr_html_(self) -> str:
+        return report.html(self)
+
+
+def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:
+    merged = {**(values or {}), **named}
+    return {name: number(name, value) for name, value in merged.items()}

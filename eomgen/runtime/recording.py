@@ -1,0 +1,146 @@
+"""Stage runtime: Module and an integrator's solution -> Trajectory: projected states, residuals, lazy columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..numeric.projection import largest
+from ..numeric.scales import Array
+from .integrate import Solution
+from .signals import Forcing
+from .trajectory import Residuals, Trajectory
+
+if TYPE_CHECKING:
+    from .module import Module
+
+
+class Columns:
+    """Everything that can be read from the states of a run, evaluated when first asked for.
+
+    Parameters
+    ----------
+    module : Module
+        With the parameters and constant inputs of the run bound.
+    t : (n_t,) array
+    x : (n_x, n_t) array
+        Projected.
+    u : (n_u, n_t) array
+    """
+
+    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
+        self.module, self.t, self.x, self.u = module, t, x, u
+        layout = module.layout
+        loops = layout.loops + layout.loop_rates + layout.loop_accelerations
+        self._groups: list[tuple[tuple[str, ...], Callable[[], Array]]] = [
+            (layout.x, lambda: self.x),
+            (layout.a, self._accelerations),
+            (loops, self._loops),
+            (layout.y, self._outputs),
+            (layout.u, lambda: self.u),
+            (("T", "V", "energy"), self._energies),
+        ]
+        self._known: dict[str, Array] = {}
+        # an output may repeat the coordinate of its own name; the coordinate wins
+        self.names = tuple(dict.fromkeys(name for names, _ in self._groups for name in names))
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._known:
+            names, evaluate = next(group for group in self._groups if name in group[0])
+            for key, row in zip(names, evaluate(), strict=True):
+                self._known.setdefault(key, row)
+        return self._known[name]
+
+    def _varying(self) -> Array | None:
+        return self.u if self.u.size else None
+
+    def _accelerations(self) -> Array:
+        return self.module.rhs(self.t, self.x, u=self._varying())[self.module.n_q :]
+
+    def _outputs(self) -> Array:
+        return self.module.outputs(self.t, self.x, u=self._varying())
+
+    def _loops(self) -> Array:
+        layout = self.module.layout
+        if not layout.n_k:
+            return np.empty((0, len(self.t)))
+        a = np.array([self[name] for name in layout.a])
+        q, v = self.x[: layout.n_q], self.x[layout.n_q :]
+        y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
+        angles = layout.loop_angles
+        y[0, angles] = np.unwrap(y[0, angles], axis=-1)
+        return y.reshape(3 * layout.n_k, -1)
+
+    def _energies(self) -> Array:
+        T, V = self.module.energy(self.x, u=self._varying(), t=self.t)
+        return np.array([T, V, T + V])
+
+
+def record(module: Module, forcing: Forcing, solution: Solution, method: str, options: dict[str, Any]) -> Trajectory:
+    """Project the solution and put the trajectory together.
+
+    Raises
+    ------
+    ProjectionError
+        A stored state cannot be brought onto the constraints.
+    """
+    layout = module.layout
+    residuals, x = project(module, solution.t, solution.x)
+    header: dict[str, Any] = {
+        "name": module.name,
+        "q_names": list(layout.q),
+        "v_names": list(layout.v),
+        "x_names": list(layout.x),
+        "loop_names": list(layout.loops),
+        "y_names": list(layout.y),
+        "u_names": list(layout.u),
+        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
+        "model_method": layout.metadata.get("method"),
+        "docs": layout.metadata.get("docs", {}),
+        "method": method,
+        "rtol": _plain(options.get("rtol")),
+        "atol": _plain(options.get("atol")),
+        "span": list(solution.ends),
+        "status": solution.status,
+        "message": solution.message,
+        **solution.counts,
+        "residuals": residuals._asdict(),
+    }
+    columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
+    header["units"] = {name: layout.unit(name) for name in ("t", *columns.names) if layout.unit(name)}
+    events = [project(module, t, found)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)]
+    dense = solution.dense
+    sample: Callable[[Array], Trajectory] | None = None
+    if dense is not None:
+
+        def sample(t: Array) -> Trajectory:
+            found, states = project(module, t, dense(t))
+            head = header | {"residuals": found._asdict()}
+            return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
+
+    return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
+
+
+def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
+    """Projected states (n_x, k), and how far the raw ones were off."""
+    n = module.n_q
+    if not module.n_c or not t.size:
+        return Residuals(), np.array(raw)
+    x = module.project(raw, t=t)
+    position = module.constraints.every
+    velocity = module.kernels.state("velocity_constraints")
+    correction = np.abs(x - raw)
+    return Residuals(
+        raw_position=largest(position(raw[:n], t=t)),
+        raw_velocity=largest(velocity(raw, t=t)),
+        position=largest(position(x[:n], t=t)),
+        velocity=largest(velocity(x, t=t)),
+        correction_position=float(correction[:n].max()),
+        correction_velocity=float(correction[n:].max()),
+    ), x
+
+
+def _plain(value: Any) -> Any:
+    return np.asarray(value).tolist() if value is not None else None

@@ -1,0 +1,67 @@
+"""Stage runtime: a module -> a short description of it, as text and as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .module import Module
+
+SHOWN = 12  #: names listed
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names separated by commas, cut when there are many."""
+    text = ", ".join(names[:SHOWN])
+    return f"{text}, ... ({len(names)})" if len(names) > SHOWN else text or "-"
+
+
+def facts(module: Module) -> list[tuple[str, str]]:
+    """Label and value of each line of the report."""
+    layout, data = module.layout, module.metadata
+    lines = [
+        ("degrees of freedom", str(layout.n_dof)),
+        ("coordinates", listed(layout.q)),
+    ]
+    if layout.n_c:
+        lines.append(("independent", listed([layout.q[i] for i in layout.independent])))
+        lines.append(("cut joints", listed(data.get("loop_joint_names", ()))))
+        redundant = [layout.constraint_labels[i] for i in data.get("redundant_rows", ())]
+        rows = f"{layout.n_c}" + (f", redundant at the reference: {listed(redundant)}" if redundant else "")
+        lines.append(("constraint rows", rows))
+    if layout.loops:
+        lines.append(("loop coordinates", listed(layout.loops)))
+    p = module.kernels.context.p
+    values = [f"{name} = {value:.6g}" for name, value in zip(layout.p, p, strict=True)]
+    lines += [
+        ("bodies", listed(layout.bodies)),
+        ("parameters", listed(values)),
+        ("inputs", listed(layout.u)),
+        ("outputs", listed(layout.y)),
+        ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
+    ]
+    counts = data.get("operations", {}).get("rhs")
+    if counts:
+        lines.append(("operations of rhs", ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)))
+    return lines
+
+
+def text(module: Module) -> str:
+    """Several lines of plain text."""
+    lines = facts(module)
+    width = max(len(label) for label, _ in lines)
+    head = module.name + (f": {module.doc}" if module.doc else "")
+    return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
+
+
+def html(module: Module) -> str:
+    """A small table for notebooks."""
+    from html import escape
+
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(label)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
+        for label, value in facts(module)
+    )
+    doc = f"<p>{escape(module.doc)}</p>" if module.doc else ""
+    return f"<b>{escape(module.name)}</b>{doc}<table>{rows}</table>"

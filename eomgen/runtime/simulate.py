@@ -1,0 +1,232 @@
+"""Stage runtime: Module, span, initial values, parameters, inputs -> Trajectory, through SciPy's integrators."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import EvaluationError, SimulationError, UsageError
+from ..numeric.scales import Array
+from .integrate import Event, Solution, choose_solver, integrate, takes_jacobian
+from .kernels import Timed
+from .layout import number
+from .progress import Progress, wanted
+from .recording import record
+from .signals import Forcing
+
+if TYPE_CHECKING:
+    from .module import Module
+    from .trajectory import Trajectory
+
+DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
+
+
+def simulate(
+    module: Module,
+    span: float | tuple[float, float] | None = None,
+    initial: Mapping[str, float] | ArrayLike | None = None,
+    parameters: Any = None,
+    inputs: Mapping[str, Any] | None = None,
+    *,
+    method: Any = None,
+    rtol: float | None = None,
+    atol: Any = None,
+    t_eval: ArrayLike | None = None,
+    events: Any = None,
+    dense_output: bool = False,
+    max_step: float | None = None,
+    first_step: float | None = None,
+    progress: bool | None = None,
+    **options: Any,
+) -> Trajectory:
+    """Integrate the equations of motion.
+
+    Parameters
+    ----------
+    module : Module
+    span : (float, float) or float, optional
+        Start and end (s); the end alone for a start at 0; the model's own end by default.
+    initial : mapping of str to float, or (n_x,) array, optional
+        Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints.
+    parameters : mapping of str to float, or (n_p,) array, optional
+        Those not named keep their bound values.
+    inputs : mapping of str to number, (times, values) or callable f(t, x), optional
+        Tables are linear in between and constant outside; their corners are stepped on exactly.
+    method : str or OdeSolver subclass, optional
+        A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  Implicit ones get the exact Jacobian.
+    rtol, atol : float, optional
+        The model's own, or 1e-8 and 1e-10.
+    t_eval : (n_t,) array, optional
+        Times to store; the solver's steps by default.
+    events : callable or list of callables f(t, x), optional
+        With SciPy's attributes ``terminal`` and ``direction``.
+    dense_output : bool
+        Keep a continuous solution for ``Trajectory.at``.
+    max_step, first_step : float, optional
+    progress : bool, optional
+        Show progress on stderr; by default for runs of more than two seconds on a terminal.
+    **options
+        Passed on to the solver.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    SimulationError
+        The integration ended early or met a state that is not finite; its cause is the last failure of a kernel.
+    AssemblyError
+        The initial values do not fit the loops.
+    EvaluationError
+        The right-hand side cannot be evaluated at the initial state.
+    UsageError
+        Unknown names, wrong shapes.
+    MissingDependencyError
+        SciPy is not installed.
+    """
+    declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+    solver = choose_solver(declared["method"] if method is None else method)
+    start, end = _span(span, float(declared["end"]))
+    forcing = Forcing(module.layout, inputs)
+    bound = module.bind(parameters, forcing.constants)
+    forcing.base = bound.u
+    x0 = _initial_state(bound, initial, start)
+    bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
+    run = _Run(bound, forcing)
+    options = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol} | {
+        key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None
+    } | options  # fmt: skip
+    if takes_jacobian(solver):
+        options.setdefault("jac", run.jacobian)
+    watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
+    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    nodes = [start, *forcing.corners(start, end), end]
+    stored = None if t_eval is None else _times(t_eval, start, end)
+    try:
+        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+            solution = integrate(
+                run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
+            )
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        if run.failure() is None:
+            raise
+        raise run.ended(start, end, solver.__name__, str(error)) from run.cause()
+    finally:
+        if watch is not None:
+            watch.close()
+    _check(run, solution, start, end, solver.__name__)
+    try:
+        return record(bound, forcing, solution, solver.__name__, options)
+    except EvaluationError as error:
+        where = "?" if error.time is None else f"{error.time:.6g}"
+        raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
+
+
+class _Run:
+    """The right-hand side and Jacobian of one run, with NaN for recoverable failures."""
+
+    def __init__(self, module: Module, forcing: Forcing) -> None:
+        self.module = module
+        self.forcing = forcing
+        self.kernel: Timed = module.kernels.timed("rhs", nan=True)
+        self.tangent: Timed | None = None
+
+    def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
+        """f(t, x) for the solver: the kernel itself if nothing varies with time."""
+        kernel, forcing = self.kernel, self.forcing
+        call: Callable[[float, Array], Array] = kernel
+        if forcing:
+
+            def forced(t: float, x: Array) -> Array:
+                return kernel(t, x, u=forcing(t, x))
+
+            call = forced
+        if watch is None:
+            return call
+
+        def told(t: float, x: Array) -> Array:
+            watch(t)
+            return call(t, x)
+
+        return told
+
+    def jacobian(self, t: float, x: Array) -> Array:
+        """d(x')/dx, inputs that depend on the state included."""
+        if self.tangent is None:
+            self.tangent = self.module.kernels.timed("jacobian", nan=True)
+        if not self.forcing:
+            return self.tangent(t, x)
+        J = self.tangent(t, x, u=self.forcing(t, x))
+        extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
+        return J if extra is None else J + extra
+
+    def failure(self) -> tuple[str, int, float, Array] | None:
+        """The last failure of a kernel."""
+        if self.kernel.failure is not None:
+            return ("rhs", *self.kernel.failure)
+        if self.tangent is not None and self.tangent.failure is not None:
+            return ("jacobian", *self.tangent.failure)
+        return None
+
+    def cause(self) -> EvaluationError | None:
+        """It as an exception."""
+        failure = self.failure()
+        return None if failure is None else self.module.kernels.fail.exception(*failure)
+
+    def ended(self, t: float, end: float, method: str, words: str) -> SimulationError:
+        """The error for a run that stopped at time t."""
+        cause = self.cause()
+        if cause is None:
+            return SimulationError(
+                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "
+                "tolerances, or look for a motion that grows without bound."
+            )
+        when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"
+        return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
+
+
+def _check(run: _Run, solution: Solution, start: float, end: float, method: str) -> None:
+    finite = np.isfinite(solution.x).all(axis=0)
+    if not finite.all():
+        first = int(np.flatnonzero(~finite)[0])
+        raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
+    if solution.status < 0:
+        reached = float(solution.t[-1]) if solution.t.size else start
+        raise run.ended(reached, end, method, solution.message) from run.cause()
+
+
+def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    if span is None:
+        return 0.0, declared
+    if np.ndim(span) == 0:
+        return 0.0, number("the end of the span", span)
+    pair = np.asarray(span, dtype=float)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
+    return float(pair[0]), float(pair[1])
+
+
+def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
+    times = np.array(t_eval, dtype=float)
+    low, high = min(start, end), max(start, end)
+    steps = np.diff(times) if times.ndim == 1 else np.empty(0)
+    ordered = (steps > 0).all() if end >= start else (steps < 0).all()
+    if times.ndim != 1 or not times.size or not ordered or not ((times >= low) & (times <= high)).all():
+        raise UsageError(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
+    return times
+
+
+def _initial_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+    if initial is None:
+        return module.x0(t=t)
+    if isinstance(initial, Mapping):
+        return module.x0(initial, t=t)
+    x = np.array(initial, dtype=float)
+    if x.shape != (module.n_x,):
+        names = ", ".join(module.x_names)
+        raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
+    return module.project(x, t=t)

@@ -1,0 +1,106 @@
+"""Stage runtime: Trajectory <-> a file that needs only NumPy to be read."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .trajectory import Trajectory
+
+FORMAT = "eomgen trajectory 1"
+
+
+class Stored:
+    """Columns read from a file."""
+
+    def __init__(self, names: tuple[str, ...], values: Array) -> None:
+        self.names = names
+        self._rows = dict(zip(names, values, strict=True))
+
+    def __getitem__(self, name: str) -> Array:
+        return np.asarray(self._rows[name])
+
+
+def save(trajectory: Trajectory, path: str | Path) -> Path:
+    """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
+    target = Path(path)
+    if not target.suffix:
+        target = target.with_suffix(".npz")
+    names = trajectory.names
+    values = trajectory.to_numpy()
+    if target.suffix == ".csv":
+        heads = [_head(trajectory, name) for name in ("t", *names)]
+        table = np.vstack([trajectory.t, values]).T
+        np.savetxt(target, table, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
+        return target
+    if target.suffix != ".npz":
+        raise UsageError(f"a trajectory is saved as .npz or .csv, not {target.suffix!r}")
+    header = {"format": FORMAT, "names": list(names), **trajectory.metadata}
+    arrays: dict[str, Any] = {
+        "t": trajectory.t,
+        "x": trajectory.x,
+        "columns": values,
+        "header": np.array(json.dumps(header)),
+    }
+    for k, (t, x) in enumerate(zip(trajectory.t_events, trajectory.x_events, strict=True)):
+        arrays[f"t_events_{k}"], arrays[f"x_events_{k}"] = t, x
+    with target.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    return target
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """Read a trajectory that :meth:`Trajectory.save` wrote to an .npz file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Trajectory
+        With all columns; without dense output.
+
+    Raises
+    ------
+    UsageError
+        The file holds something else.
+    FileNotFoundError
+    """
+    from .trajectory import Trajectory
+
+    source = Path(path)
+    if not source.suffix and not source.exists():
+        source = source.with_suffix(".npz")
+    try:
+        with np.load(source, allow_pickle=False) as data:
+            arrays = {key: data[key] for key in data.files}
+        header = json.loads(str(arrays["header"]))
+        if header.pop("format") != FORMAT:
+            raise ValueError("another format")
+    except FileNotFoundError:
+        raise
+    except (ValueError, KeyError, OSError, EOFError, AttributeError) as error:
+        raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
+    names = tuple(header.pop("names"))
+    count = sum(key.startswith("t_events_") for key in arrays)
+    return Trajectory(
+        arrays["t"],
+        arrays["x"],
+        Stored(names, arrays["columns"]),
+        header,
+        [arrays[f"t_events_{k}"] for k in range(count)],
+        [arrays[f"x_events_{k}"] for k in range(count)],
+    )
+
+
+def _head(trajectory: Trajectory, name: str) -> str:
+    unit = trajectory.units.get(name, "")
+    return f"{name} [{unit}]" if unit else name

@@ -1,0 +1,205 @@
+"""Stage runtime: projected states of a run -> named columns, tables, plots, energy balance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .names import require, unknown
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class Residuals(NamedTuple):
+    """Largest violation of the constraints over a run, all rows, redundant ones included."""
+
+    raw_position: float = 0.0  #: of the integrator's states (m, rad)
+    raw_velocity: float = 0.0  #: (m/s, rad/s)
+    position: float = 0.0  #: of the stored, projected states
+    velocity: float = 0.0
+    correction_position: float = 0.0  #: largest change of a coordinate by the projection
+    correction_velocity: float = 0.0  #: largest change of a velocity
+
+
+class Source(Protocol):
+    """Named columns (n_t,)."""
+
+    names: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Array: ...
+
+
+class Trajectory:
+    """The result of a simulation.
+
+    ``traj["theta"]`` is a column (n_t,): coordinates, velocities (``theta_dot``), accelerations (``theta_ddot``),
+    coordinates of cut joints (angles without jumps) and their rates, outputs, inputs, ``T``, ``V`` and ``energy``.
+    SI units and radians.  What was not integrated is evaluated when first asked for.
+
+    Attributes
+    ----------
+    t : (n_t,) array
+        Times (s).
+    x : (n_x, n_t) array
+        States, projected onto the constraints.
+    names : tuple of str
+        All columns.
+    units : dict of str to str
+    residuals : Residuals
+        How well the loops were kept, raw and projected.
+    t_events : list of (k,) arrays
+    x_events : list of (n_x, k) arrays
+        Projected states at the events.
+    nfev, njev, nlu, status : int
+        Calls of the right-hand side and the Jacobian, factorisations, SciPy's status (1: a terminal event).
+    message : str
+    metadata : dict
+        Model, parameters, method and tolerances.
+    """
+
+    def __init__(
+        self,
+        t: Array,
+        x: Array,
+        columns: Source,
+        header: dict[str, Any],
+        t_events: Sequence[Array] = (),
+        x_events: Sequence[Array] = (),
+        sample: Callable[[Array], Trajectory] | None = None,
+    ) -> None:
+        self.t, self.x = t, x
+        self._columns = columns
+        self.metadata = header
+        self.names = columns.names
+        self.units: dict[str, str] = header.get("units", {})
+        self.residuals = Residuals(**header["residuals"])
+        self.t_events, self.x_events = list(t_events), list(x_events)
+        self.nfev, self.njev, self.nlu = (int(header.get(key, 0)) for key in ("nfev", "njev", "nlu"))
+        self.status, self.message = int(header.get("status", 0)), str(header.get("message", ""))
+        self._sample = sample
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return str(self.metadata["name"])
+
+    @property
+    def x_names(self) -> tuple[str, ...]:
+        """Names of the rows of x."""
+        return tuple(self.metadata["x_names"])
+
+    def __getitem__(self, name: str) -> Array:
+        if name == "t":
+            return self.t
+        if name not in self.names:
+            raise unknown("column", name, ("t", *self.names))
+        return self._columns[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name == "t" or name in self.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, " if len(self.t) else ""
+        return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
+
+    def at(self, t: ArrayLike) -> Trajectory:
+        """The trajectory at other times, from the dense output of the run.
+
+        Parameters
+        ----------
+        t : float or (k,) array
+            Within the run (s).
+
+        Returns
+        -------
+        Trajectory
+
+        Raises
+        ------
+        UsageError
+            The run kept no dense output, or a time outside it.
+        """
+        if self._sample is None:
+            raise UsageError("no dense output was kept: simulate with dense_output=True")
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        low, high = sorted(self.metadata["span"])
+        if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
+            raise UsageError(f"times must lie within the run, {low:.6g} .. {high:.6g} s")
+        return self._sample(times)
+
+    def to_numpy(self, *names: str) -> Array:
+        """Columns by name as rows of one array (len(names), n_t); all of them by default."""
+        chosen = names or self.names
+        return np.array([self[name] for name in chosen]).reshape(len(chosen), len(self.t))
+
+    def to_pandas(self, *names: str) -> pandas.DataFrame:
+        """Columns by name, all by default, as a table indexed by time.
+
+        Raises
+        ------
+        MissingDependencyError
+            pandas is not installed.
+        """
+        module = require("pandas", "pandas", "to_pandas")
+        data = {name: self[name] for name in names or self.names}
+        frame: pandas.DataFrame = module.DataFrame(data, index=module.Index(self.t, name="t"))
+        return frame
+
+    @property
+    def energy_drift(self) -> float:
+        """max |E - E(0)| / max T, the measure of an energy that should be kept."""
+        change, motion = float(np.abs(self["energy"] - self["energy"][0]).max()), float(np.abs(self["T"]).max())
+        return change / motion if motion else (0.0 if change == 0.0 else float("inf"))
+
+    def save(self, path: str | Path) -> Path:
+        """Write all columns to a file that :func:`load_trajectory` reads without the model.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ends in ``.npz`` (added if there is no ending), or in ``.csv`` for a plain table.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        from .storage import save
+
+        return save(self, path)
+
+    def plot(self, *names: str, ax: Any = None) -> Any:
+        """Plot columns over time.
+
+        Parameters
+        ----------
+        *names : str
+            Columns; all coordinates by default.
+        ax : matplotlib Axes, optional
+            Where to draw; by default a new figure with one panel for each unit.
+
+        Returns
+        -------
+        Axes, or an array of Axes for several panels
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from .plotting import plot
+
+        return plot(self, names or tuple(self.metadata["q_names"]), ax)

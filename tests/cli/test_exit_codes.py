@@ -1,0 +1,91 @@
+"""Exit codes 0 to 4, and what is printed with each: plain lines on stderr, never a traceback."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from .conftest import EXAMPLES, Call, Result
+
+PENDULUM = (EXAMPLES / "pendulum.yaml").read_text()
+FOUR_BAR = (EXAMPLES / "four_bar.yaml").read_text()
+
+
+def expect(result: Result, code: int, *said: str) -> None:
+    assert result.code == code, result.err
+    assert "Traceback" not in result.err
+    for text in said:
+        assert text in result.err
+
+
+def test_model_faults_are_told_all_at_once_with_their_lines(call: Call, model_file: Callable[[str], Path]) -> None:
+    text = PENDULUM.replace("type: revolute", "type: revolut").replace("mass: m,", "mass: mm,")
+    result = call("check", model_file(text))
+    expect(result, 1, "model.yaml:9: bodies.rod.mass: ", "model.yaml:11: joints.pivot.type: ", "revolute")
+    assert result.out == ""
+
+
+def test_model_faults_as_json(call: Call, model_file: Callable[[str], Path]) -> None:
+    result = call("run", model_file(PENDULUM.replace("mass: m,", "mass: mm,")), "--json")
+    assert result.code == 1
+    assert set(result.json) == {"error"}
+    assert set(result.json["error"]) == {"type", "exit_code", "message", "problems"}
+    problem = result.json["error"]["problems"][0]
+    assert set(problem) == {"path", "message", "remedy", "file", "line"}
+    assert (problem["path"], problem["line"]) == ("bodies.rod.mass", 9)
+
+
+@pytest.mark.parametrize("verb", ["check", "run"])
+def test_loops_that_cannot_close(call: Call, model_file: Callable[[str], Path], verb: str) -> None:
+    expect(call(verb, model_file(FOUR_BAR.replace("value: 0.12", "value: 1.2"))), 1, "model.yaml", "loops")
+
+
+def test_a_coordinate_with_no_inertia(call: Call, model_file: Callable[[str], Path]) -> None:
+    text = PENDULUM.replace("com: [0, -l, 0]", "com: [0, 0, 0]")
+    expect(call("check", model_file(text)), 1, "model.yaml:11: joints.pivot", "no inertia")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["chek", "x.yaml"], "did you mean check?"),
+        (["check"], "Missing argument"),
+        (["check", "nothing.yaml"], "nothing.yaml: no such file"),
+        (["check", "pendulum.yaml"], "eomgen examples pendulum"),
+        (["check", "."], "is a folder"),
+        (["run", EXAMPLES / "pendulum.yaml", "--sett", "g=1"], "--set"),
+        (["run", EXAMPLES / "pendulum.yaml", "--set", "g"], "name=value"),
+        (["run", EXAMPLES / "pendulum.yaml", "--set", "G=1"], "'G'"),
+        (["run", EXAMPLES / "pendulum.yaml", "--set", "g=one"], "'one' is not a number"),
+        (["run", EXAMPLES / "pendulum.yaml", "--end", "-1"], "-1"),
+        (["run", EXAMPLES / "pendulum.yaml", "--method", "kane"], "embedding, lagrange"),
+        (["run", EXAMPLES / "pendulum.yaml", "--out", "run.xls"], ".npz"),
+        (["derive", EXAMPLES / "four_bar.yaml", "--independent", "thet"], "theta"),
+        (["generate", EXAMPLES / "pendulum.yaml"], "--out"),
+        (["generate", EXAMPLES / "pendulum.yaml", "--out", "x", "--target", "rust"], "cython"),
+        (["examples", "pendulun"], "did you mean pendulum?"),
+    ],
+    ids=lambda value: " ".join(getattr(w, "name", w) for w in value) if isinstance(value, list) else "",
+)
+def test_usage(call: Call, words: list[object], said: str) -> None:
+    expect(call(*words), 2, said)
+
+
+def test_an_unknown_suffix(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "model.txt").write_text("name: x")
+    expect(call("check", tmp_path / "model.txt"), 2, ".yaml")
+
+
+def test_no_compiler(call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
+    expect(call("run", EXAMPLES / "pendulum.yaml"), 3, "no-such-compiler", "pip install ziglang")
+
+
+def test_an_integration_that_fails(call: Call, model_file: Callable[[str], Path]) -> None:
+    # the torque tan(t) goes to infinity at pi/2
+    text = PENDULUM + "forces:\n  push: {type: torque, joint: pivot, value: 1/(1 - t)**3}\n"
+    result = call("run", model_file(text))
+    expect(result, 4, "model.yaml")

@@ -1,0 +1,82 @@
+"""``eomgen run``: what it reports, writes and plots."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eomgen
+
+from .conftest import EXAMPLES, Call
+
+MODELS = sorted(EXAMPLES.glob("*.yaml"))
+
+
+def test_what_is_printed(call: Call) -> None:
+    result = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1")
+    assert result.code == 0
+    for said in ("degrees of freedom", "operations", "loop residual", "energy", "theta", "pin_x"):
+        assert said in result.out
+    for stage in ("derive", "compile", "simulate"):
+        assert stage in result.err
+
+
+def test_json(call: Call) -> None:
+    run = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1", "--json").json
+    assert set(run) == {
+        "name", "method", "report", "operations", "seconds", "integration", "loop_residual", "energy", "final", "files",
+    }  # fmt: skip
+    assert set(run["seconds"]) >= {"describe", "kinematics", "equations", "compile", "simulate"}
+    assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls"}
+    assert set(run["loop_residual"]) == {"raw", "projected", "correction"}
+    assert set(run["energy"]) == {"initial", "final", "drift", "power_balance"}
+    assert {"t", "theta", "theta_dot", "s", "pin_x", "speed"} <= set(run["final"])
+    assert run["final"]["t"] == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
+def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
+    run = call("run", path, "--json", "--out", "run.npz").json
+    trajectory = eomgen.load_trajectory("run.npz")
+    travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
+    assert travel > 1.0
+    assert run["loop_residual"]["projected"] < 1e-10
+    assert run["energy"]["power_balance"] < 1e-7
+
+
+def test_out_npz_and_set(call: Call, tmp_path: Path) -> None:
+    result = call(
+        "run", EXAMPLES / "pendulum.yaml", "--set", "theta=0.1", "--set", "l=2", "--end", "0.5", "--out", "r.npz"
+    )
+    assert result.code == 0
+    trajectory = eomgen.load_trajectory(tmp_path / "r.npz")
+    assert trajectory["theta"][0] == pytest.approx(0.1)
+    assert trajectory["theta"][-1] == pytest.approx(0.1 * np.cos(np.sqrt(9.81 / 2) * 0.5), rel=1e-3)
+
+
+def test_out_csv(call: Call, tmp_path: Path) -> None:
+    assert call("run", EXAMPLES / "pendulum.yaml", "--end", "0.5", "--out", "r.csv").code == 0
+    with (tmp_path / "r.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {"t", "theta", "theta_dot", "x", "y"} <= set(rows[0])
+    assert float(rows[0]["theta"]) == -np.pi / 2  # every digit is kept
+    assert float(rows[-1]["t"]) == 0.5
+
+
+def test_plot(call: Call, tmp_path: Path) -> None:
+    assert call("run", EXAMPLES / "four_bar.yaml", "--end", "0.7", "--plot", "new/folder/p.png").code == 0
+    assert (tmp_path / "new" / "folder" / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_another_method_and_partition_give_the_same_motion(call: Call) -> None:
+    path = EXAMPLES / "slider_crank.yaml"
+    one = call("run", path, "--end", "0.5", "--json").json
+    other = call("run", path, "--end", "0.5", "--method", "lagrange", "--independent", "s", "--json").json
+    assert other["method"] == "lagrange"
+    assert other["report"]["independent"] == ["s"]
+    for name, value in one["final"].items():
+        assert other["final"][name] == pytest.approx(value, rel=1e-6, abs=1e-7)

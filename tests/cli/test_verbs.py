@@ -1,0 +1,159 @@
+"""The command line: results on stdout, pinned keys of --json, files written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from eomgen.cli.command import VERBS
+from eomgen.cli.examples import describe_example, example_files
+
+from .conftest import EXAMPLES, Call
+
+REPORT_KEYS = {
+    "name", "bodies", "joints", "tree", "loop_joints", "coordinates", "loop_coordinates", "independent", "dependent",
+    "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "gruebler_kutzbach",
+    "gruebler_kutzbach_planar", "redundant", "conditioning", "length_scale", "reference", "assumed",
+}  # fmt: skip
+MODELS = sorted(EXAMPLES.glob("*.yaml"))
+
+
+def test_help_names_every_verb(call: Call) -> None:
+    result = call("--help")
+    assert result.code == 0
+    assert all(verb in result.out for verb in VERBS)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself(call: Call, verb: str) -> None:
+    result = call(verb, "--help")
+    assert result.code == 0
+    assert "Usage: eomgen" in result.out
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
+def test_every_example_passes_check(call: Call, path: Path) -> None:
+    result = call("check", path)
+    assert (result.code, result.err) == (0, "")
+    assert f"mechanism {path.stem}" in result.out
+    assert "degrees of freedom" in result.out
+
+
+@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
+def test_every_example_names_its_source_in_one_short_line(path: Path) -> None:
+    doc = describe_example(path)
+    assert "(" in doc
+    assert len(doc) <= 100
+    assert example_files()[path.stem].name == path.name
+
+
+def test_check_json(call: Call) -> None:
+    report = call("check", EXAMPLES / "slider_crank.yaml", "--json").json
+    assert set(report) == REPORT_KEYS
+    assert (report["degrees_of_freedom"], report["rank"], report["loop_joints"]) == (1, 2, ["C"])
+    assert (report["gruebler_kutzbach"], report["gruebler_kutzbach_planar"]) == (-2, 1)
+    assert report["independent"] == ["theta"]
+
+
+def test_derive_prints_the_size_of_the_equations(call: Call) -> None:
+    result = call("derive", EXAMPLES / "slider_crank.yaml")
+    assert result.code == 0
+    assert "mass_matrix" in result.out
+    assert "derive" in result.err
+
+
+def test_derive_json(call: Call) -> None:
+    derived = call("derive", EXAMPLES / "slider_crank.yaml", "--method", "lagrange", "--json").json
+    assert set(derived) == {"name", "method", "report", "operations", "seconds"}
+    assert derived["method"] == "lagrange"
+    counts = {"multiplications", "additions", "divisions", "negations", "functions", "choices", "total"}
+    assert {frozenset(operations) for operations in derived["operations"].values()} == {frozenset(counts)}
+    assert set(derived["report"]) == REPORT_KEYS
+
+
+def test_derive_writes_the_equations(call: Call) -> None:
+    result = call("derive", EXAMPLES / "pendulum.yaml", "--equations")
+    assert "mass_matrix[0, 0] = l**2*m" in result.out
+    assert "force[0] = -g*l*m*sin(theta)" in result.out
+
+
+def test_derive_needs_no_parameter_values(call: Call, model_file: Callable[[str], Path]) -> None:
+    text = (EXAMPLES / "pendulum.yaml").read_text().replace("value: 9.81, ", "")
+    assert call("derive", model_file(text)).code == 0
+    result = call("check", model_file(text))
+    assert result.code == 1
+    assert "model.yaml:7: parameters.g: has no value" in result.err
+
+
+def test_generate_json(call: Call, tmp_path: Path) -> None:
+    written = call("generate", EXAMPLES / "pendulum.yaml", "--out", tmp_path / "out", "--json").json
+    assert set(written) == {"name", "target", "folder", "files"}
+    assert written["target"] == "cython"
+    assert Path(written["folder"]) == tmp_path / "out" / "pendulum"
+    assert {"model.json", "pyproject.toml", "README.md"} <= set(written["files"])
+    assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
+
+
+def test_examples_list(call: Call) -> None:
+    result = call("examples")
+    assert result.code == 0
+    assert all(name in result.out for name in ("slider_crank", "andrews_squeezer", "chain.py"))
+
+
+def test_examples_json(call: Call) -> None:
+    listed = call("examples", "--json").json
+    assert set(listed) == {"examples"}
+    assert {frozenset(entry) for entry in listed["examples"]} == {frozenset({"name", "file", "doc"})}
+    assert {entry["name"] for entry in listed["examples"]} >= {path.stem for path in MODELS}
+    assert all(entry["doc"] for entry in listed["examples"])
+
+
+@pytest.mark.parametrize("name", ["pendulum", "pendulum.yaml", "chain.py"])
+def test_examples_copies_one_and_never_overwrites(call: Call, tmp_path: Path, name: str) -> None:
+    file = name if "." in name else f"{name}.yaml"
+    assert call("examples", name).out.strip() == file
+    copy = tmp_path / file
+    assert copy.read_bytes() == (EXAMPLES / file).read_bytes()
+    copy.write_text("mine")
+    assert call("examples", name).code == 2
+    assert copy.read_text() == "mine"
+    assert call("examples", name, "--force", "--json").json == {"file": file}
+    assert copy.read_bytes() == (EXAMPLES / file).read_bytes()
+
+
+def test_cache(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
+    empty = call("cache", "list", "--json").json
+    assert empty == {"directory": str(tmp_path / "cache"), "size": 0, "entries": []}
+    assert call("run", EXAMPLES / "pendulum.yaml", "--end", "0.1").code == 0
+    full = call("cache", "list", "--json").json
+    assert {"pendulum"} <= {entry["name"] for entry in full["entries"]}
+    keys = {"key", "kind", "name", "directory", "size", "created", "used"}
+    assert {frozenset(entry) for entry in full["entries"]} == {frozenset(keys)}
+    assert "pendulum" in call("cache").out
+    assert call("cache", "prune", "--json").json == {"directory": full["directory"], "removed": [], "freed": 0}
+    pruned = call("cache", "prune", "--max-size", "0", "--json").json
+    assert set(pruned["removed"]) == {entry["key"] for entry in full["entries"]}
+    assert pruned["freed"] == full["size"]
+    assert call("cache", "clear", "--json").json == {"directory": full["directory"], "removed": 0}
+
+
+@pytest.mark.slow
+def test_doctor(call: Call) -> None:
+    result = call("doctor", "--json")
+    assert result.code == 0
+    assert set(result.json) == {"ok", "checks"}
+    assert result.json["ok"] is True
+    checks = {check["name"]: check for check in result.json["checks"]}
+    assert {frozenset(check) for check in checks.values()} == {frozenset({"name", "ok", "detail", "remedy", "needed"})}
+    assert {"python", "numpy", "matplotlib", "compiler", "small model", "cache"} <= set(checks)
+
+
+def test_doctor_without_a_compiler_says_what_to_do(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    result = call("doctor")
+    assert result.code == 3
+    assert "no-such-compiler" in result.out
+    assert "pip install ziglang" in result.out

@@ -1,0 +1,92 @@
+"""The package as people install it: wheel from the sdist, and the editable install of this checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
+def shipped(folder: str) -> set[str]:
+    """Files of a mapped folder, as paths inside it."""
+    top = ROOT / folder
+    return {str(p.relative_to(top)) for p in top.rglob("*") if p.is_file() and "__pycache__" not in p.parts}
+
+
+def run(*words: object, cwd: Path, **variables: str) -> str:
+    result = subprocess.run(
+        [sys.executable, *map(str, words)], cwd=cwd, env=os.environ | variables, capture_output=True, text=True
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sdist of a copy of this checkout, and the wheel built from that sdist."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True
+    )
+    folder = tmp_path_factory.mktemp("copy")
+    for name in listed.stdout.splitlines():
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes((ROOT / name).read_bytes())
+    run("-m", "build", "--no-isolation", "--outdir", folder / "dist", folder, cwd=folder)
+    return folder / "dist"
+
+
+@pytest.mark.slow
+def test_wheel_and_sdist_hold_everything(built: Path) -> None:
+    with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
+        names = set(wheel.namelist())
+    with tarfile.open(next(built.glob("*.tar.gz"))) as sdist:
+        sources = {name.partition("/")[2] for name in sdist.getnames()}
+    for folder in ("templates", "examples"):
+        assert {name.removeprefix(f"eomgen/{folder}/") for name in names if f"eomgen/{folder}/" in name} == shipped(
+            folder
+        )
+        assert {f"{folder}/{name}" for name in shipped(folder)} <= sources
+    assert {f"eomgen/{name}" for name in shipped("eomgen")} <= names
+    assert not any(name.startswith(("tests/", "docs/", "benchmarks/")) for name in names)
+    assert any(name.endswith("LICENSE") for name in names)
+
+
+@pytest.mark.slow
+def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path) -> None:
+    home = tmp_path / "site"
+    run("-m", "pip", "install", "--no-deps", "--quiet", "--target", home, next(built.glob("*.whl")), cwd=tmp_path)
+    where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(tmp_path / "cache")}
+    origin = run("-c", "import eomgen; print(eomgen.__file__)", cwd=tmp_path, **where).strip()
+    assert Path(origin).is_relative_to(home)
+    run("-m", "eomgen.cli", "examples", "pendulum", cwd=tmp_path, **where)
+    out = run("-m", "eomgen.cli", "run", "pendulum.yaml", "--end", "0.1", cwd=tmp_path, **where)
+    assert "energy" in out
+
+
+def test_the_editable_install_sees_templates_and_examples() -> None:
+    for package, folder in {"eomgen.templates": "templates", "eomgen.examples": "examples"}.items():
+        for name in shipped(folder):
+            found = files(package).joinpath(*Path(name).parts)
+            assert found.read_bytes() == (ROOT / folder / name).read_bytes()
+
+
+def test_every_package_is_listed() -> None:
+    found = {".".join(p.relative_to(ROOT).parts) for p in (ROOT / "eomgen").rglob("*") if any(p.glob("*.py"))}
+    mapped = set(PYPROJECT["tool"]["setuptools"]["package-dir"])
+    assert set(PYPROJECT["tool"]["setuptools"]["packages"]) == found | {"eomgen"} | mapped
+
+
+def test_every_package_has_an_init() -> None:
+    packages = [p for p in (ROOT / "eomgen").rglob("*") if any(p.glob("*.py"))]
+    assert [p for p in packages if not (p / "__init__.py").exists()] == []
