@@ -21,6 +21,7 @@ _ERRORS = (
     "AssemblyError",
     "EomgenError",
     "EvaluationError",
+    "ExpressionError",
     "MissingDependencyError",
     "ModelError",
     "NonFiniteError",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .failures import reports_failures
-from .options import independent_option, json_option, load_model, method_option, model_argument
+from .options import blaming_option, independent_option, json_option, load_model, method_option, model_argument
 from .screen import print_heading, print_json, print_table, stage
 
 if TYPE_CHECKING:
@@ -29,8 +29,9 @@ def derive(model: Path, method: str, independent: tuple[str, ...], equations: bo
     """
     from .. import pipeline
 
-    with stage("derive"):
+    with blaming_option(independent), stage("derive") as parts:
         derived = pipeline.derive(load_model(model), method, independent or None)
+        parts |= derived.seconds
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))
         return

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .failures import reports_failures
-from .options import independent_option, json_option, load_model, method_option, model_argument
+from .options import blaming_option, independent_option, json_option, load_model, method_option, model_argument
 from .screen import print_json, stage
 
 
@@ -31,7 +31,7 @@ def generate(model: Path, out: Path, method: str, independent: tuple[str, ...], 
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
     from .. import pipeline
 
-    with stage("generate"):
+    with blaming_option(independent), stage("generate"):
         folder = pipeline.generate(load_model(model), out, method, target, independent or None)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:

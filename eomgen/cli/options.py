@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UsageError
+from ..errors import ModelError, UsageError
 
 if TYPE_CHECKING:
     from ..describe import Model
@@ -31,6 +33,19 @@ independent_option = click.option(
     metavar="NAME",
     help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
 )
+
+
+@contextmanager
+def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
+    """Turn a complaint about ``--independent`` into a UsageError: the model file is not at fault."""
+    try:
+        yield
+    except ModelError as error:
+        if independent and all(p.path.startswith("independent") for p in error.problems):
+            raise UsageError(
+                "\n".join(str(p._replace(file="", path="--independent")) for p in error.problems)
+            ) from None
+        raise
 
 
 def load_model(path: Path) -> Model:

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from math import isfinite
 from time import perf_counter
 from typing import Any
 
@@ -52,17 +53,25 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Seq
 
 
 @contextmanager
-def stage(name: str) -> Iterator[None]:
-    """Show on stderr that a stage runs and how long it took; on a terminal with a moving sign meanwhile."""
+def stage(name: str) -> Iterator[dict[str, float]]:
+    """Show on stderr that a stage runs and how long it took; on a terminal with a moving sign meanwhile.
+
+    Yields
+    ------
+    dict of str to float
+        To be filled with the seconds of its parts, which are shown too.
+    """
     start = perf_counter()
+    parts: dict[str, float] = {}
     if sys.stderr.isatty():
         from rich.console import Console
 
         with Console(stderr=True).status(name):
-            yield
+            yield parts
     else:
-        yield
-    click.echo(f"{name:<12}{perf_counter() - start:8.3f} s", err=True)
+        yield parts
+    detail = ", ".join(f"{part} {seconds:.3f}" for part, seconds in parts.items())
+    click.echo(f"{name:<10}{perf_counter() - start:8.3f} s" + (f"   {detail}" if detail else ""), err=True)
 
 
 def readable_size(size: int) -> str:
@@ -70,3 +79,9 @@ def readable_size(size: int) -> str:
     if size < 1000:
         return f"{size} B"
     return f"{size / 1000:.0f} kB" if size < 1_000_000 else f"{size / 1e6:.1f} MB"
+
+
+def finite(value: float) -> float | None:
+    """A number that JSON can hold: None stands for what is not finite."""
+    number = float(value)
+    return number if isfinite(number) else None

@@ -48,8 +48,8 @@ def load_core(artifact: Artifact) -> ModuleType:
             loader.exec_module(module)
         except ImportError as error:
             raise ToolchainError(
-                f"the compiled model {artifact.path} cannot be loaded: {error}. If it has gone, compile again; else clear "
-                "the cache first"
+                f"the compiled model {artifact.path} cannot be loaded: {error}. If it has gone, compile again; else "
+                "clear the cache first"
             ) from error
         sys.modules[name] = module
         return module

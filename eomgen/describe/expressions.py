@@ -101,12 +101,14 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     line = re.sub(r"\s", " ", text)
     start = len(line) - len(line.lstrip())
     try:
-        body = ast.parse(line[start:]).body
+        # as one interactive statement: for a module, Python would look for a file to quote the faulty line from
+        tree = ast.parse(line[start:].rstrip() + "\n", mode="single")
     except SyntaxError as error:
         column = (error.offset or 1) + start
         raise ExpressionError(f"not a valid expression ({error.msg})", column, ALLOWED, text) from None
     except (ValueError, MemoryError, RecursionError):
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
+    body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("a statement, not an expression", start + 1, ALLOWED, text)
     return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)

@@ -99,11 +99,11 @@ class Scope:
                 self.names.faults.add(self.path, error.message, error.remedy)
                 return self.graph.symbol(name)
         kind = self.names.kinds.get(name)
-        if kind is None:
+        if self.level == NUMBER:
+            self._refuse(name, "name")
+        elif kind is None:
             known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
-            if self.level == NUMBER:
-                remedy = f"only {_LEVEL_REMEDY[NUMBER]} stand here"
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
         elif LEVELS[kind] > self.level:
             self._refuse(name, kind)

@@ -88,6 +88,13 @@ class _Printer:
             return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:]))
         return f"{self.operand(i)} != 0.0"
 
+    def failed(self, i: int, piece: Piece | None) -> str:
+        """The text of a check that is not passed; NaN passes, and is found in the result."""
+        node = self._nodes[i]
+        if piece is not None and i in piece.inlined and node[0] == "lt":
+            return f"{self.operand(node[1])} >= {self.operand(node[2])}"
+        return f"{self.operand(i)} <= 0.0"
+
     def _value(self, i: int, piece: Piece) -> str:
         node = self._nodes[i]
         kind = node[0]
@@ -107,10 +114,7 @@ class _Printer:
             if i in piece.checks:
                 if i in piece.inlined:
                     self._load(i, piece, loaded, result)
-                    passed = self.condition(i, piece)
-                else:
-                    passed = f"{self.operand(i)} > 0.0"
-                result.append(f"if (!({passed})) {{ return 2; }}")
+                result.append(f"if ({self.failed(i, piece)}) {{ return 2; }}")
             if i in piece.results:
                 self.used.add("out")
                 result += [f"out[{k}] = {self._name(i)};" for k in piece.results[i]]
@@ -145,7 +149,7 @@ def print_block(program: Program, block: Block) -> tuple[str, int]:
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> tuple[str, int]:
     """Print cut statements as one function, or as several and one that calls them."""
     printer = _Printer(program, texts)
-    main = _direct(printer, pieces) + [f"if (!({printer.operand(i)} > 0.0)) {{ return 2; }}" for i in pieces.checks]
+    main = _direct(printer, pieces) + [f"if ({printer.failed(i, None)}) {{ return 2; }}" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions = []
     if len(pieces.pieces) == 1:

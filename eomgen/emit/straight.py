@@ -29,7 +29,7 @@ class Piece:
     results : mapping of int to tuple of int
         Node id -> places in the result.
     checks : frozenset of int
-        Ids that must be > 0.
+        Ids that must not be <= 0.
     inlined : frozenset of int
         Conditions that stand only in selections and checks, so need no variable of their own.
     """
@@ -90,7 +90,7 @@ def cut(
                 stores={i: slots[i] for i in c.exports},
                 results={i: tuple(places[i]) for i in c.statements if i in places},
                 checks=frozenset(check_ids.intersection(c.statements)),
-                inlined=_conditions(graph, c.statements, {*c.exports, *places}),
+                inlined=_conditions(graph, c.statements, {*c.exports, *places}, check_ids),
             )
         )
         free.extend(sorted((slots[i] for i in c.imports if last_use[i] == k), reverse=True))
@@ -124,13 +124,13 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
     return result
 
 
-def _conditions(graph: Graph, statements: Iterable[int], kept: set[int]) -> frozenset[int]:
+def _conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
     nodes = graph.nodes
     found = set()
     for i in statements:
         node = nodes[i]
-        if node[0] in CONDITIONS and i not in kept:
+        if node[0] in CONDITIONS and i not in kept and (i not in checks or node[0] == "lt"):
             found.add(i)
         found.difference_update(node[2:] if node[0] == "select" else node[1:])
     return frozenset(found)

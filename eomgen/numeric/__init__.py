@@ -5,14 +5,52 @@ the mobility analysis when a model is derived and the assembly at run time.  All
 (:class:`~.scales.Scales`), so that metres or millimetres make no difference.
 """
 
-from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
-from .continuation import follow
-from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
-from .kinematics import kinematics, solve_dependent
-from .partition import Partition, partition
-from .projection import correct_position, correct_velocity, project, tangent_projector
-from .rank import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows
-from .scales import Scales
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
+    from .continuation import follow
+    from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
+    from .dependent import kinematics, solve_dependent
+    from .partitions import Partition, partition
+    from .projection import correct_position, correct_velocity, project, tangent_projector
+    from .ranks import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows
+    from .scales import Scales
+
+#: Where each name is defined; loaded on first use, because a module that only evaluates needs none of them.
+_HOMES = {
+    "Assembly": "assembly",
+    "Partition": "partitions",
+    "Rank": "ranks",
+    "Rates": "assembly",
+    "Scales": "scales",
+    "Terms": "embedded",
+    "VelocityEquations": "assembly",
+    "accelerate": "embedded",
+    "assemble": "assembly",
+    "assemble_velocity": "assembly",
+    "choose_independent": "ranks",
+    "conditioning": "ranks",
+    "correct_position": "projection",
+    "correct_velocity": "projection",
+    "embed": "embedded",
+    "embedded_mass": "embedded",
+    "follow": "continuation",
+    "independent_rows": "ranks",
+    "jacobian": "embedded",
+    "kinematics": "dependent",
+    "partition": "partitions",
+    "project": "projection",
+    "rank": "ranks",
+    "redundant_rows": "ranks",
+    "rhs": "embedded",
+    "solve_dependent": "dependent",
+    "tangent_projector": "projection",
+    "unpack_terms": "embedded",
+}
 
 __all__ = [
     "Assembly",
@@ -44,3 +82,11 @@ __all__ = [
     "tangent_projector",
     "unpack_terms",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    return value

@@ -11,7 +11,7 @@ from ..errors import AssemblyError
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
 from .closure import Equations, System, close, closed
 from .projection import largest
-from .rank import rank
+from .ranks import rank
 from .scales import Array, Indices, Position, Scales
 
 __all__ = ["Assembly", "Equations", "Rates", "VelocityEquations", "assemble", "assemble_velocity", "starts"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError
-from .rank import rank
+from .ranks import rank
 from .scales import Array, Indices, Scales
 
 CUT = 1e-9  #: singular values below this part of the largest count as zero

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
-from .partition import Partition, partition
+from .partitions import Partition, partition
 from .projection import minimum_norm, project, tangent_projector
 from .scales import Array, Indices, Position, Rate, Scales
 
@@ -61,7 +61,7 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     SingularMassMatrixError
         A pivot is not above 1e-13 of the largest diagonal entry.
     PartitionError
-        As :func:`~.partition.partition`.
+        As :func:`~.partitions.partition`.
     """
     scaled = scales.q[:, None] * M * scales.q
     split = partition(scales.jacobian(C_q), rank, independent)

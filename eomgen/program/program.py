@@ -36,7 +36,7 @@ class Block:
     Attributes
     ----------
     checks : tuple of Expr
-        Must all be > 0 at run time, or the function reports a singular mass matrix (status 2).
+        Where one is <= 0 the function reports a singular mass matrix (status 2); NaN shows in the result.
     public : bool
         Whether users call it; else only drivers do.
     """

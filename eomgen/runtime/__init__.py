@@ -1,15 +1,36 @@
 """Stage runtime: a compiled or NumPy core -> Module; Module -> Trajectory.
 
-Importing it costs NumPy; SciPy, pandas, matplotlib and rich load inside the calls that need them.
+Importing it costs NumPy and little more; SciPy, pandas, matplotlib and rich load inside the calls that need them.
 """
 
 from __future__ import annotations
 
-from .kernels import Core
-from .minimal import Minimal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .module import Module
-from .numpy_core import NumpyCore
-from .storage import load_trajectory
-from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from .minimal import Minimal
+    from .numpy_core import NumpyCore
+    from .protocols import Core
+    from .storage import load_trajectory
+    from .trajectory import Trajectory
+
+_HOMES = {
+    "Core": "protocols",
+    "Minimal": "minimal",
+    "NumpyCore": "numpy_core",
+    "Trajectory": "trajectory",
+    "load_trajectory": "storage",
+}
 
 __all__ = ["Core", "Minimal", "Module", "NumpyCore", "Trajectory", "load_trajectory"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    return value

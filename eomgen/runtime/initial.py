@@ -19,7 +19,7 @@ from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, ass
 from ..numeric.closure import Equations, System, close, closed
 from ..numeric.continuation import follow
 from ..numeric.projection import largest
-from ..numeric.rank import rank
+from ..numeric.ranks import rank
 from ..numeric.scales import Array
 from .kernels import Kernels
 from .names import UnknownNameError, unknown

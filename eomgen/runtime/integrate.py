@@ -132,9 +132,11 @@ def integrate(
         x = y[:, -1]
     joined = pieces[0] if len(pieces) == 1 else Joined(pieces, nodes[1 : len(pieces)]) if pieces else None
     all_times = np.concatenate(times)
-    reached = (
-        [pieces[0].ts[0], pieces[-1].ts[-1]] if pieces else all_times[[0, -1]] if all_times.size else nodes[:1] * 2
-    )
+    ends = (nodes[0], nodes[0])
+    if pieces:
+        ends = (float(pieces[0].ts[0]), float(pieces[-1].ts[-1]))
+    elif all_times.size:
+        ends = (float(all_times[0]), float(all_times[-1]))
     return Solution(
         all_times,
         np.concatenate(states, axis=1),
@@ -144,7 +146,7 @@ def integrate(
         int(part.status),
         str(part.message),
         counts,
-        (float(reached[0]), float(reached[1])),
+        ends,
     )
 
 

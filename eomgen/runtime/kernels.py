@@ -1,13 +1,13 @@
 """Stage runtime: a core (compiled or NumPy), parameters and inputs -> the calls of one model.
 
 A core is the part that differs between targets.  It offers ``metadata``, ``names``, ``context(p, u, error)`` and the
-makers ``timed``, ``state`` and ``motion``; see :class:`Core`.
+makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,68 +17,8 @@ from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
 
-
-class Timed(Protocol):
-    """A kernel of time and state."""
-
-    failure: tuple[int, float, Array] | None  #: with NaN for failures: (status, t, x) of the last one
-
-    def __call__(
-        self,
-        t: ArrayLike,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-    ) -> Array: ...
-
-
-class State(Protocol):
-    """A kernel of the state, or of the coordinates, alone."""
-
-    failure: tuple[int, float, Array] | None
-
-    def __call__(
-        self,
-        x: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-    ) -> Array: ...
-
-
-class Motion(Protocol):
-    """A kernel of coordinates, velocities and accelerations."""
-
-    def __call__(
-        self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
-        p: ArrayLike | None = None,
-        u: ArrayLike | None = None,
-        out: Array | None = None,
-        t: ArrayLike = 0.0,
-    ) -> Array: ...
-
-
-class Core(Protocol):
-    """What both targets give Python: the Cython extension module ``_core``, or a :class:`~.numpy_core.NumpyCore`."""
-
-    metadata: str
-    names: tuple[str, ...]
-
-    def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Any: ...
-    def timed(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
-    def state(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
-    def motion(
-        self, name: str, context: Any, shape: tuple[int, ...], fail: Any, nan: bool = False, error: Any = ...
-    ) -> Any: ...
+if TYPE_CHECKING:
+    from .protocols import Core, Motion, State, Timed
 
 
 class Kernels:

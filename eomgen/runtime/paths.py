@@ -41,7 +41,7 @@ class Path:
             return result.ravel()
         result = self.kernel(np.concatenate([q_i, v_i, a_i, guess]), t=t)
         if not np.isfinite(result).all():
-            raise self._failure(q_i)
+            raise self._blocked(q_i, result)
         return result
 
     def motion(self, q_i: Array, v_i: Array, a_i: Array, near: Array, t: float) -> Array:
@@ -59,7 +59,7 @@ class Path:
         if np.abs((reached - q) / self.layout.scales.q).max() <= JUMP:  # False for NaN
             return reached
         if not halvings:
-            raise self._failure(target)
+            raise self._blocked(target, reached)
         middle = 0.5 * (q[self.layout.independent] + target)
         half = self.advance(q, middle, t, halvings - 1)
         return self.advance(half, target, t, halvings - 1)
@@ -72,8 +72,11 @@ class Path:
         way = target - origin
         steps = int(np.ceil(np.abs(way / self.scales_i).max() / STEP)) if way.size else 0
         q = start
-        for k in range(1, steps + 1):
-            q = self.advance(q, target if k == steps else origin + k / steps * way, t)
+        try:
+            for k in range(1, steps + 1):
+                q = self.advance(q, target if k == steps else origin + k / steps * way, t)
+        except EvaluationError as error:
+            raise self._too_far(target, error) from None
         return q
 
     def walk_all(self, start: Array, targets: Array) -> list[Array]:
@@ -87,25 +90,32 @@ class Path:
         known: dict[int, list[Array]] = {1: [start], -1: [start]}
         origin, step = start[self.layout.independent[0]], STEP * self.scales_i[0]
         result = []
-        for target in targets[0]:
-            sign = 1 if target >= origin else -1
+        for target in targets.T:
+            sign = 1 if target[0] >= origin else -1
             points = known[sign]
-            count = int(abs(target - origin) / step)
-            while len(points) <= count:
-                points.append(self.advance(points[-1], np.array([origin + sign * len(points) * step]), 0.0))
-            result.append(self.advance(points[count], np.array([target]), 0.0))
+            count = int(abs(target[0] - origin) / step)
+            try:
+                while len(points) <= count:
+                    points.append(self.advance(points[-1], np.array([origin + sign * len(points) * step]), 0.0))
+                result.append(self.advance(points[count], target, 0.0))
+            except EvaluationError as error:
+                raise self._too_far(target, error) from None
         return result
 
-    def _failure(self, target: Array) -> EvaluationError:
-        names = [self.layout.q[i] for i in self.layout.independent]
-        where = place(names, target).removeprefix(", ")
-        if self.kernel.failure is None:
-            return ProjectionError(
-                f"the position {where} lies on another branch, or too near to a dead centre", 0.0, target
-            )
+    def _place(self, target: Array) -> str:
+        return place([self.layout.q[i] for i in self.layout.independent], target).removeprefix(", ")
+
+    def _blocked(self, target: Array, found: Array) -> EvaluationError:
+        """Why the step to independent values failed."""
+        if np.isfinite(found).all() or self.kernel.failure is None:
+            words = f"the position {self._place(target)} lies on another branch, or too near to a dead centre"
+            return ProjectionError(words, 0.0, target)
         status, t, x = self.kernel.failure
         error = self.fail.exception("kinematics", status, t, x)
-        return type(error)(f"the way to {where} is blocked: {error}", t, target)
+        return type(error)(f"{self._place(target)}: {error}", t, target)
+
+    def _too_far(self, target: Array, error: EvaluationError) -> EvaluationError:
+        return type(error)(f"the way to {self._place(target)} is blocked at {error}", error.time, target)
 
 
 def motions(

@@ -97,9 +97,12 @@ def simulate(
     x0 = _initial_state(bound, initial, start)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     run = _Run(bound, forcing)
-    options = {"rtol": declared["rtol"] if rtol is None else rtol, "atol": declared["atol"] if atol is None else atol} | {
-        key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None
-    } | options  # fmt: skip
+    tolerances = {
+        "rtol": declared["rtol"] if rtol is None else rtol,
+        "atol": declared["atol"] if atol is None else atol,
+    }
+    steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
+    options = {**tolerances, **steps, **options}
     if takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None

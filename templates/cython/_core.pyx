@@ -17,7 +17,6 @@ from libc.string cimport memcmp, memcpy
 
 import json
 import numpy as np
-
 cnp.import_array()
 
 cdef extern from "eomgen.h" nogil:
@@ -308,7 +307,8 @@ cdef class Kernel:
         cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
-        batch.columns, batch.x, batch.y = abs(columns), batch.w + MODEL.n_work, batch.w + MODEL.n_work + self.n_in
+        batch.columns = 1 if columns < 0 else columns
+        batch.x, batch.y = batch.w + MODEL.n_work, batch.w + MODEL.n_work + self.n_in
         batch.u = batch.y + self.n_out
         if self.long or columns > 1:
             with nogil:

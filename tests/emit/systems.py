@@ -117,6 +117,19 @@ def lagrangian_system(
         "y_names": [f"y{k}" for k in range(len(y))],
         "body_names": [f"body{k}" for k in range(len(terms.poses) // 16)],
         "constraint_labels": [f"row {k}" for k in range(m)],
+        "constraint_kinds": ["length"] * m,
+        "coordinate_kinds": list(more.get("kinds", ["angle"] * n)),
+        "loop_names": [f"cut{k}" for k in range(len(loop))],
+        "loop_kinds": ["angle"] * len(loop),
+        "joint_names": [],
+        "loop_joint_names": [],
+        "independent_rows": list(range(n - n_dof)),
+        "redundant_rows": list(range(n - n_dof, m)),
+        "length_scale": float(more.get("length_scale", 1.0)),
+        "q_reference": list(map(float, more.get("q_reference", [0.0] * n))),
+        "initial": {},
+        "guess": {},
+        "simulation": {"end": 1.0, "method": "DOP853", "rtol": 1e-8, "atol": 1e-10},
         "p_values": list(parameters.values()),
         "u_values": list(inputs.values()),
         "units": {"l": "m"},
@@ -190,9 +203,10 @@ def slider_crank(copies=1, preferred=(0,), name="crank", driven=False, **more):
         th, be, s = q
         height = 0.02 * sin(w * t) if driven else g.zero
         rows = [l1 * cos(th) + l2 * cos(be) - s, l1 * sin(th) + l2 * sin(be) - height]
-        return rows * copies
+        return rows * copies + ([th - 2.0 * t] if more.get("spun") else [])
 
     L = g.constant(0.2)
+    more = {"kinds": ["angle", "angle", "length"], "length_scale": 0.2, **more}
     theta = 0.3
     beta = -np.arcsin(0.1 * np.sin(theta) / 0.35)
     return lagrangian_system(
@@ -200,7 +214,7 @@ def slider_crank(copies=1, preferred=(0,), name="crank", driven=False, **more):
         forces=lambda q, v, t: [g.symbol("tau") * cos(t), g.zero, -0.5 * v[2]],
         outputs=lambda q, v, a: [l1 * cos(q[0]), v[1] + a[2]] if more.get("accelerated", True) else [l1 * cos(q[0])],
         poses=lambda q: pose(g, q[0], l1, g.zero), loop=lambda q: [q[1] - q[0]],
-        coordinate_scales=[g.one, g.one, L], constraint_scales=[L, L] * copies, n_dof=1, preferred=preferred,
+        coordinate_scales=[g.one, g.one, L], constraint_scales=[L, L] * copies + [g.one] * bool(more.get("spun")), preferred=preferred,
         q_reference=[theta, beta, 0.1 * np.cos(theta) + 0.35 * np.cos(beta)],
-        **{k: x for k, x in more.items() if k != "accelerated"},
+        **{"n_dof": 1, **more},
     )  # fmt: skip

@@ -7,7 +7,7 @@ static int cholesky(double *restrict g)
             d -= g[j * M + k] * g[j * M + k];
         }
         if (!(d > 0.0)) {
-            return EOMGEN_PROJECTION_FAILED;
+            return isnan(d) ? EOMGEN_NON_FINITE : EOMGEN_PROJECTION_FAILED;
         }
         d = sqrt(d);
         g[j * M + j] = d;

@@ -10,7 +10,7 @@ static int ldl_factor(double *restrict a)
         for (int k = 0; k < j; k++) {
             d -= a[j * F + k] * a[j * F + k] * a[k * F + k];
         }
-        if (!(d > 1e-13 * largest)) {
+        if (d <= 1e-13 * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         a[j * F + j] = d;

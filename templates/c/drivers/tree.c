@@ -9,7 +9,7 @@ static int tree_factor(double *restrict H, const double *restrict s)
     }
     for (int k = N - 1; k >= 0; k--) {
         double *const row = H + k * (k + 1) / 2;
-        if (!(row[k] * s[k] * s[k] > 1e-13 * largest)) {
+        if (row[k] * s[k] * s[k] <= 1e-13 * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         for (int i = PARENT[k]; i >= 0; i = PARENT[i]) {

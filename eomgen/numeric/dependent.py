@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from .partition import Partition, partition
+from .partitions import Partition, partition
 from .projection import ACCEPTED, DAMPING, EXACT, SETTLED, largest
 from .scales import Array, Indices, Position, Rate, Scales
 

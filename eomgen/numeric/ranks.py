@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .partition import PREFERENCE
+from .partitions import PREFERENCE
 from .scales import Array, Indices
 
 TOLERANCE = 1e-8  #: a singular value below this part of the largest counts as zero

@@ -1,0 +1,94 @@
+"""Stage cli, energy: Equations and Trajectory -> change of the energy, held against the work of forces and inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute
+
+if TYPE_CHECKING:
+    from ..derivation import Equations
+    from ..kinematics import Kinematics
+    from ..runtime import Trajectory
+
+POINTS = 8  #: of Gauss's quadrature in each step of the integrator
+
+
+class EnergyBalance(NamedTuple):
+    """How well the energy E = T + V is accounted for (J; the last two relative to the largest T)."""
+
+    initial: float
+    final: float
+    work: float | None  #: of everything without a potential; None where it is not known
+    drift: float  #: max |E - E(0)| / max T
+    power_balance: float | None  #: max |E - E(0) - work so far| / max T
+
+
+def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping[str, float]) -> EnergyBalance:
+    """Hold the energy of a run against the work done on it.
+
+    Parameters
+    ----------
+    equations : Equations
+    trajectory : Trajectory
+        With dense output; inputs constant.
+    inputs : mapping of str to float
+        Their values during the run.
+
+    Returns
+    -------
+    EnergyBalance
+    """
+    energy, largest = trajectory["energy"], float(np.abs(trajectory["T"]).max())
+    work = _work(equations.kinematics, trajectory, inputs)
+    balance = None
+    if work is not None and largest:
+        balance = float(np.abs(energy - energy[0] - work).max()) / largest
+    return EnergyBalance(
+        float(energy[0]),
+        float(energy[-1]),
+        None if work is None else float(work[-1]),
+        trajectory.energy_drift,
+        balance,
+    )
+
+
+def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, float]) -> NDArray[np.float64] | None:
+    """Work done up to each time (n_t,), by Gauss's quadrature of the power over each step; None if not known."""
+    if kinematics.mechanism.lagrangian is not None or not all(
+        e.is_zero for e in kinematics.constraints.time_derivative
+    ):
+        return None  # constraints that move do work of their own
+    values = {**trajectory.metadata["parameters"], **inputs}
+    graph = kinematics.graph
+    power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in inputs.items()})[0]
+    if power.is_zero:
+        return np.zeros(len(trajectory.t))
+    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
+    times = (start + step * (nodes + 1.0) / 2.0).ravel()
+    between = trajectory.at(times)
+    values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True))}
+    watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
+    return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
+
+
+def _power(kinematics: Kinematics) -> Expr:
+    """Power (W) of every force element without a potential: wrench . twist at its markers, in ground axes."""
+    motion, power = kinematics.motion, kinematics.graph.zero
+    for terms in kinematics.forces:
+        if terms.potential is not None:
+            continue
+        for load in terms.marker_loads:
+            power = power + vec.dot(load.force, motion.velocity(load.marker))
+            power = power + vec.dot(load.torque, motion.angular_velocity(load.marker))
+        for along in terms.coordinate_loads:
+            power = power + along.value * motion.coordinate(along.coordinate)[1]
+    return kinematics.resolve([power])[0]

@@ -1,0 +1,192 @@
+"""Stage cli, run: model file -> simulation, with what was derived, how long it took and how far to trust it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import UsageError
+from .derive import print_operations, summary
+from .failures import reports_failures
+from .options import (
+    blaming_option,
+    independent_option,
+    json_option,
+    load_model,
+    method_option,
+    model_argument,
+    parse_settings,
+)
+from .screen import finite, print_heading, print_json, print_rows, stage
+
+if TYPE_CHECKING:
+    from ..derivation import Equations
+    from ..describe import Model
+    from ..runtime import Module, Trajectory
+    from .energy import EnergyBalance
+
+TABLES = (".npz", ".csv")
+
+
+@click.command()
+@model_argument
+@method_option
+@independent_option
+@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Value of a parameter, an input or an initial value; repeat it for more.",
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
+@json_option
+@reports_failures
+def run(
+    model: Path,
+    method: str,
+    independent: tuple[str, ...],
+    end: float | None,
+    settings: tuple[str, ...],
+    out: Path | None,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Derive, compile and simulate a model, and report it.
+
+    Integrator, tolerances, end time and initial values are those of the model file.
+    """
+    chosen = parse_settings(settings)
+    if out is not None and out.suffix not in TABLES:
+        raise UsageError(f"--out {out}: a run is written as {' or '.join(TABLES)}")
+    if plot is not None:
+        from .plot import require_matplotlib
+
+        require_matplotlib()
+    from .. import pipeline
+
+    with blaming_option(independent), stage("derive") as parts:
+        described = load_model(model)
+        _complete(described, chosen)
+        equations = pipeline.derive(described, method, independent or None)
+        parts |= equations.seconds
+    with stage("compile") as parts:
+        before = set(equations.seconds)
+        module = equations.compile()
+        parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
+    initial, parameters, inputs = _sort(module, chosen)
+    start = perf_counter()
+    with stage("simulate"):
+        trajectory = module.simulate(
+            end, initial=initial or None, parameters=parameters or None, inputs=inputs or None, dense_output=True
+        )
+    seconds = {**equations.seconds, "simulate": perf_counter() - start}
+    from .energy import balance_energy
+
+    values = dict(zip(module.u_names, module.u.tolist(), strict=True)) | inputs
+    energy = balance_energy(equations, trajectory, values)
+    files = _write(equations, trajectory, module.doc, out, plot)
+    if as_json:
+        print_json(to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files})
+        return
+    click.echo(str(equations.report))
+    print_operations(equations)
+    print_trajectory(trajectory, energy)
+    for file in files:
+        click.echo(f"wrote {file}")
+
+
+def _complete(model: Model, settings: dict[str, float]) -> None:
+    """Give values to parameters that the model leaves open; others change without compiling anew."""
+    for entry in model.description.sections["parameters"]:
+        if entry.name in settings and entry.values.get("value") is None:
+            entry.values["value"] = settings[entry.name]
+
+
+def _sort(module: Module, settings: dict[str, float]) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Which settings are initial values, parameters and inputs; one namespace holds them all."""
+    loops = [*module.loop_names, *(f"{name}_dot" for name in module.loop_names)]
+    groups = [[*module.x_names, *loops], module.p_names, module.u_names]
+    known = [name for group in groups for name in group]
+    for name in settings:
+        if name not in known:
+            from ..runtime.names import unknown
+
+            raise unknown("parameter, input or initial value", name, known)
+    initial, parameters, inputs = ({n: v for n, v in settings.items() if n in group} for group in groups)
+    return initial, parameters, inputs
+
+
+def _write(equations: Equations, trajectory: Trajectory, doc: str, out: Path | None, plot: Path | None) -> list[str]:
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        trajectory.save(out)
+    if plot is not None:
+        from .plot import find_paths, plot_run
+
+        plot_run(trajectory, find_paths(equations.kinematics.mechanism), trajectory.name, plot)
+    return [str(file) for file in (out, plot) if file is not None]
+
+
+def final_names(trajectory: Trajectory) -> list[str]:
+    """Columns whose last value is reported: state, coordinates of cut joints and their rates, outputs."""
+    header = trajectory.metadata
+    loops = [name + suffix for suffix in ("", "_dot") for name in header["loop_names"]]
+    return list(dict.fromkeys([*header["x_names"], *loops, *header["y_names"]]))
+
+
+def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance) -> dict[str, Any]:
+    """A run as plain values."""
+    header, residuals = trajectory.metadata, trajectory.residuals
+    final = {name: finite(trajectory[name][-1]) for name in final_names(trajectory)}
+    return summary(equations) | {
+        "integration": {
+            "method": header["method"],
+            "rtol": header["rtol"],
+            "atol": header["atol"],
+            "end": float(trajectory.t[-1]),
+            "steps": len(trajectory) - 1,
+            "calls": trajectory.nfev,
+            "jacobians": trajectory.njev,
+        },
+        "loop_residual": {
+            "raw": residuals.raw_position,
+            "projected": residuals.position,
+            "correction": residuals.correction_position,
+            "raw_velocity": residuals.raw_velocity,
+            "projected_velocity": residuals.velocity,
+            "correction_velocity": residuals.correction_velocity,
+        },
+        "energy": {key: None if value is None else finite(value) for key, value in energy._asdict().items()},
+        "final": {"t": float(trajectory.t[-1]), **final},
+    }
+
+
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
+    """Statistics of a run, its residuals, its energy and its final values."""
+    header, residuals = trajectory.metadata, trajectory.residuals
+    print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
+    rows = [
+        ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
+        ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
+    ]
+    if header["loop_names"] or residuals.raw_position:
+        rows += [
+            ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
+            ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
+        ]
+    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
+    rows.append(("energy", f"{change}; kept to {energy.drift:.1e} of the largest kinetic energy"))
+    if energy.work:
+        rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
+        rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))
+    print_rows(rows)
+    print_heading(f"values at t = {trajectory.t[-1]:g} s")
+    print_rows(
+        [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]
+    )

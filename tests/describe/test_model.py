@@ -1,0 +1,259 @@
+"""The builder: joints with their names, forces, namespaces, handles, and the one table behind methods and files."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sympy
+
+from eomgen.describe import Mechanism, Model
+from eomgen.describe.fields import BODY, FORCE, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
+from eomgen.errors import ModelError, UsageError
+from eomgen.forces import Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Twist
+from eomgen.frames import GROUND
+from eomgen.joints import JOINTS
+
+
+def single(add: Callable[[Model], object], body: str = "b") -> Mechanism:
+    m = Model("one")
+    m.body(body, mass=1)
+    add(m)
+    return m.mechanism()
+
+
+@pytest.mark.parametrize(
+    ("type_name", "names"),
+    [
+        ("revolute", ("J",)),
+        ("prismatic", ("J",)),
+        ("cylindrical", ("J_z", "J_3")),
+        ("spherical", ("J_1", "J_2", "J_3")),
+        ("planar", ("J_x", "J_y", "J_3")),
+        ("free", ("J_x", "J_y", "J_z", "J_1", "J_2", "J_3")),
+        ("weld", ()),
+    ],
+)
+def test_default_names_of_coordinates(type_name: str, names: tuple[str, ...]) -> None:
+    m = single(lambda m: getattr(m, type_name)("J", m.ground, "b"))
+    assert m.joints[0].coordinates == names
+    assert not m.joints[0].named
+    assert type(m.joints[0].joint) is JOINTS[type_name]
+    given = tuple(f"q{k}" for k in range(len(names)))
+    if given:
+        m = single(lambda m: m.joint(type_name, "J", m.ground, "b", coordinates=given))
+        assert m.joints[0].coordinates == given
+        assert m.joints[0].named
+
+
+def test_options_and_axes() -> None:
+    m = single(lambda m: m.free("F", m.ground, "b", sequence="zxz"))
+    assert m.joints[0].joint.sequence == "zxz"  # type: ignore[attr-defined]
+    m = single(lambda m: m.spherical("F", m.ground, "b"))
+    assert m.joints[0].joint.sequence == "xyz"  # type: ignore[attr-defined]
+    m = single(lambda m: m.revolute("F", m.ground, "b", axis=np.array([0, 0, -2])))
+    assert [m.joints[0].successor.frame.rotation[k][2].value for k in range(3)] == [0, 0, -1]
+    m = single(lambda m: m.revolute("F", m.ground.at(0, 0, 0, rpy=("pi/2", 0, 0)), "b", axis="z"))
+    assert [m.joints[0].predecessor.frame.rotation[k][2].value for k in range(3)] == [0, -1, 0]
+    with pytest.raises(ModelError, match="a weld joint has no 'axis'"):
+        single(lambda m: m.joint("weld", "F", m.ground, "b", axis="x"))
+
+
+def test_several_joints_of_the_same_kind_of_names() -> None:
+    """Coordinates may be called x, y and vx: motion of markers is written as a call and does not clash."""
+
+    def add(m: Model) -> None:
+        m.planar("P", m.ground, "b", coordinates=("x", "y", "vx"))
+        m.output("far", "x + x(b) + vx*vx(b)")
+
+    assert set(single(add).quantities) == {"x(b)", "vx(b)"}
+
+
+def test_values_of_all_kinds() -> None:
+    r = sympy.Symbol("r", positive=True)  # assumptions do not matter, the name does
+
+    def add(m: Model) -> None:
+        m.parameter("r", sympy.Rational(1, 4))
+        m.parameter("k", "pi/2")
+        m.parameter("n", np.float64(2.5))
+        b = m.body("c", mass=np.int64(3), com=sympy.Matrix([r, 0, r**2]), inertia=sympy.diag(1, r, 1))
+        m.body("d", mass=1, inertia=np.diag([1.0, 2.0, 2.0]))
+        m.weld("J", m.ground, "b")
+        m.weld("K", b, "d")
+        m.revolute("H", b.at("r", 0.5, sympy.sin(r)), m.ground)
+
+    m = single(add)
+    assert [p.value for p in m.parameters] == [0.25, math.pi / 2, 2.5]
+    assert m.bodies[1].mass.value == 3.0
+    assert m.bodies[1].com[2] == m.graph.symbol("r") * m.graph.symbol("r")
+    assert m.bodies[2].inertia[1][1].value == 2.0
+    assert m.joints[2].predecessor.label == "c.at(r, 0.5, sin(r))"
+
+
+def test_forces() -> None:
+    m = Model("forces")
+    k, u = m.parameter("k", 2), m.input("u", 1.5)
+    b = m.body("b", mass=1)
+    p = b.marker("p", at=(1, 0, 0))
+    hinge = m.revolute("H", m.ground, b, coordinate="theta")
+    ball = m.spherical("S", b, m.body("c", mass=1))
+    theta, rate = hinge.coordinate, hinge.velocity
+    m.force("f1", p, (u, 0, k * sympy.sin(m.t)), axes="body")
+    m.torque("t1", "H", -k * theta)
+    m.torque("t2", b, (0, 0, 1))
+    m.torque("t3", "b.p", (0, 0, "u"))
+    m.torque("t4", ball.coordinates[1], 1)
+    m.spring("s1", m.ground, p, stiffness=k)
+    m.damper("d1", m.ground, p, "k*(1 + theta_dot**2)")
+    m.torsional_spring("s2", hinge, stiffness=k, angle=0.5)
+    m.torsional_spring("s3", m.ground, p, stiffness=k)
+    m.torsional_damper("d2", joint="S_3", damping=1)
+    m.friction("d3", "H", viscous=0.1)
+    m.actuator("a1", hinge, u)
+    m.actuator("a2", m.ground, "c", value=u * rate)
+    made = {f.name: f for f in m.mechanism().forces}
+    graph = m.mechanism().graph
+    assert isinstance(made["f1"], PointForce)
+    assert made["f1"].axes == "body"
+    assert made["f1"].marker.label == "b.p"
+    assert isinstance(made["t1"], Actuator)
+    assert made["t1"].path == JointCoordinate("theta")
+    assert isinstance(made["t2"], BodyTorque)
+    assert made["t2"].axes == "ground"
+    assert isinstance(made["t3"], BodyTorque)
+    assert made["t3"].marker.label == "b.p"
+    assert made["t4"].path == JointCoordinate("S_2")  # type: ignore[attr-defined]
+    assert isinstance(made["s1"], Spring)
+    assert isinstance(made["s1"].path, Line)
+    assert made["s1"].rest.value == 0.0
+    assert made["s1"].path.start.body == GROUND
+    assert isinstance(made["d1"], Damper)
+    assert isinstance(made["s2"], Spring)
+    assert made["s2"].path == JointCoordinate("theta")
+    assert made["s2"].rest.value == 0.5
+    assert isinstance(made["s3"], Spring)
+    assert isinstance(made["s3"].path, Twist)
+    assert made["d2"].path == JointCoordinate("S_3")  # type: ignore[attr-defined]
+    assert isinstance(made["d3"], Damper)
+    assert isinstance(made["a1"], Actuator)
+    assert made["a1"].path == JointCoordinate("theta")
+    assert isinstance(made["a2"], Actuator)
+    assert isinstance(made["a2"].path, Line)
+    assert graph is not m.mechanism().graph  # each check makes a graph of its own
+
+
+def test_wrong_calls() -> None:
+    m, other = Model("a"), Model("b")
+    b = m.body("b", mass=1)
+    with pytest.raises(UsageError, match="belongs to the model 'a'"):
+        other.revolute("J", other.ground, b)
+    with pytest.raises(UsageError, match="one joint or two markers"):
+        m.torsional_damper("d", b, b, b, damping=1)
+    with pytest.raises(UsageError, match="is a body or marker"):
+        m.friction("f", b, 1)
+    joint = m.spherical("J", m.ground, b)
+    with pytest.raises(UsageError, match="is a joint; a body"):
+        m.force("f", joint, (0, 0, 0))
+    with pytest.raises(UsageError, match=r"3 coordinates \(J_1, J_2, J_3\)"):
+        _ = joint.coordinate
+    with pytest.raises(AttributeError, match="did you mean 'revolute'"):
+        m.revolut("K", m.ground, b)
+
+
+def test_settings_are_set_and_read() -> None:
+    m = Model("s")
+    m.initial(theta=0.3)
+    m.initial["theta_dot"] = 1
+    m.independent("theta")
+    m.simulation(end=3)
+    assert (m.initial, m.independent, m.simulation) == ({"theta": 0.3, "theta_dot": 1}, ["theta"], {"end": 3})
+    m.independent = ["s"]
+    m.initial = {sympy.Symbol("s"): 2}
+    m.guess = {"s": 1}
+    m.simulation = {"rtol": 1e-6}
+    m.revolute("J", m.ground, m.body("b", mass=1), coordinate=sympy.Symbol("s"))
+    mechanism = m.mechanism()
+    assert mechanism.independent == ("s",)
+    assert mechanism.initial["s"].value == 2.0
+    assert mechanism.guess["s"].value == 1.0
+    assert (mechanism.simulation.rtol, mechanism.simulation.end) == (1e-6, 10.0)
+
+
+def test_an_output_may_repeat_its_coordinate() -> None:
+    def add(m: Model) -> None:
+        theta = m.revolute("theta", m.ground, "b").coordinate
+        m.output("theta", theta)
+        m.output("theta_dot", "theta_dot", unit="rad/s")
+        m.output("power", "theta_ddot*theta_dot")
+
+    m = single(add)
+    assert [o.name for o in m.outputs] == ["theta", "theta_dot", "power"]
+
+
+@pytest.mark.parametrize("inertia", [(0, 0, 1), (0, 1, 1), {"zz": 2}, (1.0, 1.0, 2.1), (0.066, 0.086, 0.0125)])
+def test_inertias_that_pass(inertia: object) -> None:
+    """Planar shortcuts, thin rods, and measured data that miss the triangle inequality by a tenth (PUMA 560)."""
+    m = Model("i")
+    m.weld("J", m.ground, m.body("b", mass=1, inertia=inertia))
+    m.mechanism()
+
+
+def test_an_inertia_written_in_two_ways_is_symmetric() -> None:
+    a, b, c = sympy.symbols("a b c")
+    m = Model("i")
+    for s in "abc":
+        m.parameter(s)
+    tensor = [[c, (a + b) * c, 0], [a * c + b * c, c, 0], [0, 0, c]]
+    m.weld("J", m.ground, m.body("b", mass=1, inertia=tensor))
+    m.mechanism()
+    tensor[0][1] = a * c
+    with pytest.raises(ModelError, match="not symmetric"):
+        m.weld("K", m.ground, m.body("d", mass=1, inertia=tensor))
+        m.mechanism()
+
+
+# -- one table -----------------------------------------------------------------------------------------------------
+def arguments(method: Callable[..., object]) -> dict[str, object]:
+    return {k: p.default for k, p in inspect.signature(method).parameters.items() if k not in ("self", "name")}
+
+
+def test_every_joint_has_a_method_with_the_keys_of_the_table() -> None:
+    for name in JOINTS:
+        keys = set(joint_fields(name)) - {"type", "between"}
+        if "coordinate" in keys:
+            keys -= {"coordinates"}  # in Python the one word is enough
+        assert set(arguments(getattr(Model, name))) - {"predecessor", "successor"} == keys
+
+
+def test_every_force_has_a_method_with_the_keys_of_the_table() -> None:
+    places = {"between", "joint", "body", "marker", "on", "a", "b"}
+    for name, fields in FORCE.items():
+        given = arguments(getattr(Model, name))
+        assert set(given) - places == set(fields) - places, name
+        for key, field in fields.items():
+            if isinstance(field.default, int | float) and key in given:
+                assert given[key] == field.default
+
+
+def test_the_other_methods_have_the_keys_of_the_table() -> None:
+    assert set(arguments(Model.parameter)) == set(PARAMETER) == set(arguments(Model.input))
+    assert set(arguments(Model.output)) == set(OUTPUT_FIELDS)
+    assert set(arguments(Model.body)) == set(BODY) - {"markers"}
+    assert {key for key in MODEL if hasattr(Model, key)} >= {"parameters", "bodies", "joints", "initial", "guess"}
+
+
+def test_a_joint_without_a_method_of_its_own_has_one_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(JOINTS, "hinge", JOINTS["revolute"])
+    m = single(lambda m: m.hinge("J", m.ground, "b", axis="x", coordinate="q"))
+    assert m.joints[0].coordinates == ("q",)
+
+
+def test_importing_the_builder_loads_no_sympy() -> None:
+    code = "import eomgen.describe, sys; print('sympy' in sys.modules, 'ruamel.yaml' in sys.modules)"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert result.stdout.split() == ["False", "False"]
