@@ -25,7 +25,7 @@ lint: $(VENV)/.installed-test
 	@$(BIN)/mypy
 
 bench: $(VENV)/.installed-plot
-	@$(BIN)/python benchmarks/run.py
+	@$(BIN)/python -m benchmarks.run
 
 clean:
 	@rm -rf $(VENV) build dist demo_output eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

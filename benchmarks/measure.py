@@ -83,7 +83,9 @@ def in_fresh_process(task: str, *arguments: Any, environment: Mapping[str, str] 
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def run_process(command: Sequence[str], environment: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+def run_process(
+    command: Sequence[str], environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a command to its end from the project's root.
 
     Raises

@@ -30,7 +30,9 @@ class Limit:
     def __str__(self) -> str:
         sign = "at least" if self.at_least else "at most"
         unit = f" {self.unit}" if self.unit else ""
-        return f"{'met' if self.met else 'MISSED'}: {self.what} {number(self.value)}{unit} ({sign} {number(self.bound)})"
+        return (
+            f"{'met' if self.met else 'MISSED'}: {self.what} {number(self.value)}{unit} ({sign} {number(self.bound)})"
+        )
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,17 @@ class ExpressionError(EomgenError, ValueError):
 
 
 class AssemblyError(EomgenError):
-    """The loops do not close from the given guess, or given values contradict each other."""
+    """The loops do not close from the given guess, or given values contradict each other.
+
+    Attributes
+    ----------
+    rows : tuple of str
+        Labels of the constraint rows that stay open the most, such as ``C.r_x`` of joint C.
+    """
+
+    def __init__(self, message: str, rows: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.rows = tuple(rows)
 
 
 class UsageError(EomgenError, ValueError):

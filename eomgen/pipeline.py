@@ -15,7 +15,7 @@ import numpy as np
 
 from .derivation import Equations
 from .equations import METHODS, TreeEquations
-from .errors import EomgenError, EvaluationError, ModelError, Problem, UsageError
+from .errors import AssemblyError, EomgenError, EvaluationError, ModelError, UsageError
 from .graph.evaluate import evaluate
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import ConstraintFunctions, Mobility, judge
@@ -74,10 +74,23 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     chosen = choose_method(mechanism, method)
     with _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
-        mobility = judge(kinematics, independent or ())
+        mobility = _judge(kinematics, independent or ())
     with _timed(seconds, "equations"):
         tree = METHODS[chosen](kinematics)
     return Equations(kinematics, mobility, tree, seconds)
+
+
+def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
+    """The mobility; a loop that does not close is reported at its joint's place in the description."""
+    try:
+        return judge(kinematics, independent)
+    except AssemblyError as error:
+        mechanism = kinematics.mechanism
+        names = [row.partition(".")[0] for row in error.rows]
+        joint = next((j.name for j in mechanism.joints if j.name in names), None)
+        if joint is None:
+            raise
+        raise AssemblyError(str(mechanism.problem(f"joints.{joint}", str(error))), error.rows) from None
 
 
 def check(model: Model) -> MechanismReport:
@@ -88,21 +101,9 @@ def check(model: Model) -> MechanismReport:
     ModelError, AssemblyError
     """
     equations = derive(model)
-    require_values(equations.kinematics.mechanism)
+    equations.kinematics.mechanism.require_values()
     require_inertia(equations.kinematics, equations.mobility, equations.tree)
     return report(equations.kinematics, equations.mobility)
-
-
-def require_values(mechanism: Mechanism) -> None:
-    """Refuse parameters without a value."""
-    problems = []
-    for p in mechanism.parameters:
-        if p.value is None:
-            path = f"parameters.{p.name}"
-            file, line = mechanism.lines.get(path, ("", 0))
-            problems.append(Problem(path, "has no value", "give one: derive can do without, a run cannot", file, line))
-    if problems:
-        raise ModelError(problems)
 
 
 def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
@@ -136,10 +137,9 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     for name in culprits:
         spec = next((j for j in m.joints if name in j.coordinates), None)
         path = f"joints.{spec.name}" if spec else f"lagrangian.{name}"
-        file, line = m.lines.get(path, ("", 0))
         what = "negative inertia" if sizes[0] < -1e-12 * abs(sizes[-1]) else "no inertia"
         message = f"coordinate {name!r} has {what} behind it: a motion along it moves no mass"
-        problems.append(Problem(path, message, "give the body it moves a mass or an inertia", file, line))
+        problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
     raise ModelError(problems)
 
 
@@ -151,7 +151,7 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     if target not in TARGETS:
         raise UsageError(f"no target {target!r}; there are: {', '.join(TARGETS)}")
     kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
-    require_values(kinematics.mechanism)
+    kinematics.mechanism.require_values()
     require_inertia(kinematics, mobility, tree)
     metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
     return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels)

@@ -2,7 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
+
 import pytest
+
+CACHE = pytest.StashKey[str]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compiled modules go to a cache of this run: every test shares it, and the user's own stays as it is."""
+    config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    shutil.rmtree(config.stash[CACHE], ignore_errors=True)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

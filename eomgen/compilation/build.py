@@ -159,8 +159,6 @@ def _build(
     product: str, objects: Sequence[str], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
     """Compile every file, link, publish."""
-    from concurrent.futures import ThreadPoolExecutor  # not needed by a warm start
-
     tell: Callable[[str], Any] = progress or (lambda line: None)
     with cache.attempt(key) as directory:
         folder = directory / "sources"
@@ -175,18 +173,29 @@ def _build(
             command = [*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"]
             _command(command, directory, folder / file)
 
-        with ThreadPoolExecutor(options.jobs or os.cpu_count()) as pool:
-            try:
-                list(pool.map(compile_one, files))
-            except BaseException:
-                pool.shutdown(wait=True, cancel_futures=True)
-                raise
+        _run_all(compile_one, files, options.jobs or os.cpu_count() or 1)
         tell(f"linking {name}")
         _command([*compiler.command, *compiled, *objects, "-o", product, *flags[""]], directory, directory / product)
         for file in compiled:
             (directory / file).unlink()
         recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags)}
         return cache.publish(directory, key, kind, name, product, recipe)
+
+
+def _run_all(task: Callable[[str], None], files: Sequence[str], jobs: int) -> None:
+    """Do a task for every file, some at a time; the first failure stops those that have not begun."""
+    if min(jobs, len(files)) == 1:
+        for file in files:
+            task(file)
+        return
+    from concurrent.futures import ThreadPoolExecutor  # slow to import
+
+    with ThreadPoolExecutor(jobs) as pool:
+        try:
+            list(pool.map(task, files))
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
 
 
 def _command(command: Sequence[str], directory: Path, source: Path) -> None:

@@ -108,6 +108,7 @@ def _identify(words: tuple[str, ...], search_path: str) -> CompilerInfo | str:
     version = result.stdout.strip()
     if any(Path(word).stem in ("zig", "ziglang") for word in command):
         kind = "zig"
+        version += f"\nzig {run([*command[:-1], 'version']).stdout.strip()}"  # the above is clang's
     elif "clang" in version:
         kind = "clang"
     elif "Free Software Foundation" in version:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.machinery
 import platform
 import sys
@@ -25,9 +26,8 @@ _lock = threading.Lock()  # Cython keeps state of its own
 
 def read_layer() -> str:
     """The text of _core.pyx that comes with eomgen."""
-    from importlib.resources import files
-
-    return (files("eomgen.templates") / "cython" / SOURCE).read_text(encoding="utf-8")
+    templates = importlib.import_module("eomgen.templates")
+    return (Path(templates.__path__[0]) / "cython" / SOURCE).read_text(encoding="utf-8")
 
 
 def describe_interpreter() -> dict[str, str]:

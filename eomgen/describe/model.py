@@ -146,6 +146,16 @@ class Model(JointMethods, ForceMethods):
         """The time, as a SymPy symbol."""
         return symbol("t")
 
+    @property
+    def kinetic_energy(self) -> Any:
+        """The kinetic energy of the mechanism, as a SymPy symbol for outputs."""
+        return symbol("kinetic_energy")
+
+    @property
+    def potential_energy(self) -> Any:
+        """The potential energy of gravity and springs, as a SymPy symbol for outputs."""
+        return symbol("potential_energy")
+
     # -- bodies ---------------------------------------------------------------------------------------------------
     def body(self, name: str, mass: Value = None, com: Vector = (0, 0, 0), inertia: Any = (0, 0, 0)) -> BodyHandle:
         """Add a rigid body.

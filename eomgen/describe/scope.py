@@ -21,10 +21,12 @@ _LEVEL_REMEDY = {
     NUMBER: "numbers and pi can",
     CONSTANT: "numbers, parameters and pi can",
     MOTION: "t, parameters, inputs, coordinates and their velocities can",
-    OUTPUT: "t, parameters, inputs, coordinates, their rates and motion of markers can",
+    OUTPUT: "t, parameters, inputs, coordinates, their rates, motion of markers and energies can",
 }
 _QUANTITY = re.compile(r"([va]?[xyz])\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
+#: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
+ENERGIES = ("kinetic_energy", "potential_energy")
 
 
 def quantity_of(name: str) -> tuple[str, str] | None:
@@ -101,6 +103,8 @@ class Scope:
         kind = self.names.kinds.get(name)
         if self.level == NUMBER:
             self._refuse(name, "name")
+        elif kind is None and name in ENERGIES and self.level >= OUTPUT:
+            return self.graph.symbol(f"{name}()")
         elif kind is None:
             known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"

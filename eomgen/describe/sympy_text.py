@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ..errors import ExpressionError, UsageError
-from ..graph.core import Graph
+from ..graph.core import Expr, Graph
 from .expressions import parse
-from .sympy_face import function_name
+from .scope import RATES
+from .sympy_face import free_names, function_name, function_names
 
 
 def sympy_text(expression: Any) -> str:
@@ -72,8 +73,18 @@ def sympy_text(expression: Any) -> str:
 
     text = str(Printer().doprint(expression))
     graph = Graph()
+    known = {*free_names([expression]), "t"} | {f + rate for f in function_names([expression]) for rate in RATES}
+
+    def resolve(name: str) -> Expr:
+        if name not in known:  # a constant of SymPy such as I or oo
+            raise ExpressionError(f"{name} is not a real number")
+        return graph.symbol(name)
+
+    def locate(quantity: str, marker: str) -> Expr:
+        return resolve(f"{quantity}({marker})")
+
     try:
-        parse(text, graph, graph.symbol, lambda quantity, marker: graph.symbol(f"{quantity}({marker})"))
+        parse(text, graph, resolve, locate)
     except ExpressionError as error:
         raise UsageError(f"{expression} cannot be written as a text: {error}") from None
     return text

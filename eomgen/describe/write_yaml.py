@@ -106,4 +106,11 @@ def _text(text: str) -> str:
     plain = _PLAIN.match(text) and isinstance(scalar(text), str) and not text.endswith(" ") and ": " not in text
     if plain and not text.startswith(("- ", "---", "...", "*")) and text not in ("-", "=", "<<", "*"):
         return text
-    return json.dumps(text)
+    return "".join(_escaped(c) for c in json.dumps(text, ensure_ascii=False))
+
+
+def _escaped(c: str) -> str:
+    """A character inside double quotes; what does not print is written as its number."""
+    if c.isprintable() and c != "\ufeff":
+        return c
+    return f"\\u{ord(c):04x}" if ord(c) <= 0xFFFF else f"\\U{ord(c):08x}"

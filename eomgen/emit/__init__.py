@@ -2,6 +2,7 @@
 
 from .c import emit_c
 from .numpy import emit_numpy
+from .package import emit_package
 from .sources import SourceSet
 
-__all__ = ["SourceSet", "emit_c", "emit_numpy"]
+__all__ = ["SourceSet", "emit_c", "emit_numpy", "emit_package"]

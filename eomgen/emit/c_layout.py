@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..program import Program
 
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "project", "close"),
+    "project": ("scaled", "cholesky", "project", "close", "project_drive"),
     "rhs": ("scaled", "cholesky", "project", "close", "partition", "embed", "ldl", "accelerate", "rhs"),
     "embedded_mass_matrix": ("scaled", "partition", "embed", "mass"),
     "kinematics": ("scaled", "partition", "embed", "kinematics", "kinematics_drive"),

@@ -46,6 +46,8 @@ def environment() -> Environment:
         autoescape=False,
     )
     made.filters["comment"] = lambda text: str(text).replace("*/", "* /")
+    made.filters["docstring"] = lambda text: str(text).replace("\\", "\\\\").replace('"', '\\"')
+    made.filters["toml"] = lambda text: json.dumps(str(text), ensure_ascii=False)
     return made
 
 

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import AssemblyError, ModelError, Problem
+from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..numeric import (
@@ -202,11 +202,17 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
             continue
         if name in known:
             message = f"{name!r} belongs to the joint that closes its loop, as the other joints were chosen too"
-            problems.append(Problem("independent", message, "choose fewer coordinates of one loop"))
+            problems.append(
+                kinematics.mechanism.problem("independent", message, "choose fewer coordinates of one loop")
+            )
         else:
             near = get_close_matches(name, known, 1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            problems.append(Problem("independent", f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"))
+            problems.append(
+                kinematics.mechanism.problem(
+                    "independent", f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"
+                )
+            )
     if problems:
         raise ModelError(problems)
 
@@ -267,13 +273,15 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         message = (
             f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
         )
-        raise ModelError([Problem("independent", message, f"choose {n_dof} of {', '.join(names)}")])
+        raise ModelError(
+            [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
+        )
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)
     if wanted and quality < 1e-8 and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
         better = [names[j] for j in choose_independent(jacobians, r)]
-        raise ModelError([Problem("independent", message, f"{', '.join(better)} can")])
+        raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
     rows = independent_rows(jacobians[int(np.argmax(ranks))], r) if r else np.empty(0, dtype=int)
     kept = tuple(int(i) for i in rows)
     return Mobility(

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
     from .continuation import follow
-    from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
     from .dependent import kinematics, solve_dependent
+    from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
     from .partitions import Partition, partition
     from .projection import correct_position, correct_velocity, project, tangent_projector
     from .ranks import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows

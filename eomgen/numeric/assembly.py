@@ -89,7 +89,7 @@ def assemble(
         else:
             return Assembly(q, residual, attempt, largest((q - guess) / scales.q))
     failure = _Failure(system, guess, held, best, flipped, names, labels, restarts)
-    raise AssemblyError(failure.message())
+    raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])
 
 
 def starts(guess: Array, reach: Array, restarts: int) -> Iterator[Array]:
@@ -130,7 +130,7 @@ class _Failure(NamedTuple):
                 f"the loops close only with the axes of a joint flipped{self._with(given)}; "
                 "give initial values nearer to the wanted position"
             )
-        gaps = f"the largest gaps are {self._gaps()}"
+        gaps = "the largest gaps are " + ", ".join(f"{label} {gap:.3g}" for label, gap in self.open_rows())
         if not given:
             return (
                 f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
@@ -166,7 +166,8 @@ class _Failure(NamedTuple):
         functions = self.system.equations.names if self.system.equations else ()
         return coordinates + [f"{name} = {value:.6g}" for name, value in zip(functions, y, strict=True)]
 
-    def _gaps(self) -> str:
+    def open_rows(self) -> list[tuple[str, float]]:
+        """The three rows that stay open the most: label and gap."""
         C = self.system.position(self.best)[0]
         e, found = self.system.scales.residual(C), list(C)
         labels = list(self.labels) or [f"C[{i}]" for i in range(len(C))]
@@ -176,4 +177,4 @@ class _Failure(NamedTuple):
             found += list(y)
             labels += list(self.system.equations.names)
         order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= 1e-8]
-        return ", ".join(f"{labels[i]} {abs(found[i]):.3g}" for i in order)
+        return [(labels[i], abs(float(found[i]))) for i in order]

@@ -71,8 +71,8 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
     expressions = kinematics.resolve([o.expression for o in kinematics.mechanism.outputs])
     graph = kinematics.graph
     energies = {
-        graph.symbol("kinetic_energy"): equations.kinetic_energy,
-        graph.symbol("potential_energy"): equations.potential_energy,
+        graph.symbol("kinetic_energy()"): equations.kinetic_energy,
+        graph.symbol("potential_energy()"): equations.potential_energy,
     }
     return substitute(expressions, energies)
 

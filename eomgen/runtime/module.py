@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from . import report
-from .initial import Initial
-from .kernels import Core, Kernels, Motion, Rows, State, Timed
+from .kernels import Kernels, Rows
 from .layout import Layout, number
-from .minimal import Minimal
-from .paths import Path, motions
 
 if TYPE_CHECKING:
+    from .initial import Initial
+    from .minimal import Minimal
+    from .paths import Path
+    from .protocols import Core, Motion, State, Timed
     from .trajectory import Trajectory
 
 
@@ -264,6 +264,8 @@ class Module:
         return 0 if abs(here) < 1e-8 else int(np.sign(here * (np.sign(there) or 1.0)))
 
     def _initial(self, t: float, p: Any, u: Any) -> Initial:
+        from .initial import Initial
+
         module = self if p is None and u is None else self.bind(p, u)
         return Initial(module.kernels, t)
 
@@ -271,7 +273,9 @@ class Module:
 
     @cached_property
     def _path(self) -> tuple[Path, Callable[[float], Array]]:
-        return Path(self.kernels), lru_cache(lambda t: Initial(self.kernels, t).reference())
+        from .paths import Path
+
+        return Path(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
 
     def kinematics(
         self,
@@ -310,6 +314,8 @@ class Module:
         """
         if p is not None or u is not None:
             return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
+        from .paths import motions
+
         path, reference = self._path
         start = None if guess is None else np.asarray(guess, dtype=float)
         q, v, a = motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
@@ -318,6 +324,8 @@ class Module:
     @cached_property
     def minimal(self) -> Minimal:
         """The strictly minimal form, ``x = [q_i; v_i]``; see :class:`~.minimal.Minimal`."""
+        from .minimal import Minimal
+
         return Minimal(self)
 
     # integration
@@ -358,16 +366,19 @@ class Module:
 
     def report(self) -> str:
         """What the model is made of, as text."""
-        return report.text(self)
+        from .report import text
+
+        return text(self)
 
     def __repr__(self) -> str:
-        n = self.n_dof
-        return (
-            f"<Module {self.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{report.listed(self.x_names)}]>"
-        )
+        from .report import line
+
+        return line(self)
 
     def _repr_html_(self) -> str:
-        return report.html(self)
+        from .report import html
+
+        return html(self)
 
 
 def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import SingularMassMatrixError
 from ..numeric import embedded, projection
-from ..numeric import kinematics as kinematics_of
+from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, Scales
 from .layout import Layout
 

@@ -47,6 +47,12 @@ def facts(module: Module) -> list[tuple[str, str]]:
     return lines
 
 
+def line(module: Module) -> str:
+    """One line."""
+    n = module.n_dof
+    return f"<Module {module.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{listed(module.x_names)}]>"
+
+
 def text(module: Module) -> str:
     """Several lines of plain text."""
     lines = facts(module)

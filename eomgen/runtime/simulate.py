@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
 from .integrate import Event, Solution, choose_solver, integrate, takes_jacobian
-from .kernels import Timed
 from .layout import number
 from .progress import Progress, wanted
 from .recording import record
@@ -19,6 +18,7 @@ from .signals import Forcing
 
 if TYPE_CHECKING:
     from .module import Module
+    from .protocols import Timed
     from .trajectory import Trajectory
 
 DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
@@ -115,7 +115,7 @@ def simulate(
                 run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
             )
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-        if run.failure() is None:
+        if run.last is None:
             raise
         raise run.ended(start, end, solver.__name__, str(error)) from run.cause()
     finally:
@@ -137,17 +137,25 @@ class _Run:
         self.forcing = forcing
         self.kernel: Timed = module.kernels.timed("rhs", nan=True)
         self.tangent: Timed | None = None
+        self.last: tuple[str, int, float, Array] | None = None
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
-        """f(t, x) for the solver: the kernel itself if nothing varies with time."""
+        """f(t, x) for the solver."""
         kernel, forcing = self.kernel, self.forcing
-        call: Callable[[float, Array], Array] = kernel
-        if forcing:
 
-            def forced(t: float, x: Array) -> Array:
-                return kernel(t, x, u=forcing(t, x))
+        def plain(t: float, x: Array) -> Array:
+            result = kernel(t, x)
+            if kernel.failure is not None:
+                self.remember("rhs", kernel)
+            return result
 
-            call = forced
+        def forced(t: float, x: Array) -> Array:
+            result = kernel(t, x, u=forcing(t, x))
+            if kernel.failure is not None:
+                self.remember("rhs", kernel)
+            return result
+
+        call = forced if forcing else plain
         if watch is None:
             return call
 
@@ -157,28 +165,24 @@ class _Run:
 
         return told
 
+    def remember(self, name: str, kernel: Timed) -> None:
+        """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
+        if kernel.failure is not None and (self.last is None or np.isfinite(kernel.failure[2]).all()):
+            self.last = (name, *kernel.failure)
+        kernel.failure = None
+
     def jacobian(self, t: float, x: Array) -> Array:
         """d(x')/dx, inputs that depend on the state included."""
         if self.tangent is None:
             self.tangent = self.module.kernels.timed("jacobian", nan=True)
-        if not self.forcing:
-            return self.tangent(t, x)
-        J = self.tangent(t, x, u=self.forcing(t, x))
+        J = self.tangent(t, x, u=self.forcing(t, x)) if self.forcing else self.tangent(t, x)
+        self.remember("jacobian", self.tangent)
         extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
         return J if extra is None else J + extra
 
-    def failure(self) -> tuple[str, int, float, Array] | None:
-        """The last failure of a kernel."""
-        if self.kernel.failure is not None:
-            return ("rhs", *self.kernel.failure)
-        if self.tangent is not None and self.tangent.failure is not None:
-            return ("jacobian", *self.tangent.failure)
-        return None
-
     def cause(self) -> EvaluationError | None:
-        """It as an exception."""
-        failure = self.failure()
-        return None if failure is None else self.module.kernels.fail.exception(*failure)
+        """The last failure of a kernel as an exception."""
+        return None if self.last is None else self.module.kernels.fail.exception(*self.last)
 
     def ended(self, t: float, end: float, method: str, words: str) -> SimulationError:
         """The error for a run that stopped at time t."""

@@ -1,4 +1,4 @@
-"""Shared by the tests of the command line: a call in this process, and a cache of their own."""
+"""Shared by the tests of the command line: a call in this process, in an empty folder."""
 
 from __future__ import annotations
 
@@ -31,19 +31,10 @@ class Result:
 Call = Callable[..., Result]
 
 
-@pytest.fixture(scope="session")
-def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One cache for all tests of the command line, so that each model is compiled once."""
-    return tmp_path_factory.mktemp("cache")
-
-
 @pytest.fixture
-def call(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, cache_folder: Path
-) -> Call:
+def call(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Call:
     """Call the command as ``call("check", file)`` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(cache_folder))
 
     def run(*words: object) -> Result:
         with pytest.raises(SystemExit) as left:

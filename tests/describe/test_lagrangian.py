@@ -64,7 +64,8 @@ def test_three_ways_to_write_it(which: int) -> None:
     assert not mechanism.joints
     compare(mechanism, models()[0].mechanism())
     q, v = VALUES["q"], VALUES["q_dot"]
-    expected = [float(energy(q, v).subs(VALUES)), VALUES["c"] * v**2, VALUES["tau"], q - 1]
+    numbers = {s: VALUES[s.name] for s in (m, l, g, t)}
+    expected = [float(energy(q, v).subs(numbers)), VALUES["c"] * v**2, VALUES["tau"], q - 1]
     assert _parts(mechanism) == pytest.approx(expected)
 
 
@@ -102,5 +103,5 @@ def test_a_clash_of_names() -> None:
     clash = Model.from_lagrangian("p", v**2, ["q"], inputs={"q_dot": 1})
     with pytest.raises(ModelError, match="'q_dot' is taken"):
         clash.mechanism()
-    with pytest.raises(ModelError, match="does not|no coordinates|at least one"):
+    with pytest.raises(ModelError, match="there are no coordinates; name at least one"):
         Model.from_lagrangian("p", v**2, []).mechanism()

@@ -14,7 +14,9 @@ def scales(library, n):
 def kkt(system, x, t=0.0):
     """Accelerations and multipliers from the augmented equations, least squares over redundant rows."""
     n, q, v = system.n, x[: system.n], x[system.n :]
-    M, h, C_q, gamma = (system.evaluate(f, q=q, v=v, t=t) for f in ("mass_matrix", "bias", "constraint_jacobian", "gamma"))
+    M, h, C_q, gamma = (
+        system.evaluate(f, q=q, v=v, t=t) for f in ("mass_matrix", "bias", "constraint_jacobian", "gamma")
+    )
     K = np.block([[M, C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])
     return np.linalg.lstsq(K, np.concatenate([-h, -gamma]), rcond=1e-12)[0][:n]
 

@@ -1,0 +1,59 @@
+"""Run benchmarks and write what they found: ``python -m benchmarks.run [NAME ...] [--quick] [--out DIR]``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from rich.console import Console
+
+from .measure import calibrate, describe_machine
+from .report import Report, show, write
+
+BENCHMARKS = ("derive", "growth", "compile", "panda", "latency", "call", "simulate")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the named benchmarks, all by default; 1 if one fails or misses what was promised."""
+    parser = argparse.ArgumentParser(prog="benchmarks.run", description=__doc__.split(":")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"which: {', '.join(BENCHMARKS)}; default all")
+    parser.add_argument("--quick", action="store_true", help="small sizes and single repeats, to see that all runs")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results", help="folder of the results")
+    options = parser.parse_args(arguments)
+    unknown = [name for name in options.names if name not in BENCHMARKS]
+    if unknown:
+        parser.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(BENCHMARKS)}")
+    # One thread everywhere: threads of a linear algebra library on matrices this small only add noise.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    console = Console(width=None if sys.stdout.isatty() else 120)
+    machine = describe_machine()
+    console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)
+    summary: list[str] = []
+    for name in options.names or BENCHMARKS:
+        report, circumstances = measure(name, options.quick, console)
+        write(options.out, name, report, circumstances | {"machine": machine, "quick": options.quick})
+        summary += [f"{name}: {limit}" for limit in report.limits if not limit.met]
+    for line in summary:
+        console.print(line, style="bold red", highlight=False)
+    return 1 if summary else 0
+
+
+def measure(name: str, quick: bool, console: Console) -> tuple[Report, dict[str, dict[str, float]]]:
+    """Run one benchmark between two calibrations and show it."""
+    module = import_module(f".{name}", __package__)
+    console.rule(f"{name}: {module.TITLE}")
+    before = calibrate()
+    report: Report = module.run(quick)
+    after = calibrate()
+    show(report, console)
+    calibration = {key: max(before[key], after[key]) for key in before}
+    console.print("  calibration: " + ", ".join(f"{k} {v:.3g}" for k, v in calibration.items()), style="dim")
+    return report, {"calibration": calibration}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

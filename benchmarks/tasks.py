@@ -1,0 +1,109 @@
+"""What runs in a process of its own: ``python -m benchmarks.tasks NAME '[arguments]'`` prints a result as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+METHODS = ("embedding", "lagrange")
+
+
+def derive_chain(n: int, method: str) -> dict[str, Any]:
+    """Describe and derive a chain with eomgen; a chain of one link first, so that nothing is imported within."""
+    from .models import chain
+
+    chain(1).derive(method)
+    start = perf_counter()
+    equations = chain(n).derive(method)
+    seconds = perf_counter() - start
+    return {"seconds": seconds, "operations": equations.operations["mass_matrix and bias"].total}
+
+
+def derive_chain_sympy(n: int, absolute: bool, counted: bool) -> dict[str, Any]:
+    """Describe and derive a chain with SymPy's KanesMethod; its caches are cleared after a chain of one link."""
+    from sympy.core.cache import clear_cache
+
+    from .peers import chain
+
+    chain(1, absolute)
+    clear_cache()
+    start = perf_counter()
+    kane = chain(n, absolute)
+    seconds = perf_counter() - start
+    return {"seconds": seconds, "operations": kane.operations() if counted else None}
+
+
+def derive_panda(method: str) -> dict[str, Any]:
+    """Describe and derive the Panda arm with eomgen, and count."""
+    from .models import chain, panda
+
+    chain(1).derive(method)
+    start = perf_counter()
+    equations = panda().derive(method)
+    seconds = perf_counter() - start
+    return {"seconds": seconds, "operations": {name: x.total for name, x in equations.operations.items()}}
+
+
+def derive_panda_sympy() -> dict[str, Any]:
+    """Describe and derive the Panda arm with SymPy's KanesMethod."""
+    from sympy.core.cache import clear_cache
+
+    from .peers import chain, panda
+
+    chain(1)
+    clear_cache()
+    start = perf_counter()
+    panda()
+    return {"seconds": perf_counter() - start}
+
+
+def compile_chain(n: int, layer_ready: bool) -> dict[str, float]:
+    """Seconds by stage from a derived chain to its loaded ``rhs``; ``layer_ready`` compiles another model before."""
+    import eomgen as eg
+
+    from .models import EXAMPLES, chain
+
+    if layer_ready:
+        eg.load(EXAMPLES / "pendulum.yaml").derive().compile(kernels=["rhs"])
+    equations = chain(n).derive()
+    derivation = dict(equations.seconds)
+    start = perf_counter()
+    module = equations.compile(kernels=["rhs"])
+    total = perf_counter() - start
+    start = perf_counter()
+    module.rhs(0.0, [0.1] * (2 * n))
+    stages = {stage: seconds for stage, seconds in equations.seconds.items() if stage not in derivation}
+    return {**stages, "total": total, "first call": perf_counter() - start, "derive": sum(derivation.values())}
+
+
+def run_double_pendulum_sympy() -> dict[str, float]:
+    """What a SymPy user does instead of ``eomgen run examples/double_pendulum.yaml``; seconds by stage."""
+    start = perf_counter()
+    from scipy.integrate import solve_ivp
+
+    from .peers import pendulum_rhs
+
+    imported = perf_counter()
+    rhs = pendulum_rhs({"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 9.81})
+    derived = perf_counter()
+    solve_ivp(rhs, (0.0, 10.0), [1.5707963267948966, 0.0, 0.0, 0.0], method="DOP853", rtol=1e-11, atol=1e-13)
+    return {"import": imported - start, "derive": derived - imported, "simulate": perf_counter() - derived}
+
+
+TASKS: dict[str, Callable[..., Any]] = {
+    task.__name__: task
+    for task in (
+        derive_chain,
+        derive_chain_sympy,
+        derive_panda,
+        derive_panda_sympy,
+        compile_chain,
+        run_double_pendulum_sympy,
+    )
+}
+
+if __name__ == "__main__":
+    print(json.dumps(TASKS[sys.argv[1]](*json.loads(sys.argv[2]))))

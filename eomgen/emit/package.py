@@ -1,0 +1,131 @@
+"""Stage emit: Program -> a package that stands alone: C library, or Python package with a compiled or a NumPy core."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.resources import files
+from typing import Any
+
+from ..errors import UsageError
+from ..program import KERNELS, Program
+from .c import emit_c
+from .layouts import describe_layouts
+from .numpy import emit_numpy
+from .sources import SourceSet, read_template, render
+
+#: Annotated attributes of the package, all of its default module.
+ANNOTATED: tuple[tuple[str, str], ...] = (
+    *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs")),
+    *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
+    ("inverse_dynamics", "Motion"),
+    *((name, "Rows") for name in ("constraints", "constraint_jacobian")),
+    *((name, "tuple[str, ...]") for name in
+      ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names")),
+    *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
+    ("metadata", "dict[str, object]"),
+)  # fmt: skip
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate")
+
+
+def emit_package(program: Program, target: str) -> SourceSet:
+    """All files of an exported package, relative to its own folder.
+
+    Parameters
+    ----------
+    program : Program
+    target : {'cython', 'numpy', 'c'}
+
+    Returns
+    -------
+    SourceSet
+        ``c``: sources, header, Makefile, README.md.  ``cython`` and ``numpy``: a Python package whose root is the
+        folder itself, with pyproject.toml; installs with pip, needs NumPy alone.
+
+    Raises
+    ------
+    UsageError
+        An unknown target.
+    """
+    makers: dict[str, Callable[[Program], dict[str, str]]] = {"cython": _cython, "numpy": _numpy, "c": _c_library}
+    if target not in makers:
+        raise UsageError(f"no target {target!r}; there are {', '.join(makers)}")
+    return SourceSet(makers[target](replace(program, metadata={**program.metadata, "target": target})))
+
+
+def _cython(program: Program) -> dict[str, str]:
+    context = _context(program)
+    return {
+        **emit_c(program),
+        "_core.pyx": read_template("cython/_core.pyx"),
+        "setup.py": render("python/setup.py.j2", context),
+        **_python_files(context),
+        **_runtime_files(),
+    }
+
+
+def _numpy(program: Program) -> dict[str, str]:
+    return {**emit_numpy(program), **_python_files(_context(program)), **_runtime_files()}
+
+
+def _c_library(program: Program) -> dict[str, str]:
+    context = _context(program)
+    return {
+        **emit_c(program),
+        "Makefile": render("c/Makefile.j2", context),
+        "README.md": render("c/README.md.j2", context),
+    }
+
+
+def _python_files(context: dict[str, Any]) -> dict[str, str]:
+    names = ("__init__.py", "__init__.pyi", "pyproject.toml", "README.md")
+    return {name: render(f"python/{name}.j2", context) for name in names}
+
+
+def _runtime_files() -> dict[str, str]:
+    """errors.py, numeric/ and runtime/ as they are in eomgen itself."""
+    root = files("eomgen")
+    found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
+    for folder in ("numeric", "runtime"):
+        for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
+            if item.name.endswith(".py"):
+                found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
+    return found
+
+
+def _context(program: Program) -> dict[str, Any]:
+    metadata = program.metadata
+    results = {k.name: k.result for k in KERNELS}
+    doc = str(metadata.get("doc") or "").strip()
+    q = list(metadata.get("q_reference") or [0.0] * program.sizes.n_q)
+    return {
+        "name": program.name,
+        "prefix": program.name.upper(),
+        "doc": doc,
+        "description": doc.splitlines()[0] if doc else f"Equations of motion of {program.name}",
+        "target": metadata["target"],
+        "compiled": metadata["target"] == "cython",
+        "metadata": metadata,
+        "layouts": describe_layouts(program),
+        "kernels": [
+            {
+                "name": k.name,
+                "ports": [port.name for port in k.ports],
+                "shape": str(k.shape),
+                "result": results[k.name],
+            }
+            for k in program.kernels
+        ],
+        "attributes": [*(name for name, _ in ANNOTATED), *METHODS],
+        "annotations": ANNOTATED,
+        "methods": METHODS,
+        "p_values": _numbers(metadata.get("p_values")),
+        "u_values": _numbers(metadata.get("u_values")),
+        "x_values": _numbers([*q, *[0.0] * program.sizes.n_v]),
+    }
+
+
+def _numbers(values: Any) -> str:
+    """Numbers as the inside of a C initialiser; a value that is not given becomes 0."""
+    return ", ".join(json.dumps(0.0 if x is None else float(x)) for x in values or ()) or "0.0"

@@ -1,0 +1,9 @@
+static int drive_project(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                         double *restrict out, double *restrict w)
+{
+    const int status = close_loops(t, x, u, c, w);
+    for (int k = 0; k < 2 * N; k++) {
+        out[k] = w[AT_X + k];
+    }
+    return status;
+}

@@ -1,0 +1,86 @@
+"""README and docs: every block of Python, YAML and shell in them runs as it stands."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import eomgen
+from eomgen.describe.fields import FORCE, LAGRANGIAN, MODEL, SIMULATION
+from eomgen.describe.names import FUNCTIONS, QUANTITIES
+from eomgen.joints import JOINTS
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def blocks(path: Path, language: str) -> list[str]:
+    """Fenced blocks of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+
+
+def having(language: str) -> list[Path]:
+    return [path for path in DOCUMENTS if blocks(path, language)]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", having("python"), ids=lambda p: p.name)
+def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
+    script = here / "document.py"
+    script.write_text("\n".join(blocks(path, "python")), encoding="utf-8")
+    result = subprocess.run([sys.executable, "-W", "error", script], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize("path", having("yaml"), ids=lambda p: p.name)
+def test_yaml_blocks_pass_check(path: Path, here: Path) -> None:
+    for text in blocks(path, "yaml"):
+        (here / "model.yaml").write_text(text, encoding="utf-8")
+        assert eomgen.load("model.yaml").check().degrees_of_freedom > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", having("console"), ids=lambda p: p.name)
+def test_commands_run_in_order(path: Path, here: Path) -> None:
+    commands = [line[2:] for text in blocks(path, "console") for line in text.splitlines() if line.startswith("$ ")]
+    assert commands
+    for command in commands:
+        program, *words = shlex.split(command)
+        assert program == "eomgen"
+        result = subprocess.run(
+            [sys.executable, "-m", "eomgen.cli", *words], capture_output=True, text=True, env=dict(os.environ)
+        )
+        assert result.returncode == 0, f"{command}\n{result.stderr}"
+
+
+def test_links_lead_somewhere() -> None:
+    for path in DOCUMENTS:
+        for target in re.findall(r"\]\(([^)#:]+)\)", path.read_text(encoding="utf-8")):
+            assert (path.parent / target).exists(), f"{path.name}: {target}"
+
+
+def test_the_model_file_page_knows_every_key() -> None:
+    text = (ROOT / "docs" / "model_file.md").read_text(encoding="utf-8")
+    words = set(re.findall(r"\w+", text))
+    keys = {*MODEL, *LAGRANGIAN, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
+    keys |= {key for fields in FORCE.values() for key in fields} | {o for j in JOINTS.values() for o in j.options}
+    assert keys - words == set()
+
+
+def test_the_readme_shows_the_slider_crank_that_ships() -> None:
+    (shown,) = blocks(ROOT / "README.md", "yaml")
+    shipped = (ROOT / "examples" / "slider_crank.yaml").read_text(encoding="utf-8")
+    shipped = re.sub(r"^doc:.*\n", "", shipped, flags=re.MULTILINE)
+    assert re.sub(r" *#.*", "", shown) == shipped

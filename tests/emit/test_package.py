@@ -1,0 +1,128 @@
+"""Exported packages: what is in them, and that they work on their own."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eomgen.errors
+from eomgen.emit import SourceSet, emit_c, emit_numpy, emit_package
+
+ROOT = Path(eomgen.errors.__file__).parent
+ALONE = """
+import sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("eomgen", "sympy", "jinja2", "scipy"):
+            raise ImportError(name)
+sys.meta_path.insert(0, Refuse())
+import numpy as np
+import crank
+x = crank.x0(theta=0.3, theta_dot=10.0)
+assert np.abs(crank.constraints(x[:3])).max() < 1e-12
+x_dot = crank.rhs(0.0, x)
+assert np.allclose(x_dot[:3], x[3:], rtol=1e-13) and np.isfinite(x_dot).all()
+assert set(crank.__all__) <= set(dir(crank)) | {"minimal"}
+assert crank.minimal.rhs(0.0, [0.3, 10.0]).shape == (2,)
+try:
+    crank.simulate((0, 1))
+except crank.EomgenError as error:
+    assert "scipy" in str(error).lower()
+else:
+    raise AssertionError("simulate ran without SciPy")
+print(repr(x_dot.tolist()))
+"""
+
+
+def run_alone(folder, interpreter=sys.executable):
+    done = subprocess.run(
+        [interpreter, "-c", ALONE], cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)}, capture_output=True,
+        text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return np.array(json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def packages(systems, libraries, tmp_path_factory):
+    made = {}
+    for target in ("cython", "numpy", "c"):
+        made[target] = folder = tmp_path_factory.mktemp(target)
+        libraries.write(emit_package(systems.slider_crank().program(), target), folder / "crank")
+    return made
+
+
+def test_the_files_of_each_target(packages):
+    files = {
+        target: {str(p.relative_to(folder / "crank")) for p in folder.rglob("*") if p.is_file()}
+        for target, folder in packages.items()
+    }
+    assert files["c"] == {"crank.c", "crank.h", "eomgen.h", "model.json", "README.md", "Makefile"}
+    copied = {"errors.py"} | {str(p.relative_to(ROOT)) for d in ("numeric", "runtime") for p in (ROOT / d).glob("*.py")}
+    python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md"}
+    assert files["numpy"] == copied | python | {"_core.py"}
+    assert files["cython"] == copied | python | {"_core.pyx", "setup.py", "crank.c", "crank.h", "eomgen.h"}
+    for name in copied:
+        assert (packages["cython"] / "crank" / name).read_bytes() == (ROOT / name).read_bytes()
+    for target, folder in packages.items():
+        assert json.loads((folder / "crank" / "model.json").read_text())["target"] == target
+
+
+def test_the_numpy_package_runs_with_numpy_alone(packages, systems, compiled):
+    x_dot = run_alone(packages["numpy"])
+    system = systems.slider_crank()
+    q = [0.3, -np.arcsin(0.1 * np.sin(0.3) / 0.35), 0.0]
+    q[2] = 0.1 * np.cos(0.3) + 0.35 * np.cos(q[1])
+    rate = -0.1 * np.cos(0.3) / (0.35 * np.cos(q[1])) * 10.0
+    v = [10.0, rate, -0.1 * np.sin(0.3) * 10.0 - 0.35 * np.sin(q[1]) * rate]
+    np.testing.assert_allclose(x_dot, compiled(system).fine("rhs", [*q, *v]), rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_cython_package_installs_and_runs_with_numpy_alone(packages, tmp_path):
+    options = "--quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --target".split()
+    command = [sys.executable, "-m", "pip", "install", *options, str(tmp_path), str(packages["cython"] / "crank")]
+    environment = {**os.environ, "CFLAGS": "-O0"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    np.testing.assert_allclose(run_alone(tmp_path), run_alone(packages["numpy"]), rtol=1e-10)
+
+
+def test_the_c_package_builds_its_libraries_and_its_example(packages):
+    folder = packages["c"] / "crank"
+    (folder / "main.c").write_text(re.search(r"```c\n(.*?)```", (folder / "README.md").read_text(), re.S).group(1))
+    subprocess.run(
+        ["make", "-s", "all", "main", "CFLAGS=-O0 -std=c99 -fPIC -Wall -Wextra -Werror"], cwd=folder, check=True
+    )
+    done = subprocess.run(["./main"], cwd=folder, capture_output=True, text=True, check=True)
+    assert len(done.stdout.split()) == 6
+    assert (folder / "libcrank.so").exists()
+
+
+def test_awkward_documentation_breaks_nothing(systems, libraries, tmp_path):
+    system = systems.chain(1)
+    system.metadata["doc"] = 'It says """hello""" \\n */ and {{ more }} ?? \x41\nsecond line'
+    compile(emit_package(system.program(), "numpy")["__init__.py"], "__init__.py", "exec")
+    project = tomllib.loads(emit_package(system.program(), "cython")["pyproject.toml"])
+    assert project["project"]["description"].startswith('It says """hello"""')
+    path = libraries.compile_library(emit_c(system.program()), tmp_path)
+    assert libraries.Library(path).metadata["doc"] == system.metadata["doc"]
+
+
+def test_sources_are_a_frozen_mapping(systems):
+    sources = emit_numpy(systems.chain(1).program())
+    assert isinstance(sources, SourceSet)
+    assert set(sources) == {"_core.py", "model.json"}
+    with pytest.raises(TypeError):
+        sources["x"] = ""
+
+
+def test_an_unknown_target_is_refused_with_those_there_are(systems):
+    with pytest.raises(eomgen.errors.UsageError, match="cython, numpy, c"):
+        emit_package(systems.chain(1).program(), "fortran")

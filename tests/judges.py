@@ -1,0 +1,167 @@
+"""Judges from outside in NumPy: rigid-body dynamics from body poses alone, and the augmented form with multipliers.
+
+Derivatives are central differences of tenth order, good to about 1e-13 of the function's size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from eomgen.graph import evaluate
+
+STEP = 0.02
+FIRST = np.array([5 / 6, -5 / 21, 5 / 84, -5 / 504, 1 / 1260])
+SECOND = np.array([5 / 3, -5 / 21, 5 / 126, -5 / 1008, 1 / 3150])
+OFFSETS = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+
+
+def first(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, h: float = STEP) -> np.ndarray:
+    """Derivative of f at x along d; f takes states as columns and gives results along the last axis."""
+    size = max(1.0, np.abs(d).max(initial=0.0))
+    s = h / size
+    plus, minus = (f(x[:, None] + sign * s * np.outer(d, OFFSETS)) for sign in (1, -1))
+    return (plus - minus) @ FIRST / s
+
+
+def second(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, h: float = 2 * STEP) -> np.ndarray:
+    """Second derivative of f at x along d."""
+    size = max(1.0, np.abs(d).max(initial=0.0))
+    s = h / size
+    plus, minus = (f(x[:, None] + sign * s * np.outer(d, OFFSETS)) for sign in (1, -1))
+    return (plus + minus - 2 * f(x[:, None])) @ SECOND / s**2
+
+
+@dataclass(frozen=True)
+class RigidBodies:
+    """Masses (k,), centres (k, 3) and central inertias (k, 3, 3) in body axes, and gravity (3,)."""
+
+    masses: np.ndarray
+    centers: np.ndarray
+    inertias: np.ndarray
+    gravity: np.ndarray
+
+
+def rigid_bodies(mechanism: Any, p: Mapping[str, float] | None = None) -> RigidBodies:
+    """The numbers of a mechanism's bodies at its declared parameter values."""
+    values = {parameter.name: parameter.value for parameter in mechanism.parameters} | dict(p or {})
+
+    def numbers(expressions: list[Any]) -> np.ndarray:
+        return np.array(evaluate(expressions, values), dtype=float)
+
+    bodies = mechanism.bodies
+    return RigidBodies(
+        numbers([b.mass for b in bodies]),
+        numbers([x for b in bodies for x in b.com]).reshape(-1, 3),
+        numbers([x for b in bodies for row in b.inertia for x in row]).reshape(-1, 3, 3),
+        numbers(list(mechanism.gravity)),
+    )
+
+
+def vee(W: np.ndarray) -> np.ndarray:
+    """Axial vectors (k, 3) of the skew parts of matrices (k, 3, 3)."""
+    return np.stack([W[:, 2, 1] - W[:, 1, 2], W[:, 0, 2] - W[:, 2, 0], W[:, 1, 0] - W[:, 0, 1]], axis=1) / 2
+
+
+class Bodies:
+    """Motion of all bodies at one state of a module, by differences of its poses alone.
+
+    Attributes
+    ----------
+    R, r : (k, 3, 3), (k, 3)
+    J_w, J_r : (k, 3, n): angular velocity and velocity of the body origin per generalized velocity
+    w, v : (k, 3) at the given velocities; w_dot, r_ddot: their rates for vanishing generalized accelerations
+    """
+
+    def __init__(self, module: Any, q: np.ndarray, v: np.ndarray, t: float = 0.0) -> None:
+        def poses(columns: np.ndarray) -> np.ndarray:
+            return module.poses(columns, t=t)
+
+        n = len(q)
+        here = module.poses(q, t=t)
+        self.R, self.r = here[:, :3, :3], here[:, :3, 3]
+        slopes = np.stack([first(poses, q, e) for e in np.eye(n)], axis=-1) if n else np.zeros((*here.shape, 0))
+        turned = np.einsum("kabj,kcb->kacj", slopes[:, :3, :3], self.R)
+        self.J_w = np.stack([vee(turned[..., j]) for j in range(n)], axis=-1)
+        self.J_r = slopes[:, :3, 3]
+        self.w, self.v = self.J_w @ v, self.J_r @ v
+        bend = second(poses, q, v)
+        self.w_dot = vee(np.einsum("kab,kcb->kac", bend[:, :3, :3], self.R))
+        self.r_ddot = bend[:, :3, 3]
+
+    def point(self, body: int, at: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position, velocity (3,) and velocity Jacobian (3, n) of a point fixed in a body, -1 for ground."""
+        at = np.asarray(at, dtype=float)
+        n = self.J_r.shape[-1]
+        if body < 0:
+            return at, np.zeros(3), np.zeros((3, n))
+        arm = self.R[body] @ at
+        J = self.J_r[body] + np.cross(self.J_w[body].T, arm).T
+        return self.r[body] + arm, self.v[body] + np.cross(self.w[body], arm), J
+
+    def newton_euler(self, rigid: RigidBodies) -> tuple[np.ndarray, np.ndarray]:
+        """M (n, n) and h (n,) with gravity alone: M a + h = generalized forces of everything else."""
+        n = self.J_r.shape[-1]
+        M, h = np.zeros((n, n)), np.zeros(n)
+        for k, mass in enumerate(rigid.masses):
+            arm = self.R[k] @ rigid.centers[k]
+            J = self.J_r[k] + np.cross(self.J_w[k].T, arm).T
+            w = self.w[k]
+            a = self.r_ddot[k] + np.cross(self.w_dot[k], arm) + np.cross(w, np.cross(w, arm))
+            tensor = self.R[k] @ rigid.inertias[k] @ self.R[k].T
+            M += mass * J.T @ J + self.J_w[k].T @ tensor @ self.J_w[k]
+            h += mass * J.T @ (a - rigid.gravity)
+            h += self.J_w[k].T @ (tensor @ self.w_dot[k] + np.cross(w, tensor @ w))
+        return M, h
+
+
+def loop_terms(module: Any, q: np.ndarray, v: np.ndarray, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """C_q (all rows) and gamma of C_q a + gamma = 0 for constraints without t, gamma by differences of C_q v."""
+    C_q = module.constraint_jacobian(q, t=t, rows="all")
+
+    def rate(columns: np.ndarray) -> np.ndarray:
+        return np.einsum("ijk,j->ik", module.constraint_jacobian(columns, t=t, rows="all"), v)
+
+    return C_q, first(rate, q, v)
+
+
+def augmented(M: np.ndarray, h: np.ndarray, C_q: np.ndarray, gamma: np.ndarray) -> np.ndarray:
+    """Accelerations from [[M, C_q^T], [C_q, 0]] [a; l] = [-h; -gamma] (Shabana, sec. 5.6), redundant rows allowed.
+
+    Rows are made orthonormal first (by singular values), which leaves their solutions as they are.
+    """
+    n = len(h)
+    U, sizes, Vt = np.linalg.svd(C_q / np.abs(C_q).max(initial=1.0))
+    rank = int((sizes > 1e-9).sum())
+    G = Vt[:rank]
+    right = (U.T @ (gamma / np.abs(C_q).max(initial=1.0)))[:rank] / sizes[:rank]
+    size = np.abs(M).max()
+    K = np.block([[M / size, G.T], [G, np.zeros((rank, rank))]])
+    return np.linalg.solve(K, np.concatenate([-h / size, -right]))[:n]
+
+
+def random_states(module: Any, seed: int, count: int, position: float = 0.15, speed: float = 3.0) -> list[np.ndarray]:
+    """States on the manifold near the declared initial position, with random velocities."""
+    random = np.random.default_rng(seed)
+    start = module.x0()
+    n = module.n_q
+    sizes = np.array(
+        [module.metadata["length_scale"] if k == "length" else 1.0 for k in module.metadata["coordinate_kinds"]]
+    )
+    found = []
+    for _ in range(count):
+        x = start.copy()
+        x[:n] += position * sizes * random.uniform(-1, 1, n)
+        x[n:] = speed * sizes * random.uniform(-1, 1, n)
+        found.append(module.project(x))
+    return found
+
+
+def agree(a: np.ndarray, b: np.ndarray, digits: float, cond: float = 1.0) -> None:
+    """Accelerations agree to 10^-k: |difference| <= 1e-k max(1, cond(M)/1e3) max|v'|."""
+    allowed = digits * max(1.0, cond / 1e3) * np.abs(b).max(initial=0.0)
+    worst = np.abs(a - b).max(initial=0.0)
+    assert worst <= allowed, f"differ by {worst:.3g}, allowed {allowed:.3g}\n{a}\n{b}"

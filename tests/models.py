@@ -1,0 +1,228 @@
+"""Models for the acceptance tests: the shipped examples by name, and variations on them in Python."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import eomgen as eg
+
+TESTS = Path(__file__).parent
+EXAMPLES = TESTS.parent / "examples"
+EXAMPLE_NAMES = (
+    "pendulum",
+    "double_pendulum",
+    "two_link_manipulator",
+    "slider_crank",
+    "four_bar",
+    "peaucellier",
+    "chain",
+    "cart_pendulum",
+    "spherical_pendulum",
+    "andrews_squeezer",
+)
+
+
+@cache
+def reference(name: str) -> Any:
+    """Published numbers, with their source."""
+    return json.loads((TESTS / "reference" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def offset_slider_crank() -> eg.Model:
+    """Slider-crank whose guide lies e above the crank's pivot; thin rods."""
+    m = eg.Model("offset_slider_crank", gravity=(0, -9.81, 0))
+    r, l, e = m.parameter("r", 0.15), m.parameter("l", 0.5), m.parameter("e", 0.05)
+    crank = m.body("crank", mass=1.0, com=(r / 2, 0, 0), inertia={"zz": r**2 / 12})
+    rod = m.body("rod", mass=0.8, com=(l / 2, 0, 0), inertia={"zz": 0.8 * l**2 / 12})
+    slider = m.body("slider", mass=0.5)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(r, 0, 0), rod)
+    m.revolute("C", rod.at(l, 0, 0), slider)
+    m.prismatic("D", m.ground.at(0, e, 0), slider, axis="x", coordinate="s")
+    m.initial(theta=0.3)
+    m.guess(s=0.6)
+    m.independent("theta")
+    return m
+
+
+def free_slider_crank() -> eg.Model:
+    """The rigid slider-crank of planar_slider_crank_dynamics.json (Flores, Leine and Glocker 2010)."""
+    given = reference("planar_slider_crank_dynamics")["parameters_SI"]
+    m = eg.Model("free_slider_crank", gravity=(0, "-g", 0))
+    p = {name: m.parameter(name, value) for name, value in given.items()}
+    crank = m.body("crank", mass=p["m1"], com=(p["l1"] / 2, 0, 0), inertia={"zz": p["J1"]})
+    rod = m.body("rod", mass=p["m2"], com=(p["l2"] / 2, 0, 0), inertia={"zz": p["J2"]})
+    slider = m.body("slider", mass=p["m3"])
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(p["l1"], 0, 0), rod, coordinate="bend")
+    m.revolute("C", rod.at(p["l2"], 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="x")
+    m.output("beta", "theta + bend")
+    m.initial(theta=0, theta_dot=10)
+    m.guess(bend=0, x=0.4)
+    return m
+
+
+def point_chain() -> eg.Model:
+    """Three point masses on massless rods: pm3_horizontal of nlink_chain.json."""
+    m = eg.Model("point_chain", gravity=(0, -9.81, 0))
+    previous = m.ground
+    for k in (1, 2, 3):
+        link = m.body(f"link{k}", mass=1, com=(0, -1, 0))
+        m.revolute(f"q{k}", previous, link)
+        previous = link.at(0, -1, 0)
+    m.initial(q1=np.pi / 2)
+    return m
+
+
+def tilted_four_bar() -> eg.Model:
+    """The example four_bar in a plane of general attitude and place: no row of its loop vanishes identically."""
+    m = eg.Model("tilted_four_bar")
+    rpy = (0.4, -0.7, 1.1)
+    a4 = np.array(rotation(rpy)) @ np.array([0.1, 0.0, 0.0])
+    at = np.array([0.03, -0.02, 0.05])
+
+    def link(name: str, length: float) -> Any:
+        return m.body(name, mass=length, com=(length / 2, 0, 0), inertia={"zz": length**3 / 12})
+
+    crank, coupler, rocker = link("crank", 0.04), link("coupler", 0.12), link("rocker", 0.08)
+    m.revolute("A", m.ground.at(*at, rpy=rpy), crank, coordinate="theta")
+    m.revolute("B", crank.at(0.04, 0, 0), coupler, coordinate="bend")
+    m.revolute("C", coupler.at(0.12, 0, 0), rocker.at(0.08, 0, 0))
+    m.revolute("D", m.ground.at(*(at + a4), rpy=rpy), rocker, coordinate="psi")
+    m.initial(theta=np.pi / 3, theta_dot=10)
+    m.guess(bend=-0.7, psi=1.1)
+    m.independent("theta")
+    return m
+
+
+def skewed_four_bar() -> eg.Model:
+    """A planar four-bar in which every joint's markers are turned by general angles in their bodies."""
+    m = eg.Model("skewed_four_bar")
+    lengths = {"crank": 0.04, "coupler": 0.12, "rocker": 0.08}
+    turns = {
+        "crank": (0.3, 0.2, 0.0),
+        "coupler": (-0.5, 0.4, 0.1),
+        "rocker": (0.2, -0.6, -0.3),
+        "ground": (0.7, 0.1, 0.2),
+    }
+    R = {name: rotation(rpy) for name, rpy in turns.items()}
+    bodies: dict[str, Any] = {"ground": m.ground}
+    for name, length in lengths.items():
+        # body axes turned by R^T against the link's own: everything of the link is seen through R
+        tensor = R[name] @ np.diag([0.0, length**3 / 12, length**3 / 12]) @ R[name].T
+        com = R[name] @ [length / 2, 0, 0]
+        bodies[name] = m.body(name, mass=length, com=tuple(com), inertia=tensor.tolist())
+
+    def at(name: str, x: float) -> Any:
+        return bodies[name].at(*(R[name] @ [x, 0, 0]), rpy=turns[name])
+
+    m.revolute("A", at("ground", 0), at("crank", 0), coordinate="theta")
+    m.revolute("B", at("crank", 0.04), at("coupler", 0), coordinate="bend")
+    m.revolute("C", at("coupler", 0.12), at("rocker", 0.08))
+    m.revolute("D", at("ground", 0.1), at("rocker", 0), coordinate="psi")
+    m.initial(theta=np.pi / 3, theta_dot=10)
+    m.guess(bend=-0.7, psi=1.1)
+    m.independent("theta")
+    return m
+
+
+def spatial_loop() -> eg.Model:
+    """Spatial linkage of revolute, spherical, cylindrical and revolute joint: one degree of freedom."""
+    m = eg.Model("spatial_loop", gravity=(0.5, -1.0, -9.81))
+    crank = m.body("crank", mass=1.2, com=(0.1, 0, 0.02), inertia=[[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0.022]])
+    rod = m.body("rod", mass=0.7, com=(0.3, 0.01, 0), inertia=(0.002, 0.03, 0.031))
+    rocker = m.body("rocker", mass=0.9, com=(0.0, 0.2, 0), inertia=(0.02, 0.003, 0.021))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.spherical("B", crank.at(0.2, 0, 0), rod, coordinates=["b_1", "b_2", "b_3"])
+    m.revolute("D", m.ground.at(0.7, 0.1, 0.2, rpy=(1.2, 0.3, 0.2)), rocker, coordinate="psi")
+    m.cylindrical("C", rod.at(0.6, 0, 0), rocker.at(0, 0.4, 0, rpy=(0.3, 0.2, 0.1)))
+    m.initial(theta=0.4, theta_dot=6.0)
+    m.independent("theta")
+    return m
+
+
+def powered_slider_crank() -> eg.Model:
+    """Slider-crank with spring, dampers, joint friction, a torque input and a force on the slider."""
+    m = eg.Model("powered_slider_crank", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    r, l = m.parameter("r", 0.1), m.parameter("l", 0.35)
+    crank = m.body("crank", mass=1.0, com=(r / 2, 0, 0), inertia={"zz": r**2 / 12})
+    rod = m.body("rod", mass=0.8, com=(l / 2, 0, 0), inertia={"zz": 0.8 * l**2 / 12})
+    slider = m.body("slider", mass=0.5)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(r, 0, 0), rod, coordinate="bend")
+    m.revolute("C", rod.at(l, 0, 0), slider)
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    m.torque("motor", "A", m.input("tau", 1.5))
+    m.spring("k1", m.ground.at(0.5, 0.2, 0), slider, stiffness=200, length=0.1)
+    m.damper("c1", m.ground.at(0.5, 0.2, 0), slider, damping=2)
+    m.friction("f1", "B", viscous=0.01)
+    m.torsional_damper("d1", "C", damping=0.02)
+    m.force("push", slider, ("3*sin(5*t)", 1, 0))
+    m.initial(theta=0.3, theta_dot=10.0)
+    m.independent("theta")
+    return m
+
+
+def powered_arm() -> eg.Model:
+    """Spatial tree with a force and a torque in body axes, dampers, springs and actuators of every kind."""
+    m = eg.Model("powered_arm", gravity=(0, 0, -9.81))
+    base = m.body("base", mass=2.0, com=(0.05, 0, 0.1), inertia=(0.03, 0.03, 0.02))
+    arm = m.body(
+        "arm", mass=1.0, com=(0.25, 0.02, 0), inertia=[[0.01, 0.002, 0], [0.002, 0.05, 0.001], [0, 0.001, 0.05]]
+    )
+    ram = m.body("ram", mass=0.6, com=(0.1, 0, 0.03), inertia=(0.004, 0.01, 0.01))
+    hand = m.body("hand", mass=0.4, com=(0.02, 0.03, 0.05), inertia=(0.002, 0.003, 0.004))
+    m.revolute("turn", m.ground, base)
+    m.revolute("lift", base.at(0, 0, 0.3, rpy=(0.2, 0.1, 0)), arm, axis="-y")
+    m.prismatic("slide", arm.at(0.4, 0, 0), ram, axis="x")
+    m.spherical("wrist", ram.at(0.2, 0, 0), hand, coordinates=["w1", "w2", "w3"])
+    m.torque("swing", "turn", m.input("tau", 0.8))
+    m.actuator("reach", "slide", value=m.input("F", -2.0))
+    m.force("thrust", hand.at(0.1, 0, 0, rpy=(0.3, 0, 0.4)), (1.0, -0.5, "2*cos(t)"), axes="body")
+    m.torque("gyro", ram, (0.1, 0.2, -0.3), axes="body")
+    m.damper("c1", m.ground.at(1, 1, 0), hand.at(0, 0, 0.1), damping=1.5)
+    m.spring("k1", m.ground.at(1, 0, 1), ram, stiffness=30, length=0.5)
+    m.actuator("tendon", base.at(0, 0.2, 0.5), hand, value=m.input("P", 0.7))
+    m.friction("f1", "lift", viscous=0.3)
+    m.torsional_spring("k2", "lift", stiffness=4.0, angle=0.3)
+    m.spring("k3", ram.at(0, 0.1, 0), base, stiffness=10, length=0.2)
+    m.torsional_damper("d1", "turn", damping=0.2)
+    m.initial(lift=0.4, slide=0.05, w1=0.2, w2=0.3, turn_dot=1.0, w3_dot=2.0, slide_dot=0.2)
+    return m
+
+
+def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
+    """Fixed-axis roll, pitch, yaw, as in URDF: Rz(yaw) Ry(pitch) Rx(roll)."""
+    (a, b, c), (A, B, C) = np.cos(rpy), np.sin(rpy)
+    x = np.array([[1, 0, 0], [0, a, -A], [0, A, a]])
+    y = np.array([[b, 0, B], [0, 1, 0], [-B, 0, b]])
+    z = np.array([[c, -C, 0], [C, c, 0], [0, 0, 1]])
+    return z @ y @ x
+
+
+BUILT: dict[str, Callable[[], eg.Model]] = {
+    f.__name__: f
+    for f in (
+        offset_slider_crank,
+        free_slider_crank,
+        point_chain,
+        tilted_four_bar,
+        skewed_four_bar,
+        spatial_loop,
+        powered_slider_crank,
+        powered_arm,
+    )
+}
+
+
+def build(name: str) -> eg.Model:
+    """A model by name: one of this file, or an example from its YAML file."""
+    return BUILT[name]() if name in BUILT else eg.load(EXAMPLES / f"{name}.yaml")

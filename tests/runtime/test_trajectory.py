@@ -1,0 +1,129 @@
+"""Trajectory: columns, tables, files, plots."""
+
+import json
+
+import numpy as np
+import pytest
+
+from eomgen.errors import UsageError
+from eomgen.runtime import load_trajectory
+
+
+@pytest.fixture
+def traj(crank):
+    def turn(t, x):
+        return x[4]
+
+    inputs = {"tau": lambda t, x: 0.01 * np.cos(t)}
+    return crank().simulate(0.6, {"theta": 0.3, "theta_dot": 20.0}, inputs=inputs, events=turn)
+
+
+def test_columns_and_their_meaning(traj):
+    n = len(traj.t)
+    for name in traj.names:
+        assert traj[name].shape == (n,)
+    np.testing.assert_array_equal(traj["theta"], traj.x[0])
+    np.testing.assert_array_equal(traj["s_dot"], traj.x[5])
+    np.testing.assert_allclose(traj["psi"], -traj["beta"], atol=1e-14)
+    np.testing.assert_allclose(traj["psi_ddot"], -traj["beta_ddot"], atol=1e-9)
+    np.testing.assert_allclose(traj["slider_acceleration"], traj["s_ddot"], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(traj["pin_x"], 0.153 * np.cos(traj["theta"]), atol=1e-14)
+    np.testing.assert_allclose(traj["tau"], 0.01 * np.cos(traj.t))
+    np.testing.assert_allclose(traj["T"] + traj["V"], traj["energy"])
+    # work of the input equals the change of energy (trapezoidal rule over the steps)
+    power = traj["tau"] * traj["theta_dot"]
+    work = np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(traj.t))
+    assert traj["energy"][-1] - traj["energy"][0] == pytest.approx(work, abs=2e-3)
+    assert "theta" in traj
+    assert "phi" not in traj
+    assert list(traj)[:3] == ["theta", "beta", "s"]
+    assert "0.6 s" in repr(traj)
+
+
+def test_unknown_columns_suggest(traj):
+    with pytest.raises(UsageError, match="did you mean theta_dot"):
+        traj["theta_dott"]
+    with pytest.raises(KeyError):
+        traj["phi"]
+
+
+def test_loop_angles_do_not_jump(crank, models):
+    blocks = models.crank_blocks()
+
+    def wrapped(t, x, u, c):
+        return np.array([np.arctan2(np.sin(x[0]), np.cos(x[0])), x[3], x[6]])
+
+    from eomgen.runtime import Module, NumpyCore
+
+    m = Module(NumpyCore(models.crank_metadata(), blocks | {"loop_coordinates": wrapped}))
+    traj = m.simulate(0.6, {"theta": 0.3, "theta_dot": 40.0})
+    assert traj["psi"][-1] > 7
+    np.testing.assert_allclose(traj["psi"], traj["theta"], atol=1e-12)
+
+
+def test_save_and_load_without_the_module(traj, tmp_path):
+    path = traj.save(tmp_path / "run")
+    assert path.name == "run.npz"
+    again = load_trajectory(tmp_path / "run")
+    assert again.names == traj.names
+    for name in ("t", *traj.names):
+        np.testing.assert_array_equal(again[name], traj[name])
+    np.testing.assert_array_equal(again.x, traj.x)
+    np.testing.assert_array_equal(again.t_events[0], traj.t_events[0])
+    np.testing.assert_array_equal(again.x_events[0], traj.x_events[0])
+    assert again.residuals == traj.residuals
+    assert again.units == traj.units
+    assert again.metadata["parameters"] == traj.metadata["parameters"]
+    assert again.energy_drift == traj.energy_drift
+    assert again.save(tmp_path / "twice.npz").exists()
+    with pytest.raises(UsageError, match="dense_output"):
+        again.at(0.1)
+
+
+def test_files_that_are_none(tmp_path, traj):
+    (tmp_path / "x.npz").write_bytes(b"nothing")
+    with pytest.raises(UsageError, match="not a trajectory"):
+        load_trajectory(tmp_path / "x.npz")
+    np.savez(tmp_path / "y.npz", header=np.array(json.dumps({"format": "other"})))
+    with pytest.raises(UsageError, match="not a trajectory"):
+        load_trajectory(tmp_path / "y.npz")
+    with pytest.raises(FileNotFoundError):
+        load_trajectory(tmp_path / "none.npz")
+    with pytest.raises(UsageError, match=r"\.npz or \.csv"):
+        traj.save(tmp_path / "run.xls")
+
+
+def test_csv(traj, tmp_path):
+    path = traj.save(tmp_path / "run.csv")
+    head, first = path.read_text().splitlines()[:2]
+    assert head.startswith("t [s],theta [rad],beta [rad],s [m],theta_dot [rad/s]")
+    assert [float(x) for x in first.split(",")][1] == 0.3
+
+
+def test_tables(traj):
+    frame = traj.to_pandas()
+    assert list(frame.columns) == list(traj.names)
+    assert frame.index.name == "t"
+    np.testing.assert_array_equal(frame["s"], traj["s"])
+    assert traj.to_numpy("s", "theta").shape == (2, len(traj.t))
+    assert list(traj.to_pandas("s").columns) == ["s"]
+
+
+def test_plots_carry_units(traj):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    ax = traj.plot("s")
+    assert ax.get_ylabel() == "s (m)"
+    assert ax.get_xlabel() == "t (s)"
+    panels = traj.plot()
+    assert [panel.get_ylabel() for panel in panels] == ["rad", "s (m)"]
+    _, own = plt.subplots()
+    assert traj.plot("theta", "beta", ax=own) is own
+    assert own.get_ylabel() == "rad"
+    assert len(own.lines) == 2
+    with pytest.raises(UsageError, match="did you mean theta"):
+        traj.plot("thetta")
+    plt.close("all")
