@@ -91,8 +91,7 @@ def build_layer(
         (directory / SOURCE).write_text(text, encoding="utf-8")
         (directory / HEADER).write_text(header, encoding="utf-8")
         _run_cython(directory / SOURCE)
-        flags = [*layer_flags(compiler), "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION", "-I.", *includes]
-        command = [*compiler.command, *flags, "-c", "_core.c", "-o", _OBJECT]
+        command = [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECT]
         result = run(command, directory)
         if result.returncode != 0:
             raise_failure(f"compiling the Cython layer {directory / '_core.c'}", result, directory)

@@ -26,6 +26,7 @@ from eomgen.errors import ModelError
 METHODS = ["embedding", "lagrange"]
 MORE = ["offset_slider_crank", "spatial_loop", "powered_slider_crank", "powered_arm", "skewed_four_bar"]
 DIGITS = 1e-11
+SEED = 2560  # a branched tree of hinges and slides only
 
 
 def embedded_condition(module: Any, q: np.ndarray) -> float:
@@ -80,7 +81,7 @@ random_mechanisms = st.builds(
 )
 
 
-@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(made=random_mechanisms, seed=st.integers(0, 2**20))
 def test_methods_agree_on_random_mechanisms(made: Random, seed: int) -> None:
     one, other = (derived(made, method).compile(target="numpy") for method in METHODS)
@@ -90,7 +91,7 @@ def test_methods_agree_on_random_mechanisms(made: Random, seed: int) -> None:
 
 @pytest.mark.parametrize(("planar", "loop"), [(False, False), (False, True), (True, True)])
 def test_methods_agree_on_compiled_random_mechanisms(planar: bool, loop: bool, acceptance_cache: Any) -> None:
-    made = random_mechanism(7, bodies=4, planar=planar, reverse=True, loop=loop)
+    made = random_mechanism(7, bodies=3, planar=planar, reverse=True, loop=loop)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("EOMGEN_CACHE_DIR", str(acceptance_cache))
         one, other = (derived(made, method).compile() for method in METHODS)
@@ -112,7 +113,7 @@ def judge(mod: Any, rigid: judges.RigidBodies, x: np.ndarray, forces: Callable[.
 
 
 @pytest.mark.parametrize("method", METHODS)
-@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(
     seed=st.integers(0, 2**20),
     bodies=st.integers(2, 4),
@@ -196,7 +197,7 @@ def mujoco_text(made: Random) -> str:
         children = "".join(body(j, R_b, r_b) for j, parent in enumerate(made.parents) if parent == k)
         return (
             f'<body pos="{numbers(r)}" quat="{quaternion(R)}"><joint name="q{k}" type="{kind}" axis="0 0 1"/>'
-            f'<inertial pos="{center}" mass="{made.masses[k]!r}" fullinertia="{full}"/>{children}</body>'
+            f'<inertial pos="{center}" mass="{numbers(made.masses[k])}" fullinertia="{full}"/>{children}</body>'
         )
 
     roots = "".join(body(k, np.eye(3), np.zeros(3)) for k, parent in enumerate(made.parents) if parent < 0)
@@ -208,13 +209,9 @@ def mujoco_text(made: Random) -> str:
 def test_an_arm_of_hinges_and_slides_equals_mujoco(method: str) -> None:
     import mujoco
 
-    kinds = {"revolute", "prismatic"}
-    seeds = (seed for seed in range(10_000))
-    made = next(
-        m
-        for m in (random_mechanism(seed, bodies=5, forces=False) for seed in seeds)
-        if set(m.kinds) == kinds and len(set(m.parents)) > 3
-    )
+    made = random_mechanism(SEED, bodies=5, forces=False)
+    assert set(made.kinds) == {"revolute", "prismatic"}
+    assert len(set(made.parents)) > 3
     mod = derived(made, method).compile(target="numpy")
     model = mujoco.MjModel.from_xml_string(mujoco_text(made))
     data = mujoco.MjData(model)

@@ -181,7 +181,9 @@ def test_two_processes_build_the_same(
     assert list((fresh_cache.root / "attempts").iterdir()) == []
 
 
-@pytest.mark.parametrize("lines", ["touch {mark}; exec sleep 30", 'gcc "$@"; touch {mark}; exec sleep 30'], ids=["early", "late"])
+@pytest.mark.parametrize(
+    "lines", ["touch {mark}; exec sleep 30", 'gcc "$@"; touch {mark}; exec sleep 30'], ids=["early", "late"]
+)
 def test_killed_build_leaves_only_something_to_sweep(
     folder: Path, tmp_path: Path, wrapper: Callable[[str], str], fresh_cache: Cache, sources: dict[str, str], lines: str
 ) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from time import perf_counter
 
 import pytest
 
@@ -42,9 +41,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_refused(case: str, problems_of) -> None:
     text, line, message = REFUSED[case]
-    start = perf_counter()
     problems = problems_of(text)
-    assert perf_counter() - start < 1.0
     found = [p for p in problems if message in str(p)]
     assert found, [str(p) for p in problems]
     assert found[0].line == line

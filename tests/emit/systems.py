@@ -214,7 +214,8 @@ def slider_crank(copies=1, preferred=(0,), name="crank", driven=False, **more):
         forces=lambda q, v, t: [g.symbol("tau") * cos(t), g.zero, -0.5 * v[2]],
         outputs=lambda q, v, a: [l1 * cos(q[0]), v[1] + a[2]] if more.get("accelerated", True) else [l1 * cos(q[0])],
         poses=lambda q: pose(g, q[0], l1, g.zero), loop=lambda q: [q[1] - q[0]],
-        coordinate_scales=[g.one, g.one, L], constraint_scales=[L, L] * copies + [g.one] * ("spun" in more), preferred=preferred,
+        coordinate_scales=[g.one, g.one, L], constraint_scales=[L, L] * copies + [g.one] * ("spun" in more),
+        preferred=preferred,
         q_reference=[theta, beta, 0.1 * np.cos(theta) + 0.35 * np.cos(beta)],
         **{"n_dof": 1, **more},
     )  # fmt: skip

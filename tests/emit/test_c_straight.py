@@ -68,8 +68,8 @@ def every_operation(systems):
     g = Graph()
     x, y = g.symbol("x"), g.symbol("y")
     names = sorted(set(FUNCTIONS) - {"select"})
-    unary = set("neg not abs sign sqrt exp log sin cos tan asin acos atan sinh cosh tanh".split())
-    arity = {n: 1 if n in unary else 2 for n in names}
+    binary = {"add", "sub", "mul", "div", "pow", "atan2", "min", "max", "lt", "le", "eq", "and", "or"}
+    arity = {n: 2 if n in binary else 1 for n in names}
     results = [g.apply(n, *(x, y)[: arity[n]]) for n in names]
     conditions = [g.apply(n, x, y) for n in ("lt", "le", "eq", "and", "or")] + [g.apply("not", x)]
     results += [g.apply("select", c, x + 1.0, y * 2.0) for c in conditions]

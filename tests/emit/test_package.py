@@ -86,8 +86,9 @@ def test_the_numpy_package_runs_with_numpy_alone(packages, systems, compiled):
 
 @pytest.mark.slow
 def test_the_cython_package_installs_and_runs_with_numpy_alone(packages, tmp_path):
-    options = "--quiet --disable-pip-version-check --no-deps --no-build-isolation --no-index --target".split()
-    command = [sys.executable, "-m", "pip", "install", *options, str(tmp_path), str(packages["cython"] / "crank")]
+    source = str(packages["cython"] / "crank")
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command += ["--no-build-isolation", "--no-index", "--target", str(tmp_path), source]
     environment = {**os.environ, "CFLAGS": "-O0"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr

@@ -15,7 +15,7 @@ static void form_transformation(int width, const partition *restrict parts, doub
 }
 
 /* M_e = B^T M B, lower triangle in w + AT_EMBEDDED, from the scaled M (N x N) in w + AT_MASS. */
-static void embed_mass(double *restrict w)
+EOMGEN_SHARED void embed_mass(double *restrict w)
 {
     const double *const B = w + AT_B, *const mass = w + AT_MASS;
     double *const MB = w + AT_MB, *const embedded = w + AT_EMBEDDED;
