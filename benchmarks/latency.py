@@ -10,13 +10,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from .measure import Sample, in_fresh_process, run_process, seconds_of
+from .measure import Finished, Sample, run_process
 from .models import EXAMPLES
 from .report import Limit, Report, Table
 
 TITLE = "latency of a whole process"
 MODELS = ("slider_crank", "double_pendulum")
-IMPORTS = ("numpy", "scipy.integrate", "click", "rich.console", "ruamel.yaml", "jinja2", "eomgen.cli")
+PEER = "SymPy, lambdify, solve_ivp: double_pendulum"
+IMPORTS = (
+    "numpy",
+    "scipy.integrate",
+    "click",
+    "rich.console",
+    "ruamel.yaml",
+    "jinja2",
+    "Cython.Compiler.Main",
+    "sympy",
+)
 
 
 @contextmanager
@@ -27,88 +37,81 @@ def cold_cache() -> Iterator[dict[str, str]]:
 
 
 def run(quick: bool) -> Report:
-    """Time processes, then break one of each down into stages and imports."""
-    colds, warms = (1, 2) if quick else (3, 7)
-    samples: dict[str, dict[str, Sample]] = {}
-    stages: dict[str, dict[str, dict[str, float]]] = {}
+    """Time processes in turns, then break one of each kind down into stages and imports."""
+    repeats = 1 if quick else 5
+    found: dict[str, list[Finished]] = {}
+    stages: dict[str, dict[str, float]] = {}
     imports: dict[str, float] = {}
-    for model in MODELS:
-        cold = []
-        for _ in range(colds - 1):
+    for repeat in range(repeats + 1):  # the first round makes bytecode, and is not counted
+        for model in MODELS:
             with cold_cache() as environment:
-                cold.append(_seconds(model, environment))
+                cold, warm = (_run(model, environment) for _ in range(2))
+                if repeat == repeats:
+                    stages[f"{model}, warm"] = _stages(model, environment)
+                    imports = imports or _imports(model, environment)
+            if repeat:
+                found.setdefault(f"eomgen run {model}, cold cache", []).append(cold)
+                found.setdefault(f"eomgen run {model}, warm cache", []).append(warm)
+        peer = run_process([sys.executable, "-m", "benchmarks.tasks", "run_double_pendulum_sympy", "[]"])
+        if repeat:
+            found.setdefault(PEER, []).append(peer)
+    for model in MODELS:
         with cold_cache() as environment:
-            first = _stages(model, environment)
-        with cold_cache() as environment:
-            cold.append(_seconds(model, environment))
-            warm = [_seconds(model, environment) for _ in range(warms)]
-            stages[model] = {"cold": first, "warm": _stages(model, environment)}
-            imports = imports or _imports(model, environment)
-        samples[model] = {"cold": Sample(tuple(cold)), "warm": Sample(tuple(warm))}
-    peer_stages: list[dict[str, float]] = []
-    peer = Sample(tuple(seconds_of(lambda: peer_stages.append(_peer())) for _ in range(1 if quick else 3)))
+            stages[f"{model}, cold"] = _stages(model, environment)
+    stages["double_pendulum, SymPy"] = json.loads(found[PEER][-1].stdout) | {"process": found[PEER][-1].wall}
 
+    wall = {who: Sample(tuple(p.wall for p in processes)) for who, processes in found.items()}
+    cpu = {who: Sample(tuple(p.cpu for p in processes)) for who, processes in found.items()}
     rows: list[list[Any]] = []
-    for model, found in samples.items():
-        for state, sample in found.items():
-            ratio = peer.median / sample.median if model == "double_pendulum" else None
-            rows.append([f"eomgen run {model}, {state} cache", sample.median, sample.best, ratio])
-    rows.append(["SymPy, lambdify, solve_ivp: double_pendulum", peer.median, peer.best, None])
-    names = list(dict.fromkeys(name for found in stages.values() for s in found.values() for name in s))
-    columns = [(model, state) for model in MODELS for state in ("cold", "warm")]
-    split = [[name, *(stages[m][s].get(name) for m, s in columns)] for name in names]
+    for who, sample in wall.items():
+        ratio = wall[PEER].median / sample.median if "double_pendulum" in who and who != PEER else None
+        rows.append([who, sample.median, sample.best, cpu[who].median, ratio])
+    names = list(dict.fromkeys(name for split in stages.values() for name in split))
+    columns = sorted(stages, reverse=True)
+    split = [[name, *(stages[column].get(name) for column in columns)] for name in names]
     tables = (
-        Table("whole process", ("process", "median s", "best s", "SymPy's over it"), rows),
-        Table("stages, seconds", ("stage", *(f"{m} {s}" for m, s in columns)), split),
+        Table("whole process, seconds", ("process", "median", "best", "cpu", "SymPy's over it"), rows),
+        Table("stages, seconds", ("stage", *columns), split),
         Table("imports of a warm run, seconds", ("module and what it pulls in", "s"), [[*x] for x in imports.items()]),
     )
-    crank = samples["slider_crank"]
     limits = (
-        Limit("slider-crank from a cold cache", crank["cold"].median, 8, "s"),
-        Limit("slider-crank from a warm cache", crank["warm"].median, 1.5, "s"),
+        Limit("slider-crank from a cold cache, best,", wall["eomgen run slider_crank, cold cache"].best, 8, "s"),
+        Limit("slider-crank from a warm cache, best,", wall["eomgen run slider_crank, warm cache"].best, 1.5, "s"),
     )
     notes = (
         "5 s of the slider-crank (a closed loop), 10 s of the double pendulum; SymPy takes KanesMethod for the latter,",
         "solves and lambdifies it with cse to plain math, and integrates at the same tolerances.",
-        "'process' is the wall time of the run whose stages are shown; some stages are parts of others.",
+        "cpu: computed by the process and its children, on all cores; hardly depends on what else the machine does.",
+        "'process' is the wall time of the run whose stages are shown; what is not in a stage is imports and output.",
     )
     details = {
-        "processes": {m: {s: x.as_dict() for s, x in found.items()} for m, found in samples.items()},
+        "wall": {who: sample.as_dict() for who, sample in wall.items()},
+        "cpu": {who: sample.as_dict() for who, sample in cpu.items()},
         "stages": stages,
         "imports": imports,
-        "sympy": {"process": peer.as_dict(), "stages": peer_stages},
     }
     return Report(tables, limits, notes, details)
 
 
-def _command(model: str, *options: str) -> list[str]:
-    return [str(Path(sys.executable).with_name("eomgen")), "run", str(EXAMPLES / f"{model}.yaml"), *options]
-
-
-def _seconds(model: str, environment: Mapping[str, str]) -> float:
-    return seconds_of(lambda: run_process(_command(model), environment))
+def _run(model: str, environment: Mapping[str, str], *options: str) -> Finished:
+    program = str(Path(sys.executable).with_name("eomgen"))
+    return run_process([program, "run", str(EXAMPLES / f"{model}.yaml"), *options], environment)
 
 
 def _stages(model: str, environment: Mapping[str, str]) -> dict[str, float]:
     """Seconds by stage as ``eomgen run --json`` tells them, and of the whole process."""
-    output: list[str] = []
-    total = seconds_of(lambda: output.append(run_process(_command(model, "--json"), environment).stdout))
-    seconds: dict[str, float] = json.loads(output[0])["seconds"]
-    return {**seconds, "process": total}
+    done = _run(model, environment, "--json")
+    seconds: dict[str, float] = json.loads(done.stdout)["seconds"]
+    return {**seconds, "process": done.wall}
 
 
 def _imports(model: str, environment: Mapping[str, str]) -> dict[str, float]:
     """Cumulative seconds of the larger imports of a warm run, from ``-X importtime`` (which slows them somewhat)."""
-    command = [sys.executable, "-X", "importtime", *_command(model)]
+    done = _run(model, {**environment, "PYTHONPROFILEIMPORTTIME": "1"})
     found: dict[str, float] = {}
-    for line in run_process(command, environment).stderr.splitlines():
+    for line in done.stderr.splitlines():
         if line.startswith("import time:") and line.count("|") == 2:
             _, cumulative, name = line.split("|")
-            if name.strip() in IMPORTS or name.strip() == "sympy":
+            if name.strip() in IMPORTS:
                 found[name.strip()] = int(cumulative) / 1e6
     return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
-def _peer() -> dict[str, float]:
-    result: dict[str, float] = in_fresh_process("run_double_pendulum_sympy")
-    return result

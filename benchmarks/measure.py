@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import resource
 import statistics
 import subprocess
 import sys
@@ -76,16 +77,31 @@ def seconds_per_call(call: Callable[[], Any], budget: float) -> float:
     return elapsed / number
 
 
+@dataclass(frozen=True)
+class Finished:
+    """A process that has ended well.
+
+    Attributes
+    ----------
+    stdout, stderr : str
+    wall, cpu : float
+        Seconds that passed, and seconds that it and its children computed: the latter hardly depends on what else the
+        machine is doing.
+    """
+
+    stdout: str
+    stderr: str
+    wall: float
+    cpu: float
+
+
 def in_fresh_process(task: str, *arguments: Any, environment: Mapping[str, str] | None = None) -> Any:
     """Run a task of :mod:`benchmarks.tasks` in a new interpreter; what it returns comes back through JSON."""
     command = [sys.executable, "-m", "benchmarks.tasks", task, json.dumps(arguments)]
-    done = run_process(command, environment)
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(run_process(command, environment).stdout.splitlines()[-1])
 
 
-def run_process(
-    command: Sequence[str], environment: Mapping[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def run_process(command: Sequence[str], environment: Mapping[str, str] | None = None) -> Finished:
     """Run a command to its end from the project's root.
 
     Raises
@@ -94,10 +110,15 @@ def run_process(
         It failed; the message holds the end of its standard error.
     """
     inherited = {**os.environ, **(environment or {})}
+    # What an installed program has: bytecode beside its modules. Python writes it when it first imports them.
+    inherited.pop("PYTHONDONTWRITEBYTECODE", None)
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     done = subprocess.run(command, cwd=ROOT, env=inherited, capture_output=True, text=True, check=False)
+    wall, after = perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
         raise RuntimeError(f"{' '.join(command)} exited with {done.returncode}:\n{done.stderr[-3000:]}")
-    return done
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Finished(done.stdout, done.stderr, wall, cpu)
 
 
 def calibrate() -> dict[str, float]:

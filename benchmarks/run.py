@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -27,8 +26,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     unknown = [name for name in options.names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {', '.join(unknown)}; there are: {', '.join(BENCHMARKS)}")
-    # One thread everywhere: threads of a linear algebra library on matrices this small only add noise.
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     console = Console(width=None if sys.stdout.isatty() else 120)
     machine = describe_machine()
     console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable
 from time import perf_counter
@@ -70,13 +71,19 @@ def compile_chain(n: int, layer_ready: bool) -> dict[str, float]:
         eg.load(EXAMPLES / "pendulum.yaml").derive().compile(kernels=["rhs"])
     equations = chain(n).derive()
     derivation = dict(equations.seconds)
-    start = perf_counter()
+    start, busy = perf_counter(), os.times()
     module = equations.compile(kernels=["rhs"])
-    total = perf_counter() - start
+    total, done = perf_counter() - start, os.times()
     start = perf_counter()
     module.rhs(0.0, [0.1] * (2 * n))
     stages = {stage: seconds for stage, seconds in equations.seconds.items() if stage not in derivation}
-    return {**stages, "total": total, "first call": perf_counter() - start, "derive": sum(derivation.values())}
+    first_call = perf_counter() - start
+    own, compiler = done.user + done.system, done.children_user + done.children_system
+    cpu = {
+        "cpu of this process": own - busy.user - busy.system,
+        "cpu of the compiler": compiler - busy.children_user - busy.children_system,
+    }
+    return {**stages, "total": total, **cpu, "first call": first_call, "derive": sum(derivation.values())}
 
 
 def run_double_pendulum_sympy() -> dict[str, float]:

@@ -35,7 +35,7 @@ def main() -> None:
     module = equations.compile()
 
     trajectory = module.simulate((0, 5), initial={"theta": 0.3, "theta_dot": 10.0}, parameters={"r": 0.12})
-    print(f"crank turned by {trajectory['theta'][-1] - trajectory['theta'][0]:.3f} rad")
+    print(f"the crank swings through {np.ptp(trajectory['theta']):.3f} rad")
     print(f"the rod's tip moved between {trajectory['pin_x'].min():.4f} and {trajectory['pin_x'].max():.4f} m")
 
     x0 = module.x0(theta=0.3, theta_dot=10.0)  # loops closed, dependent velocities consistent

@@ -1,6 +1,7 @@
 """Two-link manipulator: symbolic equations, and the end effector's motion (Shabana, Computational Dynamics, 1.4)."""
 
 import numpy as np
+import sympy
 
 import eomgen as eg
 
@@ -30,8 +31,9 @@ def build() -> eg.Model:
 def main() -> None:
     """Print the equations, then let the arm fall and compare the tip's acceleration with eq. (1.3) of the book."""
     equations = build().derive()
-    print("mass matrix:", equations.mass_matrix)
-    print("force:      ", equations.force)
+    sympy.pprint(equations.mass_matrix.applyfunc(sympy.simplify), use_unicode=False, wrap_line=False)
+    for name, force in zip(equations.independent, equations.force, strict=True):
+        print(f"force along {name}:", sympy.simplify(force))
     module = equations.compile()
     run = module.simulate((0, 2), initial={"th2": 0.5, "bend": -0.8}, rtol=1e-10, atol=1e-12)
 

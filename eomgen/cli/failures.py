@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import click
 
-from ..errors import EomgenError, MissingDependencyError, ModelError, SimulationError, ToolchainError, UsageError
+from ..errors import (
+    EomgenError,
+    EvaluationError,
+    MissingDependencyError,
+    ModelError,
+    SimulationError,
+    ToolchainError,
+    UsageError,
+)
 
 MODEL, USAGE, TOOLCHAIN, INTEGRATION = 1, 2, 3, 4
 
@@ -54,6 +63,15 @@ def to_dict(error: BaseException) -> dict[str, Any]:
             "problems": problems,
         }
     }
+
+
+@contextmanager
+def after_integration() -> Iterator[None]:
+    """Turn a kernel's failure at a state of the run into a failure of the integration."""
+    try:
+        yield
+    except EvaluationError as error:
+        raise SimulationError(f"the run cannot be evaluated: {error}") from error
 
 
 def reports_failures(verb: Verb) -> Verb:

@@ -10,7 +10,7 @@ import click
 
 from ..errors import UsageError
 from .derive import print_operations, summary
-from .failures import reports_failures
+from .failures import after_integration, reports_failures
 from .options import (
     blaming_option,
     independent_option,
@@ -89,10 +89,12 @@ def run(
     from .energy import balance_energy
 
     values = dict(zip(module.u_names, module.u.tolist(), strict=True)) | inputs
-    energy = balance_energy(equations, trajectory, values)
-    files = _write(equations, trajectory, module.doc, out, plot)
+    with after_integration():
+        energy = balance_energy(equations, trajectory, values)
+        files = _write(equations, trajectory, out, plot)
+        result = to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files}
     if as_json:
-        print_json(to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files})
+        print_json(result)
         return
     click.echo(str(equations.report))
     print_operations(equations)
@@ -122,7 +124,7 @@ def _sort(module: Module, settings: dict[str, float]) -> tuple[dict[str, float],
     return initial, parameters, inputs
 
 
-def _write(equations: Equations, trajectory: Trajectory, doc: str, out: Path | None, plot: Path | None) -> list[str]:
+def _write(equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None) -> list[str]:
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         trajectory.save(out)

@@ -40,7 +40,8 @@ def load_numpy(sources: Mapping[str, str], name: str) -> ModuleType:
             (attempt / SOURCE).write_text(text, encoding="utf-8")
             entry = cache.publish(attempt, key, "numpy", name, SOURCE, {})
     spec = importlib.util.spec_from_file_location(module_name, entry.product)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     sys.modules[module_name] = module

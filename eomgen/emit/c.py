@@ -33,7 +33,8 @@ def emit_c(program: Program) -> SourceSet:
 
 def _context(program: Program) -> dict[str, Any]:
     precompute, scratch = print_precompute(program) if program.hoisted else ("", 0)
-    printed = [print_block(program, block) for block in program.blocks]
+    twins = program.twins
+    printed = [print_block(program, block) for block in program.blocks if block.name not in twins]
     areas, n_work = work_areas(program, max((work for _, work in printed), default=0))
     n_const = len(program.parameters) + len(program.hoisted) + scratch
     sizes = program.sizes
@@ -61,7 +62,7 @@ def _context(program: Program) -> dict[str, Any]:
         "kernels": [
             {
                 "name": k.name,
-                "call": f"block_{k.name}" if isinstance(k, Block) else f"drive_{k.name}",
+                "call": f"block_{twins.get(k.name, k.name)}" if isinstance(k, Block) else f"drive_{k.name}",
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],

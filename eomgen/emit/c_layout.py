@@ -22,7 +22,7 @@ TREES: dict[str, tuple[str, ...]] = {
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
-    files: dict[str, None] = {}
+    files: dict[str, None] = {"terms": None} if program.composes_terms else {}
     for driver in program.drivers:
         if not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
@@ -63,6 +63,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
     ]
+    if program.composes_terms:
+        lengths.append(("FULL", n * n))
     if program.has_loops:
         lengths += [
             ("POSITION", m + m * n),  # C, C_q

@@ -18,10 +18,17 @@ def emit_numpy(program: Program) -> SourceSet:
         ``_core.py``, which imports NumPy and ``.runtime.numpy_core`` only, and ``model.json``.
     """
     text = json.dumps(program.metadata, allow_nan=False)
+    twins = program.twins
     context = {
+        "n_v": program.sizes.n_v,
+        "composes_terms": program.composes_terms,
+        "twins": twins,
         "name": program.name,
         "metadata_lines": [repr(text[k : k + 100]) for k in range(0, len(text), 100)],
-        "functions": [*(print_block(program, block) for block in program.blocks), print_precompute(program)],
+        "functions": [
+            *(print_block(program, b) for b in program.blocks if b.name not in twins),
+            print_precompute(program),
+        ],
         "blocks": [block.name for block in program.blocks],
     }
     return SourceSet({"_core.py": render("numpy/_core.py.j2", context), "model.json": metadata_json(program)})

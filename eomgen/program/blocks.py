@@ -150,11 +150,12 @@ class BlockMaker:
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
-        if not self.has_loops:
+        if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
+            terms = ("mass_matrix", "bias", "scales")
             return {
-                "rhs": ("terms", "scales"),
-                "jacobian": ("terms", "scales", residual),
-                "outputs": ("terms", "scales", "accelerated_outputs"),
+                "rhs": terms,
+                "jacobian": (*terms, residual),
+                "outputs": (*terms, "accelerated_outputs"),
             }[name]
         project = ("scales", "position", "rate")
         accelerate = ("terms",) if self.outputs_need_accelerations else ()

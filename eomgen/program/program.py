@@ -142,6 +142,23 @@ class Program:
         return frozenset(b.name for b in self.blocks)
 
     @property
+    def twins(self) -> dict[str, str]:
+        """Blocks that compute exactly what an earlier one does -> the name of that one; never blocks of drivers."""
+        needed = {name for d in self.drivers for name in d.blocks}
+        first: dict[tuple[object, ...], str] = {}
+        found = {}
+        for b in self.blocks:
+            key = (b.inputs, tuple(y.id for y in b.outputs), tuple(y.id for y in b.checks))
+            if first.setdefault(key, b.name) != b.name and b.name not in needed:
+                found[b.name] = first[key]
+        return found
+
+    @property
+    def composes_terms(self) -> bool:
+        """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
+        return not self.has_loops and bool(self.drivers)
+
+    @property
     def kernels(self) -> tuple[Block | Driver, ...]:
         """The public functions, in the order of the metadata."""
         found: dict[str, Block | Driver] = {b.name: b for b in self.blocks if b.public}

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .module import Module
 
 AMPLIFIED = 10.0  #: v_d / v_i above which a dead centre is near
+REMEMBERED = 7  #: calls that the next one is compared with, less one
 SUDDEN = 3.0  #: a change of velocity this many times what the accelerations explain is a change of branch
 
 
@@ -45,7 +46,7 @@ class Minimal:
         self.x_names = self.q_names + self.v_names
         self.n_x = len(self.x_names)
         self._q: Array | None = None
-        self._last: tuple[float, Array] | None = None  # time and x' of the last call
+        self._recent: list[tuple[float, Array]] = []  # time and x' of the last calls
 
     def __repr__(self) -> str:
         return f"<minimal form of {self._layout.name}: x = [{', '.join(self.x_names)}]>"
@@ -61,7 +62,7 @@ class Minimal:
         start = self._module.assemble() if q is None else np.array(q, dtype=float)
         if start.shape != (self._layout.n_q,):
             raise UsageError(f"q must have shape ({self._layout.n_q},), not {start.shape}")
-        self._q, self._last = start, None
+        self._q, self._recent = start, []
 
     def x0(self, values: Mapping[str, float] | None = None, /, *, t: float = 0.0, **named: float) -> Array:
         """Assembled initial state (n_x,), from the same named values as ``Module.x0``; calls :meth:`reset`."""
@@ -102,7 +103,7 @@ class Minimal:
         result = np.empty((self._layout.n_x, x.shape[1]))
         for j in range(x.shape[1]):
             result[:, j] = self._solve(float(times[j]), x[:, j])
-        self._last = None
+        self._recent = []
         return result
 
     def rhs(self, t: float, x: ArrayLike, p: Any = None, u: ArrayLike | None = None) -> Array:
@@ -133,7 +134,7 @@ class Minimal:
         full = self._solve(t, state)
         x_dot = self._module.rhs(t, full, u=u)
         self._check_crossing(t, x_dot, state, before)
-        self._last = (t, x_dot)
+        self._recent = [*self._recent[-REMEMBERED:], (t, x_dot)]
         return self.reduce(x_dot)
 
     def _solve(self, t: float, x: Array) -> Array:
@@ -158,22 +159,27 @@ class Minimal:
         Near it they look the same on both sides, so an integrator can step across and come back on the old branch: the
         dependent velocities then reverse at once, which no acceleration explains.
         """
-        layout, last = self._layout, self._last
-        if last is None or t == last[0] or before is None or not layout.rank:
+        layout = self._layout
+        if not layout.rank or before is None:
             return
         scales = layout.scales.q
-        v, v_last = x_dot[: layout.n_q] / scales, last[1][: layout.n_q] / scales
-        gap = abs(t - last[0])
-        own = max(np.abs(v[layout.independent]).max(), np.abs(v_last[layout.independent]).max())
-        fast = min(np.abs(v).max(), np.abs(v_last).max())
-        if fast <= AMPLIFIED * own or v @ v_last >= 0.0 or fast * gap > 1.0:
+        v, a = np.abs(x_dot.reshape(2, -1) / scales).max(axis=1)
+        own = np.abs(x_dot[layout.independent] / scales[layout.independent]).max()
+        if v <= AMPLIFIED * own:
             return
-        a = max(np.abs(x_dot[layout.n_q :] / scales).max(), np.abs(last[1][layout.n_q :] / scales).max())
-        if np.abs(v - v_last).max() > SUDDEN * a * gap:
-            self._q = before
-            raise PartitionError(
-                f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
-                "choose other independent coordinates, or integrate the full state",
-                t,
-                x,
-            )
+        for time, other in self._recent:
+            gap = abs(t - time)
+            v_other, a_other = np.abs(other.reshape(2, -1) / scales).max(axis=1)
+            own_other = np.abs(other[layout.independent] / scales[layout.independent]).max()
+            if v_other <= AMPLIFIED * own_other or gap == 0.0 or min(v, v_other) * gap > 1.0:
+                continue
+            change = (x_dot - other)[: layout.n_q] / scales
+            turned = (x_dot[: layout.n_q] / scales) @ (other[: layout.n_q] / scales) < 0.0
+            if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
+                self._q = before
+                raise PartitionError(
+                    f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
+                    "choose other independent coordinates, or integrate the full state",
+                    t,
+                    x,
+                )

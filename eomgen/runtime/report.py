@@ -41,9 +41,11 @@ def facts(module: Module) -> list[tuple[str, str]]:
         ("outputs", listed(layout.y)),
         ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
     ]
-    counts = data.get("operations", {}).get("rhs")
-    if counts:
-        lines.append(("operations of rhs", ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)))
+    operations = data.get("operations", {})
+    name = next((name for name in ("rhs", "terms") if operations.get(name)), None)
+    if name:  # with loops, linear algebra on the terms comes on top
+        counts = (f"{n} {kind}" for kind, n in operations[name].items() if isinstance(n, int) and n)
+        lines.append((f"operations of {name}", ", ".join(counts)))
     return lines
 
 

@@ -15,6 +15,12 @@ def acceptance_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("acceptance_cache")
 
 
+@pytest.fixture(autouse=True)
+def own_cache(acceptance_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a test itself compiles goes there too."""
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(acceptance_cache))
+
+
 @pytest.fixture(scope="session")
 def equations() -> Callable[..., Any]:
     """``equations(name, method, independent)`` -> the derived equations."""

@@ -11,6 +11,7 @@ from eomgen.numeric import (
     embed,
     embedded_mass,
     jacobian,
+    kinematics,
     partition,
     project,
     rhs,
@@ -159,3 +160,27 @@ def test_a_coordinate_without_inertia_is_an_error():
         embed(np.diag([1.0, 0.0]), np.zeros((0, 2)), scales, 0, [0, 1])
     with pytest.raises(SingularMassMatrixError):
         embed(np.diag([1.0, 1e-15]), np.zeros((0, 2)), scales, 0, [0, 1])
+
+
+def test_a_mechanism_without_freedom_left(crank):
+    """All coordinates driven: the accelerations follow from the constraints alone."""
+    c = crank()
+    scales = Scales(c.scales.q, np.append(c.scales.c, 1.0))
+
+    def position(q):
+        C, C_q = c.position(q)
+        return np.append(C, q[0] - 0.7), np.vstack([C_q, [1.0, 0.0, 0.0]])
+
+    def rate(q):
+        return np.array([0.0, 0.0, -2.0])
+
+    def terms(q, v):
+        here = c.terms(q, v)
+        return here._replace(C_q=position(q)[1], gamma=np.append(here.gamma, 0.0))
+
+    q = c.closed(0.7)
+    x_dot = rhs(terms, position, rate, q, np.zeros(3), scales, 3, [])
+    expected = kinematics(
+        c.position, c.rate, c.gamma, np.array([0.7]), np.array([2.0]), np.zeros(1), q, c.scales, 2, [0]
+    )
+    np.testing.assert_allclose(x_dot, np.concatenate(expected[1:]), atol=1e-12)
