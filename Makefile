@@ -1,6 +1,6 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png
 # make test   ruff, mypy, then every test, fast ones first; fails if anything was skipped
-# make bench  timings of derivation, compilation, calls and integration
+# make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
 # make clean  removes what the other targets made, .venv included
 # Each makes its own .venv (Python 3.11 or later) and installs what it needs; a second call goes straight to work.

@@ -31,7 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console.print(", ".join(f"{key} {value}" for key, value in machine.items()), highlight=False)
     summary: list[str] = []
     for name in options.names or BENCHMARKS:
-        report, circumstances = measure(name, options.quick, console)
+        try:
+            report, circumstances = measure(name, options.quick, console)
+        except Exception:  # the others are still worth running
+            console.print_exception(max_frames=4)
+            summary.append(f"{name}: failed")
+            continue
         write(options.out, name, report, circumstances | {"machine": machine, "quick": options.quick})
         summary += [f"{name}: {limit}" for limit in report.limits if not limit.met]
     for line in summary:

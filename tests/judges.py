@@ -19,10 +19,14 @@ SECOND = np.array([5 / 3, -5 / 21, 5 / 126, -5 / 1008, 1 / 3150])
 OFFSETS = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
 
 
-def first(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, h: float = STEP) -> np.ndarray:
-    """Derivative of f at x along d; f takes states as columns and gives results along the last axis."""
-    size = max(1.0, np.abs(d).max(initial=0.0))
-    s = h / size
+def first(
+    f: Callable[[np.ndarray], np.ndarray], x: np.ndarray, d: np.ndarray, h: float = STEP, size: float | None = None
+) -> np.ndarray:
+    """Derivative of f at x along d; f takes states as columns and gives results along the last axis.
+
+    Steps are h / size, with the largest entry of d (at least 1) as the size unless it is given.
+    """
+    s = h / (max(1.0, np.abs(d).max(initial=0.0)) if size is None else size)
     plus, minus = (f(x[:, None] + sign * s * np.outer(d, OFFSETS)) for sign in (1, -1))
     return (plus - minus) @ FIRST / s
 

@@ -27,7 +27,7 @@ CONSERVATIVE = {
     "spherical_pendulum": {},
     "free_slider_crank": {"theta_dot": 30.0},
     "skewed_four_bar": {},
-    "spatial_loop": {},
+    "spatial_loop": {"theta_dot": 4.0},
 }
 
 
@@ -113,10 +113,12 @@ def test_energy_changes_by_the_power_at_every_state(module: Callable[..., Any], 
     random = np.random.default_rng(41)
     for x in judges.random_states(mod, 42, 5):
         t, u = float(random.uniform(0, 2)), random.uniform(-3, 3, mod.n_u)
-        rate = judges.first(lambda columns: mod.energy(columns).sum(axis=0), x, mod.rhs(t, x, u=u))
+        v, a = np.split(mod.rhs(t, x, u=u), 2)
+        # steps small enough for positions, and for velocities as a part of themselves (they enter as squares)
+        size = max(1.0, np.abs(v).max(), np.abs(a).max() / np.abs(v).max())
+        T_rate, V_rate = judges.first(mod.energy, x, np.concatenate([v, a]), size=size)
         expected = power(mod, t, x, dict(zip(mod.u_names, u, strict=True)))
-        T_rate = judges.first(lambda columns: mod.energy(columns)[0], x, mod.rhs(t, x, u=u))
-        assert abs(rate - expected) <= 1e-10 * max(abs(expected), abs(T_rate))
+        assert abs(T_rate + V_rate - expected) <= 1e-10 * max(abs(expected), abs(T_rate))
 
 
 @pytest.mark.parametrize("method", ["embedding", "lagrange"])
@@ -138,5 +140,5 @@ def test_work_is_the_change_of_energy_over_a_run(module: Callable[..., Any], nam
     solution = solve_ivp(fun, (0, end), start, method="DOP853", rtol=1e-10, atol=1e-12)
     T, V = mod.energy(mod.project(solution.y[:n]))
     change, work = T + V - T[0] - V[0], solution.y[n]
-    assert np.ptp(work) > 0.1 * T.max()
+    assert np.ptp(work) > 0.05 * T.max()
     assert np.abs(change - work).max() <= 1e-9 * T.max()

@@ -69,6 +69,13 @@ def test_layouts_of_the_inner_blocks(systems):
     assert not any(blocks[name].public for name in ("terms", "position", "rate", "residual_jacobian"))
 
 
+def test_a_kernel_that_repeats_another_is_written_once_unless_drivers_call_it(systems):
+    assert systems.chain(3).program().twins["embedded_mass_matrix"] == "mass_matrix"
+    assert "embedded_mass_matrix" not in systems.chain(3, preferred=(2, 0, 1)).program().twins
+    program = systems.slider_crank().program()  # C_t is zero, as other results of two entries may be
+    assert not {name for d in program.drivers for name in d.blocks} & set(program.twins)
+
+
 def test_only_what_is_asked_for_is_built(systems):
     program = systems.slider_crank().program(kernels=["energy"])
     assert names(program) == (["energy"], [])
