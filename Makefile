@@ -25,7 +25,7 @@ lint: $(VENV)/.installed-test
 	@$(BIN)/mypy
 
 bench: $(VENV)/.installed-plot
-	@$(BIN)/python -m benchmarks.run
+	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
 
 clean:
 	@rm -rf $(VENV) build dist demo_output eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -133,6 +133,28 @@ def skewed_four_bar() -> eg.Model:
     return m
 
 
+def three_cranks() -> eg.Model:
+    """Parallelogram with a third, parallel crank: two loops, of whose four rows one depends on the others.
+
+    Gruebler counts no degree of freedom; off the manifold the four rows are independent.
+    """
+    m = eg.Model("three_cranks", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    r, mass = m.parameter("r", 0.2), m.parameter("mass", 0.7)
+    bar = m.body("bar", mass=1.3, com=(0.3, 0, 0), inertia={"zz": 0.04})
+    for k, x in ((1, 0.0), (2, 0.35), (3, 0.6)):
+        crank = m.body(f"crank{k}", mass=mass, com=(r / 2, 0, 0), inertia={"zz": mass * r**2 / 12})
+        m.revolute(f"A{k}", m.ground.at(x, 0, 0), crank, coordinate=f"theta{k}")
+        if k == 1:
+            m.revolute("B1", crank.at(r, 0, 0), bar, coordinate="bend")
+        else:
+            m.revolute(f"B{k}", bar.at(x, 0, 0), crank.at(r, 0, 0))
+    m.initial(theta1=-0.5)
+    m.guess(bend=0.5, theta2=-0.5, theta3=-0.5)
+    m.independent("theta1")
+    return m
+
+
 def spatial_loop() -> eg.Model:
     """Spatial linkage of revolute, spherical, cylindrical and revolute joint: one degree of freedom."""
     m = eg.Model("spatial_loop", gravity=(0.5, -1.0, -9.81))
@@ -216,6 +238,7 @@ BUILT: dict[str, Callable[[], eg.Model]] = {
         point_chain,
         tilted_four_bar,
         skewed_four_bar,
+        three_cranks,
         spatial_loop,
         powered_slider_crank,
         powered_arm,

@@ -62,7 +62,7 @@ def _context(program: Program) -> dict[str, Any]:
         "kernels": [
             {
                 "name": k.name,
-                "call": f"block_{twins.get(k.name, k.name)}" if isinstance(k, Block) else f"drive_{k.name}",
+                "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],

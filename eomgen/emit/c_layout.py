@@ -6,9 +6,9 @@ from ..program import Program
 
 LOOPS: dict[str, tuple[str, ...]] = {
     "project": ("scaled", "cholesky", "project", "close", "project_drive"),
-    "rhs": ("scaled", "cholesky", "project", "close", "partition", "embed", "ldl", "accelerate", "rhs"),
-    "embedded_mass_matrix": ("scaled", "partition", "embed", "mass"),
-    "kinematics": ("scaled", "partition", "embed", "kinematics", "kinematics_drive"),
+    "rhs": ("scaled", "cholesky", "project", "close", "eliminate", "partition", "embed", "ldl", "accelerate", "rhs"),
+    "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
+    "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
     "outputs": ("scaled", "cholesky", "project", "close", "outputs_closed"),
 }
 ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
@@ -27,7 +27,7 @@ def driver_files(program: Program) -> list[str]:
         if not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
         elif driver.name == "jacobian":
-            needed = (*LOOPS["rhs"][:-1], direct, "jacobian")
+            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian")
         elif driver.name == "outputs" and "terms" in driver.blocks:
             needed = ACCELERATED
         else:

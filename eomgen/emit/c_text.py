@@ -141,9 +141,9 @@ def _function(head: str, used: set[str], lines: Sequence[str]) -> str:
 
 
 def print_block(program: Program, block: Block) -> tuple[str, int]:
-    """The C functions of a block, the last of them ``block_<name>``, and the doubles of work they need."""
+    """The C functions of a block, the last of them ``<name>_block``, and the doubles of work they need."""
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    return print_pieces(program, f"block_{block.name}", pieces, references(program, block.inputs))
+    return print_pieces(program, f"{block.name}_block", pieces, references(program, block.inputs))
 
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> tuple[str, int]:
@@ -179,11 +179,11 @@ def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
 
 
 def print_precompute(program: Program) -> tuple[str, int]:
-    """``block_precompute``, which fills the hoisted constants, and the doubles of scratch it needs behind them."""
+    """``precompute_block``, which fills the hoisted constants, and the doubles of scratch it needs behind them."""
     graph = program.graph
     texts = {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
     pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
-    return print_pieces(program, "block_precompute", pieces, texts)
+    return print_pieces(program, "precompute_block", pieces, texts)
 
 
 def used_helpers(program: Program, roots: Sequence[Expr]) -> list[str]:

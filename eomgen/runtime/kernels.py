@@ -65,7 +65,7 @@ class Kernels:
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
         if name not in self.core.names:
-            raise UsageError(f"model {self.layout.name!r} was generated without the kernel {name!r}")
+            return Missing(name, f"model {self.layout.name!r} was generated without the kernel {name!r}")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
     def _culprit(self, status: int, t: float, x: Array) -> str:
@@ -89,6 +89,25 @@ class Kernels:
         if status == 4:
             return f"independent are {', '.join(layout.q[i] for i in layout.independent)}"
         return ""
+
+
+class Missing:
+    """A kernel that was not generated: the module can be used without it."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, name: str, message: str) -> None:
+        self.name = name
+        self.message = message
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Refuse.
+
+        Raises
+        ------
+        UsageError
+        """
+        raise UsageError(f"{self.message}; compile again with kernels=None for all, or name it in kernels")
 
 
 class Rows:

@@ -18,7 +18,7 @@ from mechanisms import random_mechanism
 from eomgen import pipeline
 
 LOOPS = ["offset_slider_crank", "powered_slider_crank", "spatial_loop"]
-REDUNDANT = ["tilted_four_bar", "skewed_four_bar"]
+REDUNDANT = ["tilted_four_bar", "skewed_four_bar", "three_cranks"]
 
 
 def compare(mod: Any, x: np.ndarray, t: float) -> None:

@@ -24,7 +24,7 @@ from eomgen import pipeline
 from eomgen.errors import ModelError
 
 METHODS = ["embedding", "lagrange"]
-MORE = ["offset_slider_crank", "spatial_loop", "powered_slider_crank", "powered_arm", "skewed_four_bar"]
+MORE = ["offset_slider_crank", "spatial_loop", "powered_slider_crank", "powered_arm", "skewed_four_bar", "three_cranks"]
 DIGITS = 1e-11
 SEED = 2560  # a branched tree of hinges and slides only
 
@@ -164,7 +164,9 @@ FORCES = {
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, "offset_slider_crank", "spatial_loop", "skewed_four_bar"])
+@pytest.mark.parametrize(
+    "name", [*models.EXAMPLE_NAMES, "offset_slider_crank", "spatial_loop", "skewed_four_bar", "three_cranks"]
+)
 def test_models_against_newton_euler_with_multipliers(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     rigid = judges.rigid_bodies(models.build(name).mechanism())

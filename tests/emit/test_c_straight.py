@@ -122,3 +122,9 @@ def test_parameters_change_without_recompiling(systems, compiled):
     system.p = system.p * [1.0, 2.0, 0.5]
     library.set_parameters(system.p)
     compare(system, library)
+
+
+@pytest.mark.parametrize("name", ["block", "rhs", "driver", "scale", "N", "main", "eomgen_model", "x"])
+def test_a_model_may_have_any_name(systems, compiled, name):
+    for system in (systems.chain(1, name=name), systems.slider_crank(name=name)):
+        compiled(system, "-O0").fine("rhs", np.zeros(2 * system.n))

@@ -97,11 +97,15 @@ def test_the_cython_package_installs_and_runs_with_numpy_alone(packages, tmp_pat
 
 def test_the_c_package_builds_its_libraries_and_its_example(packages):
     folder = packages["c"] / "crank"
-    (folder / "main.c").write_text(re.search(r"```c\n(.*?)```", (folder / "README.md").read_text(), re.S).group(1))
-    subprocess.run(
-        ["make", "-s", "all", "main", "CFLAGS=-O0 -std=c99 -fPIC -Wall -Wextra -Werror"], cwd=folder, check=True
+    (folder / "crank_example.c").write_text(
+        re.search(r"```c\n(.*?)```", (folder / "README.md").read_text(), re.S).group(1)
     )
-    done = subprocess.run(["./main"], cwd=folder, capture_output=True, text=True, check=True)
+    subprocess.run(
+        ["make", "-s", "all", "crank_example", "CFLAGS=-O0 -std=c99 -fPIC -Wall -Wextra -Werror"],
+        cwd=folder,
+        check=True,
+    )
+    done = subprocess.run(["./crank_example"], cwd=folder, capture_output=True, text=True, check=True)
     assert len(done.stdout.split()) == 6
     assert (folder / "libcrank.so").exists()
 

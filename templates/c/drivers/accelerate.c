@@ -31,8 +31,8 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     double *const mass = w + AT_MASS, *const h = w + AT_H, *const scaled = w + AT_A;
     const double *const s = w + AT_SCALES, *const packed = w + AT_TERMS, *const rows = w + AT_ROWS;
     const double *const bias = packed + N * (N + 1) / 2, *const C_q = bias + N, *const gamma = C_q + M * N;
-    (void)block_terms(t, w + AT_X, u, c, w + AT_TERMS, w);
-    scale_jacobian(C_q, s, w + AT_J);
+    (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);
+    form_scaled(C_q, s, w + AT_J);
     form_rows(w + AT_J, gamma, width, w);
     int status = split(width, 0, parts, w);
     if (status != 0) {

@@ -40,3 +40,23 @@ static void cholesky_solve(const double *restrict g, double *restrict b)
         b[i] = s / g[i * M + i];
     }
 }
+
+/* G = J J^T + 1e-12 max(diag) I, factored. */
+static int factor_gram(const double *restrict J, double *restrict G)
+{
+    double largest = 0.0;
+    for (int i = 0; i < M; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < N; k++) {
+                sum += J[i * N + k] * J[j * N + k];
+            }
+            G[i * M + j] = sum;
+        }
+        largest = G[i * M + i] > largest ? G[i * M + i] : largest;
+    }
+    for (int i = 0; i < M; i++) {
+        G[i * M + i] += 1e-12 * largest;
+    }
+    return cholesky(G);
+}

@@ -3,7 +3,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
                        double *restrict w)
 {
     double *const q = w + AT_X, *const v = w + AT_X + N, *const r = w + AT_RATE, *const s = w + AT_SCALES;
-    (void)block_scales(t, x, u, c, s, w);
+    (void)scales_block(t, x, u, c, s, w);
     for (int k = 0; k < 2 * N; k++) {
         q[k] = x[k];
     }
@@ -11,7 +11,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
     if (status != 0) {
         return status;
     }
-    (void)block_rate(t, q, u, c, r, w);
+    (void)rate_block(t, q, u, c, r, w);
     for (int i = 0; i < M; i++) {
         r[i] /= s[N + i];
     }

@@ -1,22 +1,3 @@
-/* Multipliers l from the dependent rows of C_q^T l = -(M a + h), zero on redundant rows; scaled values in w. */
-static void find_multipliers(int width, const partition *restrict parts, double *restrict l, const double *restrict w)
-{
-    const double *const mass = w + AT_MASS, *const a = w + AT_A, *const rows = w + AT_ROWS, *const s = w + AT_SCALES;
-    for (int i = 0; i < M; i++) {
-        l[i] = 0.0;
-    }
-    for (int j = 0; j < R; j++) {
-        const int d = parts->dependent[j];
-        double force = w[AT_H + d];
-        for (int k = 0; k < N; k++) {
-            force += mass[d * N + k] * a[k];
-        }
-        for (int i = 0; i < M; i++) {
-            l[i] -= rows[parts->row[j] * width + N + 1 + i] * force / s[N + i];
-        }
-    }
-}
-
 /* The change of the projected state for the unit change of x[column]: dq and dv in w + AT_X + 3 N + M. */
 static void project_direction(double t, int column, const double *restrict u, const double *restrict c,
                               double *restrict w)
@@ -45,7 +26,7 @@ static void project_direction(double t, int column, const double *restrict u, co
     }
 }
 
-static int drive_jacobian(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
     partition parts;

@@ -7,9 +7,9 @@ static int close_dependent(double t, double *restrict q, const double *restrict 
     double *const step = w + AT_STEP;
     double before = 0.0;
     for (int count = 0; count <= 50; count++) {
-        (void)block_position(t, q, u, c, w + AT_POSITION, w);
+        (void)position_block(t, q, u, c, w + AT_POSITION, w);
         const double size = largest_residual(C, s);
-        scale_jacobian(C + M, s, w + AT_J);
+        form_scaled(C + M, s, w + AT_J);
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }

@@ -1,11 +1,11 @@
 /* x = [q_i v_i a_i q_guess] -> [q v a] of the whole tree; the set of independent coordinates is the preferred one. */
-static int drive_kinematics(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int kinematics_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                             double *restrict out, double *restrict w)
 {
     partition parts;
     const int width = N + 1 + M;
     double *const q = out, *const v = out + N, *const a = out + 2 * N;
-    (void)block_scales(t, x, u, c, w + AT_SCALES, w);
+    (void)scales_block(t, x, u, c, w + AT_SCALES, w);
     for (int k = 0; k < N; k++) {
         q[k] = x[3 * F + k];
     }
@@ -16,7 +16,7 @@ static int drive_kinematics(double t, const double *restrict x, const double *re
     if (status != 0) {
         return status;
     }
-    (void)block_rate(t, q, u, c, w + AT_RATE, w);
+    (void)rate_block(t, q, u, c, w + AT_RATE, w);
     form_rows(w + AT_J, w + AT_RATE, width, w);
     status = split(width, 1, &parts, w);
     if (status != 0) {
@@ -27,7 +27,7 @@ static int drive_kinematics(double t, const double *restrict x, const double *re
     for (int k = 0; k < 2 * N; k++) {
         w[AT_X + k] = out[k];
     }
-    (void)block_terms(t, w + AT_X, u, c, w + AT_TERMS, w);
+    (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);
     complete(x + 2 * F, w + AT_TERMS + N * (N + 1) / 2 + N + M * N, &parts, a, w);
     return 0;
 }

@@ -1,4 +1,4 @@
-static int drive_outputs(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int outputs_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                          double *restrict out, double *restrict w)
 {
     partition parts;
@@ -6,5 +6,5 @@ static int drive_outputs(double t, const double *restrict x, const double *restr
     if (status == 0) {
         status = accelerate(t, u, c, N + 1, &parts, w + AT_X + 2 * N, w);
     }
-    return status != 0 ? status : block_accelerated_outputs(t, w + AT_X, u, c, out, w);
+    return status != 0 ? status : accelerated_outputs_block(t, w + AT_X, u, c, out, w);
 }

@@ -21,24 +21,6 @@ static void form_rows(const double *restrict J, const double *restrict column, i
     }
 }
 
-/* Gauss-Jordan elimination of row `row` by column `column`. */
-static void eliminate(double *restrict a, int width, int row, int column)
-{
-    const double pivot = a[row * width + column];
-    for (int k = 0; k < width; k++) {
-        a[row * width + k] /= pivot;
-    }
-    for (int i = 0; i < M; i++) {
-        const double factor = a[i * width + column];
-        if (i == row || factor == 0.0) {
-            continue;
-        }
-        for (int k = 0; k < width; k++) {
-            a[i * width + k] -= factor * a[row * width + k];
-        }
-    }
-}
-
 /* Complete pivoting over the rows in w + AT_ROWS, R pivots: the best among the columns preferred as dependent if it is
    within 100 of the best of all. With `strict` only preferred columns are taken. */
 static int split(int width, int strict, partition *restrict parts, double *restrict w)

@@ -1,23 +1,3 @@
-/* G = J J^T + 1e-12 max(diag) I, factored. */
-static int factor_gram(const double *restrict J, double *restrict G)
-{
-    double largest = 0.0;
-    for (int i = 0; i < M; i++) {
-        for (int j = 0; j <= i; j++) {
-            double sum = 0.0;
-            for (int k = 0; k < N; k++) {
-                sum += J[i * N + k] * J[j * N + k];
-            }
-            G[i * M + j] = sum;
-        }
-        largest = G[i * M + i] > largest ? G[i * M + i] : largest;
-    }
-    for (int i = 0; i < M; i++) {
-        G[i * M + i] += 1e-12 * largest;
-    }
-    return cholesky(G);
-}
-
 /* x -= J^T G^-1 (J x + r), twice so that the term 1e-12 leaves no trace: the nearest x with J x + r = 0. */
 static void correct_linear(const double *restrict r, double *restrict x, double *restrict w)
 {
@@ -47,12 +27,12 @@ static int close_position(double t, double *restrict q, const double *restrict u
     double *const e = w + AT_E, *const dz = w + AT_STEP;
     double before = 0.0;
     for (int step = 0; step <= 25; step++) {
-        (void)block_position(t, q, u, c, w + AT_POSITION, w);
+        (void)position_block(t, q, u, c, w + AT_POSITION, w);
         const double size = largest_residual(C, s);
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }
-        scale_jacobian(C + M, s, w + AT_J);
+        form_scaled(C + M, s, w + AT_J);
         const int status = factor_gram(J, w + AT_G);
         if (status != 0 || has_settled(step, size, before)) {
             return status;

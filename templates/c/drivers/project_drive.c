@@ -1,4 +1,4 @@
-static int drive_project(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int project_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                          double *restrict out, double *restrict w)
 {
     const int status = close_loops(t, x, u, c, w);

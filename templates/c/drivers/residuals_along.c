@@ -7,7 +7,7 @@ static void prepare_residuals(double t, const double *restrict u, const double *
 
 static void residuals_along(double t, const double *restrict u, const double *restrict c, double *restrict w)
 {
-    (void)block_residual_tangent(t, w + AT_X, u, c, w + AT_ALONG, w);
+    (void)residual_tangent_block(t, w + AT_X, u, c, w + AT_ALONG, w);
 }
 
 EOMGEN_SHARED void rate_along(double t, const double *restrict u, const double *restrict c, double *restrict w)

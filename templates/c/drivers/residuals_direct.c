@@ -2,7 +2,7 @@
    their Jacobians, evaluated once. */
 static void prepare_residuals(double t, const double *restrict u, const double *restrict c, double *restrict w)
 {
-    (void)block_residual_jacobian(t, w + AT_X, u, c, w + AT_RESIDUAL, w);
+    (void)residual_jacobian_block(t, w + AT_X, u, c, w + AT_RESIDUAL, w);
 }
 
 static void multiply_add(int rows, const double *restrict a, const double *restrict x, double *restrict y)

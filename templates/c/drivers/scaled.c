@@ -1,5 +1,5 @@
 /* Scaled quantities: q / s_q, C / s_c, J = diag(1/s_c) C_q diag(s_q). */
-EOMGEN_SHARED void scale_jacobian(const double *restrict C_q, const double *restrict s, double *restrict J)
+EOMGEN_SHARED void form_scaled(const double *restrict C_q, const double *restrict s, double *restrict J)
 {
     for (int i = 0; i < M; i++) {
         for (int k = 0; k < N; k++) {

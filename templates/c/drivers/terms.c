@@ -1,10 +1,10 @@
 /* M packed row by row, lower triangle, and h of a tree. */
-static int block_terms(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int terms_block(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                        double *restrict out, double *restrict w)
 {
     const double *const full = w + AT_FULL;
-    (void)block_mass_matrix(t, x, u, c, w + AT_FULL, w);
-    (void)block_bias(t, x, u, c, out + N * (N + 1) / 2, w);
+    (void)mass_matrix_block(t, x, u, c, w + AT_FULL, w);
+    (void)bias_block(t, x, u, c, out + N * (N + 1) / 2, w);
     for (int i = 0; i < N; i++) {
         for (int k = 0; k <= i; k++) {
             out[i * (i + 1) / 2 + k] = full[i * N + k];

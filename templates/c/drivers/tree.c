@@ -46,8 +46,8 @@ static int tree_accelerate(double t, const double *restrict x, const double *res
 {
     double *const a = w + AT_X + 2 * N;
     const double *const bias = w + AT_TERMS + N * (N + 1) / 2;
-    (void)block_scales(t, x, u, c, w + AT_SCALES, w);
-    (void)block_terms(t, x, u, c, w + AT_TERMS, w);
+    (void)scales_block(t, x, u, c, w + AT_SCALES, w);
+    (void)terms_block(t, x, u, c, w + AT_TERMS, w);
     for (int k = 0; k < N; k++) {
         w[AT_X + k] = x[k], w[AT_X + N + k] = x[N + k];
         a[k] = -bias[k];

@@ -1,4 +1,4 @@
-static int drive_jacobian(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
     double *const dq = w + AT_X + 3 * N, *const r1 = w + AT_ALONG;

@@ -1,4 +1,4 @@
-static int drive_rhs(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+static int rhs_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                      double *restrict out, double *restrict w)
 {
     const int status = tree_accelerate(t, x, u, c, w);
