@@ -37,6 +37,6 @@ def run(quick: bool) -> Report:
     columns = ("operations of", f"{short} links", f"{2 * short} links", "ratio", "per link")
     notes = (
         "Angles between neighbours, every parameter a symbol; work that depends on parameters only is included.",
-        "SymPy's energies and equations in these angles grow exponentially before cse; see the derive benchmark.",
+        "How SymPy fares in these angles when links double: see the derive benchmark.",
     )
     return Report((Table("operations", columns, rows),), tuple(limits), notes, details)

@@ -26,7 +26,8 @@ class Constraints:
     time_derivative: tuple[Expr, ...] = ()  #: C_t
     velocity: tuple[Expr, ...] = ()  #: C_q v + C_t
     gamma: tuple[Expr, ...] = ()
-    aligned: tuple[Expr, ...] = ()  #: must be positive, else an axis is flipped
+    aligned: tuple[Expr, ...] = ()  #: must be positive, else an axis of the joint in ``aligned_joints`` is flipped
+    aligned_joints: tuple[str, ...] = ()
     vanishing: tuple[str, ...] = ()
     declared: int = 0  #: rows before the vanishing ones were left out
 
@@ -65,13 +66,14 @@ def close_loop(spec: JointSpec, poses: Poses) -> tuple[list[Row], list[Expr], li
 def differentiate_constraints(
     graph: Graph,
     rows: Sequence[Row],
-    aligned: Sequence[Expr],
+    aligned: Sequence[tuple[str, Expr]],
     motion: tuple[Sequence[Expr], Sequence[Expr], Expr],
 ) -> Constraints:
     """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
     q, v, t = motion
     kept = [r for r in rows if not r.expression.is_zero]
     values = [r.expression for r in kept]
+    open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
     along = dict(zip(q, v, strict=True)) | {t: graph.one}
     velocity = jvp(values, along)
     rest = along | dict.fromkeys(v, graph.zero)
@@ -85,7 +87,8 @@ def differentiate_constraints(
         time_derivative=tuple(jvp(values, {t: graph.one})),
         velocity=tuple(velocity),
         gamma=tuple(jvp(velocity, rest)),
-        aligned=tuple(e for e in aligned if e.value is None or e.value <= 0),
+        aligned=tuple(e for _, e in open_conditions),
+        aligned_joints=tuple(joint for joint, _ in open_conditions),
         vanishing=tuple(r.label for r in rows if r.expression.is_zero),
         declared=len(rows),
     )

@@ -122,6 +122,7 @@ class BlockMaker:
             "poses": lambda: terms.poses,
             "loop_coordinates": lambda: terms.loop_coordinates,
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
+            "alignment": lambda: terms.alignment,
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {

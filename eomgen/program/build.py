@@ -125,6 +125,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_dof=terms.n_dof,
         n_bodies=len(terms.poses) // 16,
         n_k=terms.n_k,
+        n_a=len(terms.alignment),
     )
 
 

@@ -20,6 +20,7 @@ class Sizes:
     n_dof: int
     n_bodies: int
     n_k: int
+    n_a: int
 
 
 @dataclass(frozen=True)
@@ -60,5 +61,6 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (3 * s.n_v,), "[q; v; a] of the whole tree"),
     Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
+    Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

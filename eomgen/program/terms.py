@@ -43,6 +43,7 @@ class SystemTerms:
     outputs: Row  #: (n_y,) of (q, v, a)
     loop_coordinates: Row  #: (3 n_k,) y, y' and y'' of the coordinates of cut joints, of (q, v, a)
     loop_coordinate_jacobian: tuple[Row, ...]  #: (n_k, n) dy/dq
+    alignment: Row  #: (n_a,) of q: positive unless an axis of a cut joint is flipped
 
     coordinate_scales: Row  #: (n,) typical size of each coordinate, of parameters only
     constraint_scales: Row  #: (m,) typical size of each row's residual, of parameters only

@@ -99,6 +99,7 @@ def lagrangian_system(
         outputs=tuple(y),
         loop_coordinates=(*loop, *rates, *jvp(rates, motion)),
         loop_coordinate_jacobian=tuple(tuple(L_q.get((i, j), zero) for j in range(n)) for i in range(len(loop))),
+        alignment=(),
         coordinate_scales=tuple(more.get("coordinate_scales", [graph.one] * n)),
         constraint_scales=tuple(more.get("constraint_scales", [graph.one] * m)),
         n_dof=n_dof,
