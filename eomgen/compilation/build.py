@@ -89,9 +89,11 @@ def compile_sources(
     entry = cache.find(key)
     if entry is not None:
         return _artifact(entry, start, from_cache=True)
-    layer_object = build_layer(cache, layer, sources[HEADER], compiler, progress).product
     product = f"_core{describe_interpreter()['suffix']}"
-    objects = [str(layer_object)]
+
+    def objects() -> list[str]:
+        return [str(build_layer(cache, layer, sources[HEADER], compiler, progress).product)]
+
     entry = _build(cache, key, "extension", name, sources, flags, product, objects, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
 
@@ -118,7 +120,7 @@ def compile_c_library(
     if entry is not None:
         return _artifact(entry, start, from_cache=True)
     product = f"lib{name}.dylib" if sys.platform == "darwin" else f"lib{name}.so"
-    entry = _build(cache, key, "library", name, sources, flags, product, [], options, compiler, progress)
+    entry = _build(cache, key, "library", name, sources, flags, product, list, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
 
 
@@ -137,11 +139,9 @@ def _plan(
     sources: Mapping[str, str], options: Options, compiler: CompilerInfo, *, extension: bool
 ) -> dict[str, list[str]]:
     """Flags of every C file, and under "" those of the linker."""
-    flags = {
-        file: compile_flags(options, compiler, len(text), hidden=extension)
-        for file, text in sources.items()
-        if file.endswith(".c")
-    }
+    files = [file for file in sources if file.endswith(".c")]
+    size = sum(len(sources[file]) for file in files)
+    flags = {file: compile_flags(options, compiler, size, hidden=extension) for file in files}
     return {**flags, "": link_flags(options, compiler, extension=extension)}
 
 
@@ -156,9 +156,9 @@ def _artifact(entry: CacheEntry, start: float, *, from_cache: bool) -> Artifact:
 
 def _build(
     cache: Cache, key: str, kind: str, name: str, sources: Mapping[str, str], flags: Mapping[str, Sequence[str]],
-    product: str, objects: Sequence[str], options: Options, compiler: CompilerInfo, progress: Progress | None,
+    product: str, objects: Callable[[], list[str]], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
-    """Compile every file, link, publish."""
+    """Compile every file, meanwhile make the further objects, link, publish."""
     tell: Callable[[str], Any] = progress or (lambda line: None)
     with cache.attempt(key) as directory:
         folder = directory / "sources"
@@ -173,29 +173,37 @@ def _build(
             command = [*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"]
             _command(command, directory, folder / file)
 
-        _run_all(compile_one, files, options.jobs or os.cpu_count() or 1)
+        further = _run_all(compile_one, files, options.jobs or os.cpu_count() or 1, objects)
         tell(f"linking {name}")
-        _command([*compiler.command, *compiled, *objects, "-o", product, *flags[""]], directory, directory / product)
+        _command([*compiler.command, *compiled, *further, "-o", product, *flags[""]], directory, directory / product)
         for file in compiled:
             (directory / file).unlink()
         recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags)}
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
-def _run_all(task: Callable[[str], None], files: Sequence[str], jobs: int) -> None:
-    """Do a task for every file, some at a time; the first failure stops those that have not begun."""
-    if min(jobs, len(files)) == 1:
+def _run_all(
+    task: Callable[[str], None], files: Sequence[str], jobs: int, meanwhile: Callable[[], list[str]]
+) -> list[str]:
+    """Do a task for every file, some at a time, and something else in this thread, whose result is returned.
+
+    The first failure stops the tasks that have not begun.
+    """
+    if jobs == 1:
         for file in files:
             task(file)
-        return
+        return meanwhile()
     from concurrent.futures import ThreadPoolExecutor  # slow to import
 
     with ThreadPoolExecutor(jobs) as pool:
         try:
-            list(pool.map(task, files))
+            results = pool.map(task, files)
+            made = meanwhile()
+            list(results)
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
+    return made
 
 
 def _command(command: Sequence[str], directory: Path, source: Path) -> None:

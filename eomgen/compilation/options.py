@@ -59,7 +59,7 @@ def compile_flags(options: Options, compiler: CompilerInfo, size: int, *, hidden
     compiler : CompilerInfo
         Who compiles.
     size : int
-        Length of the source in bytes.
+        Length of all C files in bytes.
     hidden : bool
         Keep the symbols inside the library, so that two models in one process never meet.
     """

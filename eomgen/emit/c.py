@@ -7,7 +7,8 @@ from typing import Any
 
 from ..program import KERNELS, Block, Program
 from .c_layout import driver_files, work_areas
-from .c_text import print_block, print_precompute, used_helpers
+from .c_parts import distribute, part_names
+from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
 
@@ -18,12 +19,20 @@ def emit_c(program: Program) -> SourceSet:
     Returns
     -------
     SourceSet
-        ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.
+        ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.  A large model has
+        further files ``<name>_part1.c``, ..., so that they can be compiled side by side.
     """
-    context = _context(program)
+    printed = _print(program)
+    parts = distribute(program, printed)
+    context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
+    further = {
+        f"{program.name}_part{k}.c": render("c/part.c.j2", {**context, "functions": functions})
+        for k, functions in enumerate(parts, 1)
+    }
     return SourceSet(
         {
             f"{program.name}.c": render("c/model.c.j2", context),
+            **further,
             f"{program.name}.h": render("c/model.h.j2", context),
             "eomgen.h": read_template("c/eomgen.h"),
             "model.json": metadata_json(program),
@@ -31,12 +40,16 @@ def emit_c(program: Program) -> SourceSet:
     )
 
 
-def _context(program: Program) -> dict[str, Any]:
-    precompute, scratch = print_precompute(program) if program.hoisted else ("", 0)
+def _print(program: Program) -> list[Printed]:
+    """Every straight-line function, the precompute first."""
+    precompute = print_precompute(program) if program.hoisted else Printed("", (), 0)
+    return [precompute, *(print_block(program, b) for b in program.blocks if b.name not in program.twins)]
+
+
+def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     twins = program.twins
-    printed = [print_block(program, block) for block in program.blocks if block.name not in twins]
-    areas, n_work = work_areas(program, max((work for _, work in printed), default=0))
-    n_const = len(program.parameters) + len(program.hoisted) + scratch
+    areas, n_work = work_areas(program, max((p.work for p in printed[1:]), default=0))
+    n_const = len(program.parameters) + len(program.hoisted) + printed[0].work
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
     numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work}
@@ -53,7 +66,7 @@ def _context(program: Program) -> dict[str, Any]:
         "n_work": n_work,
         "hoisted": len(program.hoisted),
         "helpers": used_helpers(program, roots),
-        "blocks": [precompute, *(text for text, _ in printed)] if precompute else [text for text, _ in printed],
+        "blocks": printed if program.hoisted else printed[1:],
         "drivers": [read_template(f"c/drivers/{file}.c") for file in driver_files(program)],
         "areas": areas,
         "order": [*program.preferred, *others],

@@ -6,6 +6,7 @@ Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN include
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ..graph.core import Expr
 from ..graph.traverse import reachable
@@ -140,18 +141,26 @@ def _function(head: str, used: set[str], lines: Sequence[str]) -> str:
     return f"{head}({SIGNATURE})\n{{\n{text}\n}}\n"
 
 
-def print_block(program: Program, block: Block) -> tuple[str, int]:
-    """The C functions of a block, the last of them ``<name>_block``, and the doubles of work they need."""
+class Printed(NamedTuple):
+    """The C text of one straight-line function: the pieces it calls, if it is long, without their linkage."""
+
+    text: str
+    pieces: tuple[tuple[str, str], ...]  #: name and text of each
+    work: int  #: doubles of work needed
+
+
+def print_block(program: Program, block: Block) -> Printed:
+    """The C functions of a block, ``<name>_block`` and its pieces."""
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
     return print_pieces(program, f"{block.name}_block", pieces, references(program, block.inputs))
 
 
-def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> tuple[str, int]:
+def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
     printer = _Printer(program, texts)
     main = _direct(printer, pieces) + [f"if ({printer.failed(i, None)}) {{ return 2; }}" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
-    functions = []
+    functions: list[tuple[str, str]] = []
     if len(pieces.pieces) == 1:
         main += printer.lines(pieces.pieces[0])
         used |= printer.used
@@ -160,11 +169,10 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
         for k, piece in enumerate(pieces.pieces):
             printer.used.clear()
             lines = printer.lines(piece)
-            head = f"static EOMGEN_APART int {name}_{k}"
-            functions.append(_function(head, printer.used, [*lines, "return 0;"]))
-            main.append(f"if ({name}_{k}(t, x, u, c, out, w) != 0) {{ return 2; }}")
-    functions.append(_function(f"static int {name}", used, [*main, "return 0;"]))
-    return "\n".join(functions), pieces.work
+            part = f"{program.name}_{name}_{k}"
+            functions.append((part, _function(f"int {part}", printer.used, [*lines, "return 0;"])))
+            main.append(f"if ({part}(t, x, u, c, out, w) != 0) {{ return 2; }}")
+    return Printed(_function(f"static int {name}", used, [*main, "return 0;"]), tuple(functions), pieces.work)
 
 
 def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
@@ -178,8 +186,8 @@ def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
     return lines + [f"out[{k}] = {text};" for k, text in texts]
 
 
-def print_precompute(program: Program) -> tuple[str, int]:
-    """``precompute_block``, which fills the hoisted constants, and the doubles of scratch it needs behind them."""
+def print_precompute(program: Program) -> Printed:
+    """``precompute_block``, which fills the hoisted constants; its work lies behind them."""
     graph = program.graph
     texts = {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)}
     pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)

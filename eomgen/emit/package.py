@@ -55,9 +55,10 @@ def emit_package(program: Program, target: str) -> SourceSet:
 
 
 def _cython(program: Program) -> dict[str, str]:
-    context = _context(program)
+    sources = emit_c(program)
+    context = _context(program) | {"c_files": [name for name in sources if name.endswith(".c")]}
     return {
-        **emit_c(program),
+        **sources,
         "_core.pyx": read_template("cython/_core.pyx"),
         "setup.py": render("python/setup.py.j2", context),
         **_python_files(context),
@@ -70,9 +71,10 @@ def _numpy(program: Program) -> dict[str, str]:
 
 
 def _c_library(program: Program) -> dict[str, str]:
-    context = _context(program)
+    sources = emit_c(program)
+    context = _context(program) | {"c_files": [name for name in sources if name.endswith(".c")]}
     return {
-        **emit_c(program),
+        **sources,
         "Makefile": render("c/Makefile.j2", context),
         "README.md": render("c/README.md.j2", context),
     }

@@ -49,12 +49,14 @@ const eomgen_model *eomgen_model_table(void);
 #endif
 
 /* APART keeps pieces of very long code apart, so that compile time stays proportional to its length;
-   SHARED marks a helper that not every model uses. */
+   PIECE marks a piece that lies in another file of the same library; SHARED a helper that not every model uses. */
 #if defined(__GNUC__)
 #define EOMGEN_APART __attribute__((noinline))
+#define EOMGEN_PIECE __attribute__((visibility("hidden")))
 #define EOMGEN_SHARED static __attribute__((unused))
 #else
 #define EOMGEN_APART
+#define EOMGEN_PIECE
 #define EOMGEN_SHARED static
 #endif
 

@@ -29,7 +29,7 @@ def compare(mod: Any, x: np.ndarray, t: float) -> None:
     def rhs(columns: np.ndarray) -> np.ndarray:
         return mod.rhs(t, columns)
 
-    expected = np.stack([judges.first(rhs, x, d * s, h=1e-3) / s for d, s in zip(np.eye(2 * n), sizes, strict=True)], 1)
+    expected = np.stack([judges.first(rhs, x, d * s, h=1e-5) / s for d, s in zip(np.eye(2 * n), sizes, strict=True)], 1)
     found = mod.jacobian(t, x)
     assert found.shape == (2 * n, 2 * n)
     # each of the four blocks by its own largest entry, in units that do not favour metres or radians

@@ -258,7 +258,7 @@ def test_one_perturbed_coefficient_is_seen(
     # only the kernels compared, so that the compiler has little to do
     targets.program = pipeline.build(eqs, target, kernels=PERTURBED)
     if target == "c":
-        start = f"static int block_{kernel}("
+        start = f"static int {kernel}_block("
 
         def change(text: str) -> str:
             return perturb(text, start, "\n}\n")

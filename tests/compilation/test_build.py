@@ -38,7 +38,8 @@ def test_found_again_and_told(sources: dict[str, str]) -> None:
     said: list[str] = []
     first = compile_sources(sources, "pendulum", progress=said.append)
     assert not first.from_cache
-    assert said[-2:] == ["compiling pendulum.c", "linking pendulum"]
+    assert "compiling pendulum.c" in said
+    assert said[-1] == "linking pendulum"
     said.clear()
     second = compile_sources(sources, "pendulum", progress=said.append)
     assert second.from_cache
