@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import subprocess
+from pathlib import Path
 
 import numpy as np
 
@@ -42,9 +43,9 @@ def write(sources, folder):
 def compile_library(sources, folder, *flags):
     """Write, compile and link; returns the path of the library."""
     write(sources, folder)
-    source = next(folder.glob("*.c"))
-    library = source.with_suffix(".so")
-    command = ["gcc", "-O1", "-fPIC", "-shared", *STRICT, *flags, str(source), "-o", str(library), "-lm"]
+    files = sorted(str(folder / name) for name in sources if name.endswith(".c"))
+    library = Path(files[0]).with_suffix(".so")
+    command = ["gcc", "-O1", "-fPIC", "-shared", *STRICT, *flags, *files, "-o", str(library), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:4000]
     return library

@@ -176,3 +176,19 @@ def test_clean_under_the_sanitizers(systems, libraries, tmp_path, make):
     )
     done = subprocess.run([str(tmp_path / "main")], capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_large_models_are_split_into_files_that_link(systems, compiled, monkeypatch):
+    """The same results from one file and from several."""
+    from eomgen.emit import c_parts, emit_c
+
+    system = systems.chain(12)
+    limits = systems.Limits(statements=200)
+    one = compiled(system, limits=limits)
+    monkeypatch.setattr(c_parts, "LENGTH", 20_000)
+    files = [name for name in emit_c(system.program(limits=limits)) if name.endswith(".c")]
+    assert len(files) >= 3
+    several = compiled(system, limits=limits)
+    x = state(system)
+    for kernel in ("rhs", "jacobian", "bias"):
+        np.testing.assert_array_equal(several.fine(kernel, x), one.fine(kernel, x))
