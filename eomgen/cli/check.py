@@ -11,9 +11,24 @@ from .options import json_option, load_model, model_argument
 from .screen import print_json
 
 
+def _print_schema(context: click.Context) -> None:
+    from ..describe import model_schema
+
+    print_json(model_schema())
+    context.exit()
+
+
 @click.command()
 @model_argument
 @json_option
+@click.option(
+    "--schema",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
+    help="Print the JSON Schema of model files, for editors, and stop.",
+)
 @reports_failures
 def check(model: Path, as_json: bool) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..joints import JOINTS
+from . import FORCE_FIELDS
 from .build import build
 from .description import GROUND_NAME, SECTIONS, Description
 from .handles import BodyHandle, JointHandle, Names, Settings
@@ -310,7 +312,8 @@ class Model(JointMethods, ForceMethods):
         from .names import suggestion
 
         near = suggestion(name, [n for n in dir(type(self)) if not n.startswith("_")])
-        raise AttributeError(f"a Model has no attribute {name!r}" + (f"; {near}" if near else ""))
+        hint = near or f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCE_FIELDS)}"
+        raise AttributeError(f"a Model has no attribute {name!r}; {hint}")
 
     def _counts(self) -> str:
         counts = ((section, len(self._description.sections[section])) for section in SECTIONS)

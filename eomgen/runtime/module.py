@@ -370,6 +370,10 @@ class Module:
 
         return text(self)
 
+    def __getattr__(self, name: str) -> Any:
+        calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
+        raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
+
     def __repr__(self) -> str:
         from .report import line
 
