@@ -2,7 +2,9 @@
 
 The correction is the minimum-norm Newton step ``-J^T (J J^T)^-1 e`` in scaled coordinates.  It does not depend on any
 partition of the coordinates, so a partition that goes bad at a dead centre costs no digits.  A relative Tikhonov term
-in ``J J^T`` carries redundant rows and configurations where the rank drops.
+in ``J J^T`` carries redundant rows and configurations where the rank drops.  In position steps it is as large as the
+scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
+distance, whose Newton step would run along the motion.  It vanishes on convergence, which stays quadratic.
 """
 
 from __future__ import annotations
@@ -25,11 +27,11 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
 
 
-def gram_solve(J: Array, e: Array) -> Array:
-    """``(J J^T + 1e-12 max(diag) I)^-1 e`` for e (m,) or (m, k)."""
+def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
+    """``(J J^T + relative max(diag) I)^-1 e`` for e (m,) or (m, k)."""
     G = J @ J.T
     size = G.diagonal().max()
-    G.flat[:: len(G) + 1] += TIKHONOV * size
+    G.flat[:: len(G) + 1] += relative * size
     try:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
@@ -72,7 +74,7 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
         if step == STEPS:
             break
         J = scales.jacobian(C_q)
-        dz = J.T @ gram_solve(J, e)
+        dz = J.T @ gram_solve(J, e, max(TIKHONOV, size))
         longest = largest(dz)
         if longest > DAMPING:
             dz *= DAMPING / longest

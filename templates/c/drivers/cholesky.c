@@ -41,8 +41,8 @@ static void cholesky_solve(const double *restrict g, double *restrict b)
     }
 }
 
-/* G = J J^T + 1e-12 max(diag) I, factored. */
-static int factor_gram(const double *restrict J, double *restrict G)
+/* G = J J^T + relative max(diag) I, factored. */
+static int factor_gram(const double *restrict J, double relative, double *restrict G)
 {
     double largest = 0.0;
     for (int i = 0; i < M; i++) {
@@ -56,7 +56,7 @@ static int factor_gram(const double *restrict J, double *restrict G)
         largest = G[i * M + i] > largest ? G[i * M + i] : largest;
     }
     for (int i = 0; i < M; i++) {
-        G[i * M + i] += 1e-12 * largest;
+        G[i * M + i] += relative * largest;
     }
     return cholesky(G);
 }

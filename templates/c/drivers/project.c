@@ -33,7 +33,8 @@ static int close_position(double t, double *restrict q, const double *restrict u
             return EOMGEN_NON_FINITE;
         }
         form_scaled(C + M, s, w + AT_J);
-        const int status = factor_gram(J, w + AT_G);
+        /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
+        const int status = factor_gram(J, fmax(1e-12, size), w + AT_G);
         if (status != 0 || has_settled(step, size, before)) {
             return status;
         }
