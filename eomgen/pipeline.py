@@ -16,7 +16,7 @@ import numpy as np
 from .derivation import Equations
 from .equations import METHODS, TreeEquations
 from .errors import AssemblyError, EomgenError, EvaluationError, ModelError, UsageError
-from .graph.evaluate import evaluate
+from .graph.evaluate import compile_evaluator
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import ConstraintFunctions, Mobility, judge
 from .kinematics.report import MechanismReport, report
@@ -107,39 +107,48 @@ def check(model: Model) -> MechanismReport:
 
 
 def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
-    """Refuse a degree of freedom that moves no mass: the embedded mass matrix must be positive definite."""
-    n, m = len(kinematics.q), kinematics.mechanism
-    values = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs} | {"t": 0.0}
-    values |= dict(zip(kinematics.names, mobility.q_reference, strict=True)) | dict.fromkeys(
-        (name + "_dot" for name in kinematics.names), 0.0
-    )
-    flat = evaluate([x for row in tree.mass_matrix for x in row], values)
-    mass = np.array(flat, dtype=float).reshape(n, n)
-    basis = np.eye(n)
-    scales = np.ones(n)
-    if kinematics.constraints.values:
-        numbers = {k: v for k, v in values.items() if k not in kinematics.names and not k.endswith("_dot") and k != "t"}
-        functions = ConstraintFunctions(kinematics, numbers)
-        J = functions.scaled_jacobian(np.array(mobility.q_reference))
-        basis = np.linalg.svd(J)[2][mobility.rank :].T
-        scales = functions.scales.q
-    if not basis.shape[1]:
+    """Refuse a degree of freedom that moves no mass at any configuration tried.
+
+    The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
+    as Euler angles make it, a run that gets there says so.
+
+    Raises
+    ------
+    ModelError
+        Names the coordinates that move nothing.
+    """
+    m, names = kinematics.mechanism, kinematics.names
+    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
+    functions = ConstraintFunctions(kinematics, numbers)
+    n, r = len(names), mobility.rank
+    if n == r:
         return
-    embedded = basis.T @ (mass * np.outer(scales, scales)) @ basis
-    if not np.isfinite(embedded).all():
+    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*names, *numbers, "t"))
+    scales = functions.scales.q
+    worst: tuple[float, np.ndarray] | None = None
+    for sample in mobility.samples:
+        q = np.array(sample)
+        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
+        basis = np.linalg.svd(functions.scaled_jacobian(q))[2][r:].T if functions.m else np.eye(n)
+        embedded = basis.T @ M @ basis
+        if not np.isfinite(embedded).all():
+            continue
+        sizes, modes = np.linalg.eigh(embedded)
+        if sizes[0] > 1e-12 * sizes[-1]:
+            return
+        if worst is None:  # the reference is what the message speaks of
+            worst = float(sizes[0] + 1e-12 * abs(sizes[-1])), np.abs(basis @ modes[:, 0])
+    if worst is None:
         raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
-    sizes, modes = np.linalg.eigh(embedded)
-    if sizes[0] > 1e-12 * max(sizes[-1], 1e-300) and sizes[0] > 0.0:
-        return
-    motion = np.abs(basis @ modes[:, 0])
-    culprits = [kinematics.names[j] for j in np.argsort(-motion) if motion[j] > 0.3 * motion.max()]
+    size, motion = worst
     problems = []
-    for name in culprits:
-        spec = next((j for j in m.joints if name in j.coordinates), None)
-        path = f"joints.{spec.name}" if spec else f"lagrangian.{name}"
-        what = "negative inertia" if sizes[0] < -1e-12 * abs(sizes[-1]) else "no inertia"
-        message = f"coordinate {name!r} has {what} behind it: a motion along it moves no mass"
-        problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
+    for j in np.argsort(-motion):
+        if motion[j] > 0.3 * motion.max():
+            spec = next((s for s in m.joints if names[j] in s.coordinates), None)
+            path = f"joints.{spec.name}" if spec else f"lagrangian.{names[j]}"
+            what = "negative inertia" if size < 0.0 else "no inertia"
+            message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
+            problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
     raise ModelError(problems)
 
 

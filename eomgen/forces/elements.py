@@ -10,7 +10,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from .base import Force, Load, MarkerLoad, View
-from .paths import Path, Twist
+from .paths import Line, Path
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,18 @@ class Spring(Force):
     rest: Expr
 
     def loads(self, view: View) -> list[Load]:
+        if isinstance(self.path, Line) and self.rest.is_zero:
+            # linear in the distance, so that the markers may meet
+            return self.path.pair(view, vec.scale(-self.stiffness, self.path.reach(view)))
         value, _ = self.path.measure(view)
         return self.path.loads(view, -self.stiffness * (value - self.rest))
 
     def potential(self, view: View) -> Expr | None:
-        if isinstance(self.path, Twist):
-            return None  # its angle is exact only while the axes stay in line, so the loads are the definition
+        if not self.path.is_exact(view):
+            return None  # the loads are the definition
+        if isinstance(self.path, Line) and self.rest.is_zero:
+            reach = self.path.reach(view)
+            return 0.5 * self.stiffness * vec.dot(reach, reach)
         value, _ = self.path.measure(view)
         stretch = value - self.rest
         return 0.5 * self.stiffness * (stretch * stretch)

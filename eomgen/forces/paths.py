@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ..frames import Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr, atan2, sqrt
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
 from .base import CoordinateLoad, Load, MarkerLoad, View
 
 
@@ -18,6 +19,10 @@ class Path(ABC):
     @abstractmethod
     def measure(self, view: View) -> tuple[Expr, Expr]:
         """Value and rate."""
+
+    def is_exact(self, view: View) -> bool:
+        """Whether the loads of a force that depends on the value alone derive from a potential."""
+        return True
 
     @abstractmethod
     def loads(self, view: View, force: Expr) -> list[Load]:
@@ -31,8 +36,12 @@ class Line(Path):
     start: Marker
     end: Marker
 
-    def _geometry(self, view: View) -> tuple[vec.Vec3, Expr]:
-        d = vec.sub(view.position(self.end), view.position(self.start))
+    def reach(self, view: View) -> Vec3:
+        """From start to end, ground axes (m)."""
+        return vec.sub(view.position(self.end), view.position(self.start))
+
+    def _geometry(self, view: View) -> tuple[Vec3, Expr]:
+        d = self.reach(view)
         length = sqrt(vec.dot(d, d))
         return (d[0] / length, d[1] / length, d[2] / length), length
 
@@ -43,24 +52,30 @@ class Line(Path):
 
     def loads(self, view: View, force: Expr) -> list[Load]:
         direction, _ = self._geometry(view)
-        push = vec.scale(force, direction)
+        return self.pair(view, vec.scale(force, direction))
+
+    def pair(self, view: View, push: Vec3) -> list[Load]:
+        """A force (ground axes) on the end marker and its reaction on the start marker."""
         o = vec.zero(view.graph)
         return [MarkerLoad(self.end, push, o), MarkerLoad(self.start, vec.neg(push), o)]
 
 
 @dataclass(frozen=True)
 class Twist(Path):
-    """The angle by which the end marker is turned about the z axis of the start marker (rad)."""
+    """The angle by which the end marker is turned about the z axis of the start marker (rad).
+
+    Meant for markers whose z axes stay in line; it is then the sum of the joint angles between them.
+    """
 
     start: Marker
     end: Marker
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
-        a = vec.transpose(view.rotation(self.start))  # its rows are the marker's axes
-        x = vec.transpose(view.rotation(self.end))[0]
-        relative = vec.sub(view.angular_velocity(self.end), view.angular_velocity(self.start))
-        # with both z axes in line this is the exact rate of the angle; the element is meant for that case
-        return atan2(vec.dot(a[1], x), vec.dot(a[0], x)), vec.dot(a[2], relative)
+        angle, rate, _ = view.turn(self.start, self.end)
+        return angle, rate
+
+    def is_exact(self, view: View) -> bool:
+        return view.turn(self.start, self.end)[2]
 
     def loads(self, view: View, force: Expr) -> list[Load]:
         axis = vec.transpose(view.rotation(self.start))[2]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 
 from ..describe.mechanism import Mechanism
-from ..forces import CoordinateLoad, Force, MarkerLoad
+from ..errors import ModelError
+from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -107,18 +108,21 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     loop_names: list[str] = []
     loop_kinds: list[str] = []
     loop_values: list[Expr] = []
+    wrapping: list[str] = []
     for k in topology.cut:
         spec = mechanism.joints[k]
-        new_rows, measured, conditions = close_loop(spec, poses)
-        rows += new_rows
-        aligned += [(spec.name, condition) for condition in conditions]
+        loop_part = close_loop(spec, poses, q)
+        rows += loop_part.rows
+        wrapping += loop_part.wrapping
+        aligned += [(spec.name, condition) for condition in loop_part.aligned]
         loop_names += spec.coordinates
         loop_kinds += [c.kind for c in spec.joint.coordinates]
-        loop_values += measured
+        loop_values += loop_part.measured
     constraints = differentiate_constraints(graph, rows, aligned, (q, v, t))
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))
     coordinates = {n: (q[j], v[j], a[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
+    _refuse_wrapping(mechanism, wrapping)
     motion = Motion(poses, twists, (q, v, a, t), coordinates)
     return Kinematics(
         mechanism=mechanism,
@@ -206,6 +210,39 @@ def _resolve_force(force: Force, motion: Motion, mechanism: Mechanism) -> ForceT
         if not symbols_of([potential]) <= allowed:
             potential = None
     return ForceTerms(force, tuple(markers), tuple(along), potential)
+
+
+def _refuse_wrapping(mechanism: Mechanism, wrapping: Sequence[str]) -> None:
+    """Refuse force laws of an angle that jumps by a full turn: the force would jump with it.
+
+    Raises
+    ------
+    ModelError
+    """
+    problems = []
+    for force in mechanism.forces:
+        used = symbols_of(_expressions(force))
+        path = getattr(force, "path", None)
+        if isinstance(force, Spring) and isinstance(path, JointCoordinate):
+            used.add(path.name)
+        for name in wrapping:
+            if name in used:
+                message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+                remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+                problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+    if problems:
+        raise ModelError(problems)
+
+
+def _expressions(value: object) -> list[Expr]:
+    """All expressions in a force element."""
+    if isinstance(value, Expr):
+        return [value]
+    if isinstance(value, tuple):
+        return [e for item in value for e in _expressions(item)]
+    if is_dataclass(value):
+        return [e for item in fields(value) for e in _expressions(getattr(value, item.name))]
+    return []
 
 
 def _coordinate_symbols(motion: Motion) -> list[tuple[str, Expr]]:

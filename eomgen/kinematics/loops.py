@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from .tree import Poses
+from .turns import sum_of_turns
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,21 @@ class Row:
     kind: str
 
 
-def close_loop(spec: JointSpec, poses: Poses) -> tuple[list[Row], list[Expr], list[Expr]]:
-    """Equations of a cut joint, its coordinates, and its alignment conditions."""
+class ClosedLoop(NamedTuple):
+    """A cut joint: its equations, coordinates, alignment conditions, and the coordinates that wrap at half a turn."""
+
+    rows: list[Row]
+    measured: list[Expr]
+    aligned: list[Expr]
+    wrapping: list[str]
+
+
+def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
+    """What cutting a joint gives.
+
+    The angle of a joint that turns about one axis is a sum of the tree's angles if the loop lies in a plane; elsewhere
+    it is measured between -pi and pi.
+    """
     graph = poses.graph
     base = poses.common(spec.predecessor, spec.successor)
     outer = poses.marker(spec.predecessor, base)
@@ -59,8 +74,13 @@ def close_loop(spec: JointSpec, poses: Poses) -> tuple[list[Row], list[Expr], li
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)
+    angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
+    turns = sum_of_turns(graph, rotation, q) if len(angles) == 1 else None
+    if turns is not None:
+        measured[angles[0]] = turns[0]
     labelled = [Row(f"{spec.name}.{r.label}", r.expression, r.kind) for r in rows]
-    return labelled, measured, spec.joint.aligned(rotation)
+    wrapping = [] if turns is not None else [spec.coordinates[k] for k in angles]
+    return ClosedLoop(labelled, measured, spec.joint.aligned(rotation), wrapping)
 
 
 def differentiate_constraints(

@@ -62,6 +62,7 @@ class Mobility:
     ranks: tuple[int, ...] = ()
     assumed: bool = False
     residual: float = 0.0
+    samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
 
 
 class ConstraintFunctions:
@@ -237,10 +238,10 @@ def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mob
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     """More assembled configurations, reached along the null space from q."""
-    if not functions.m:
-        return []
     found = []
     random = np.random.default_rng(1)
+    if not functions.m:
+        return [q + functions.scales.q * random.uniform(0.2, 0.9, functions.n) for _ in range(PROBES)]
     for k in range(PROBES):
         J = functions.scaled_jacobian(q)
         basis = np.linalg.svd(J)[2][rank(J).rank :]
@@ -262,11 +263,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     names, labels = kinematics.names, kinematics.constraints.labels
     n = len(names)
     q = configurations[0]
-    if functions.m:
-        jacobians = [functions.scaled_jacobian(x) for x in configurations]
-        ranks = tuple(rank(J).rank for J in jacobians)
-    else:
-        jacobians, ranks = [np.empty((0, n))], (0,)
+    jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
+    ranks = tuple(rank(J).rank for J in jacobians)
     r = max(ranks)
     n_dof = n - r
     if len(wanted) > n_dof:
@@ -296,6 +294,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         length_scale=functions.length_scale,
         configurations=len(configurations),
         ranks=ranks,
+        samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
     )
 
 

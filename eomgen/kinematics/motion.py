@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Marker
 from ..graph import vectors as vec
-from ..graph.core import Expr
+from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
 from .tree import Poses, Twist
+from .turns import sum_of_turns
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 
@@ -36,6 +37,7 @@ class Motion:
         self.twists = twists
         self.coordinates = coordinates
         q, v, a, t = state
+        self.q, self.v = q, v
         self._along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True)) | {t: self.graph.one}
 
     def position(self, marker: Marker) -> Vec3:
@@ -66,6 +68,25 @@ class Motion:
         """Acceleration of the marker's origin, ground axes (m/s^2)."""
         x, y, z = jvp(list(self.velocity(marker)), self._along)
         return (x, y, z)
+
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap.
+
+        It is where the relative rotation is about that axis at every configuration.
+        """
+        base = self.poses.common(start, end)
+        outer = self.poses.marker(start, base).rotation
+        rotation = vec.product(vec.transpose(outer), self.poses.marker(end, base).rotation)
+        found = sum_of_turns(self.graph, rotation, self.q)
+        if found is not None:
+            angle, terms = found
+            rate = self.graph.zero
+            for j, factor in terms:
+                rate = rate + factor * self.v[j]
+            return angle, rate, True
+        axis = vec.transpose(self.rotation(start))[2]
+        relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
+        return atan2(rotation[1][0], rotation[0][0]), vec.dot(axis, relative), False
 
     def coordinate(self, name: str) -> tuple[Expr, Expr]:
         """Value and rate of a joint coordinate."""

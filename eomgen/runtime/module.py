@@ -45,7 +45,7 @@ class Module:
     loop_names : tuple of str
         Coordinates of the joints that were cut; they can be given as initial values and read from results.
     n_q, n_v, n_x, n_u, n_p, n_y, n_c, n_dof, n_bodies : int
-        Sizes; n_c counts all constraint rows.
+        Sizes; n_c counts the independent constraint rows, n_rows all of them.
     p, u : arrays
         The parameters and inputs bound.
     rhs : callable
@@ -104,7 +104,8 @@ class Module:
         self.u_names, self.p_names, self.y_names = layout.u, layout.p, layout.y
         self.body_names, self.loop_names = layout.bodies, layout.loops
         self.n_q, self.n_v, self.n_x, self.n_u, self.n_p = layout.n_q, layout.n_v, layout.n_x, layout.n_u, layout.n_p
-        self.n_y, self.n_c, self.n_dof, self.n_bodies = layout.n_y, layout.n_c, layout.n_dof, layout.n_bodies
+        self.n_y, self.n_dof, self.n_bodies = layout.n_y, layout.n_dof, layout.n_bodies
+        self.n_c, self.n_rows = len(layout.rows), layout.n_c
         self.rhs, self.jacobian = kernels.timed("rhs"), kernels.timed("jacobian")
         self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
         self.mass_matrix, self.embedded_mass_matrix = (

@@ -126,7 +126,7 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
 def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
     """Projected states (n_x, k), and how far the raw ones were off."""
     n = module.n_q
-    if not module.n_c or not t.size:
+    if not module.n_rows or not t.size:
         return Residuals(), np.array(raw)
     x = module.project(raw, t=t)
     position = module.constraints.every

@@ -175,7 +175,7 @@ def evaluated(targets: Targets, name: str, x: np.ndarray, t: float) -> np.ndarra
 def test_solving_kernels_equal_a_solve_of_evaluated_terms(targets: Targets) -> None:
     """rhs and embedded_mass_matrix of loops: augmented form from evaluated M, h, C_q and gamma."""
     mod, t = targets.cython, 0.3
-    n, m = mod.n_q, mod.n_c
+    n, m = mod.n_q, mod.n_rows
     for x in states(targets):
         mass = evaluated(targets, "mass_matrix", x, t).reshape(n, n)
         h = evaluated(targets, "bias", x, t)

@@ -1,0 +1,47 @@
+"""Stage kinematics: a relative rotation about one axis -> its angle as a sum of joint angles, which does not wrap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..graph.core import Expr, Graph, atan2
+from ..graph.differentiate import gradient
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute, symbols_of
+from ..graph.vectors import Mat3
+
+TRIALS = 3  #: random points at which an identity is tried
+CLOSE = 1e-9
+
+
+def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr, list[tuple[int, float]]] | None:
+    """The angle about z of a rotation that is about z at every q, else None.
+
+    Whether it is, is tried at random values of all symbols: an identity that holds there holds everywhere.
+
+    Returns
+    -------
+    angle : Expr
+        A constant plus coordinates with factors 1 and -1; equal to ``atan2(R_10, R_00)`` up to full turns.
+    terms : list of (index into q, factor)
+    """
+    angle = atan2(rotation[1][0], rotation[0][0])
+    slopes = gradient(angle, q)
+    tried = [rotation[2][2], *slopes]
+    names = sorted(symbols_of(tried))
+    random = np.random.default_rng(7)
+    found = []
+    for _ in range(TRIALS):
+        values = dict(zip(names, random.uniform(0.2, 1.4, len(names)).tolist(), strict=True))
+        with np.errstate(all="ignore"):
+            found.append(np.array(evaluate(tried, values), dtype=float))
+    steps = np.round(found[0][1:])
+    if any(not abs(x[0] - 1.0) < CLOSE or not (np.abs(x[1:] - steps) < CLOSE).all() for x in found):
+        return None
+    terms = [(int(j), float(steps[j])) for j in np.flatnonzero(steps)]
+    start = substitute([angle], dict.fromkeys(q, graph.zero))[0]
+    for j, factor in terms:
+        start = start + factor * q[j]
+    return start, terms
