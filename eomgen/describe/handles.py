@@ -53,9 +53,18 @@ class MarkerHandle:
         """Acceleration of the origin in ground axes (m/s^2), as SymPy symbols for use in outputs."""
         return self._motion("a")
 
-    def _motion(self, prefix: str) -> Triple:
+    @property
+    def angle(self) -> Any:
+        """Turn of the marker about the z axis of ground (rad), as a SymPy symbol for use in outputs."""
+        self._note()
+        return symbol(f"angle({self.label})")
+
+    def _note(self) -> None:
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
+
+    def _motion(self, prefix: str) -> Triple:
+        self._note()
         x, y, z = (symbol(f"{prefix}{axis}({self.label})") for axis in "xyz")
         return (x, y, z)
 

@@ -71,7 +71,8 @@ class JointSpec:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2."""
+    """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2,
+    or 3 for its angle about the z axis of ground."""
 
     marker: Marker
     level: int

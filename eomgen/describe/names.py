@@ -33,6 +33,7 @@ FUNCTIONS: dict[str, tuple[int, int]] = {
 QUANTITIES: dict[str, tuple[int, int]] = {
     prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
 }
+QUANTITIES["angle"] = (0, 3)  # turn about the z axis of ground
 
 _C_KEYWORDS = frozenset(
     word

@@ -23,7 +23,7 @@ _LEVEL_REMEDY = {
     MOTION: "t, parameters, inputs, coordinates and their velocities can",
     OUTPUT: "t, parameters, inputs, coordinates, their rates, motion of markers and energies can",
 }
-_QUANTITY = re.compile(r"([va]?[xyz])\((.+)\)\Z", re.DOTALL)
+_QUANTITY = re.compile(r"([va]?[xyz]|angle)\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
 #: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
 ENERGIES = ("kinetic_energy", "potential_energy")

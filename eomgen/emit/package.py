@@ -9,8 +9,9 @@ from importlib.resources import files
 from typing import Any
 
 from ..errors import UsageError
-from ..program import KERNELS, Program
+from ..program import Program
 from .c import emit_c
+from .calls import describe_calls
 from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .sources import SourceSet, read_template, render
@@ -82,7 +83,7 @@ def _c_library(program: Program) -> dict[str, str]:
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
     names = ("__init__.py", "__init__.pyi", "pyproject.toml", "README.md")
-    return {name: render(f"python/{name}.j2", context) for name in names}
+    return {"py.typed": "", **{name: render(f"python/{name}.j2", context) for name in names}}
 
 
 def _runtime_files() -> dict[str, str]:
@@ -98,7 +99,6 @@ def _runtime_files() -> dict[str, str]:
 
 def _context(program: Program) -> dict[str, Any]:
     metadata = program.metadata
-    results = {k.name: k.result for k in KERNELS}
     doc = str(metadata.get("doc") or "").strip()
     q = list(metadata.get("q_reference") or [0.0] * program.sizes.n_q)
     return {
@@ -110,15 +110,7 @@ def _context(program: Program) -> dict[str, Any]:
         "compiled": metadata["target"] == "cython",
         "metadata": metadata,
         "layouts": describe_layouts(program),
-        "kernels": [
-            {
-                "name": k.name,
-                "ports": [port.name for port in k.ports],
-                "shape": str(k.shape),
-                "result": results[k.name],
-            }
-            for k in program.kernels
-        ],
+        "calls": describe_calls(program),
         "attributes": [*(name for name, _ in ANNOTATED), *METHODS],
         "annotations": ANNOTATED,
         "methods": METHODS,

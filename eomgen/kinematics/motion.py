@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..describe.mechanism import Mechanism
-from ..frames import GROUND, Marker
+from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
@@ -93,6 +93,11 @@ class Motion:
         value, rate, _ = self.coordinates[name]
         return value, rate
 
+    def _angle(self, marker: Marker) -> Expr:
+        """Turn about the z axis of ground, wrapping only where the motion is not plane."""
+        ground = Marker(GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph)), "ground")
+        return self.turn(ground, marker)[0]
+
     def derived_symbols(self, mechanism: Mechanism, used: set[str]) -> dict[Expr, Expr]:
         """What cut joints' coordinates and marker quantities stand for, as a substitution, for the symbols ``used``."""
         mapping: dict[Expr, Expr] = {}
@@ -104,5 +109,7 @@ class Motion:
         look = (self.position, self.velocity, self.acceleration)
         for name, quantity in mechanism.quantities.items():
             if name in used:
-                mapping[self.graph.symbol(name)] = look[quantity.level](quantity.marker)[quantity.axis]
+                marker = quantity.marker
+                value = self._angle(marker) if quantity.axis == 3 else look[quantity.level](marker)[quantity.axis]
+                mapping[self.graph.symbol(name)] = value
         return mapping

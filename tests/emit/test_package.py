@@ -65,7 +65,7 @@ def test_the_files_of_each_target(packages):
     }
     assert files["c"] == {"crank.c", "crank.h", "eomgen.h", "model.json", "README.md", "Makefile"}
     copied = {"errors.py"} | {str(p.relative_to(ROOT)) for d in ("numeric", "runtime") for p in (ROOT / d).glob("*.py")}
-    python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md"}
+    python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}
     assert files["cython"] == copied | python | {"_core.pyx", "setup.py", "crank.c", "crank.h", "eomgen.h"}
     for name in copied:
@@ -108,6 +108,40 @@ def test_the_c_package_builds_its_libraries_and_its_example(packages):
     done = subprocess.run(["./crank_example"], cwd=folder, capture_output=True, text=True, check=True)
     assert len(done.stdout.split()) == 6
     assert (folder / "libcrank.so").exists()
+
+
+CALLS = """
+import re
+import numpy as np
+import crank
+x = crank.x0(theta=0.3, theta_dot=10.0)
+values = {
+    "t": 0.0, "x": x, "q": x[:3], "v": x[3:], "a": x[3:], "q_i": x[:1], "v_i": x[3:4], "a_i": x[3:4],
+    "x_min": [0.3, 10.0], "span": 1.0,
+}
+tried = 0
+for call, shape in re.findall(r"^    (\\w.*\\)) -> (\\(.*?\\)|Module|Trajectory): ", crank.__doc__, re.M):
+    if not shape.startswith("("):
+        continue
+    text = re.sub(r"\\*\\*\\w+", "theta=0.3", call)
+    found = eval("crank." + text, {"crank": crank, **values})
+    sizes = str(tuple(np.shape(part) for part in found))[1:-1] if isinstance(found, tuple) else str(np.shape(found))
+    assert sizes == shape, (call, sizes, shape)
+    tried += 1
+assert tried == 20, tried
+"""
+
+
+def test_the_calls_listed_are_those_there_are(packages):
+    folder = packages["numpy"]
+    done = subprocess.run(
+        [sys.executable, "-c", CALLS.replace("\\\\", "\\")],
+        cwd=folder, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    readme = (folder / "crank" / "README.md").read_text()
+    assert "| `kinematics(q_i, v_i, a_i)` | `(3,), (3,), (3,)` |" in readme
+    assert "velocity_constraints" not in readme
 
 
 def test_awkward_documentation_breaks_nothing(systems, libraries, tmp_path):

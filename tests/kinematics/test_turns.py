@@ -91,3 +91,14 @@ def test_euler_angles_singular_at_the_initial_configuration_only_are_no_fault_of
     top = m.body("top", mass=1, inertia=(1, 1, 0.5))
     m.spherical("J", m.ground, top, sequence="zxz")
     assert m.check().degrees_of_freedom == 3
+
+
+def test_angle_of_a_marker_is_the_sum_of_the_joint_angles() -> None:
+    m = eg.Model("arm", gravity=(0, -9.81, 0))
+    upper, lower = (m.body(n, mass=1, com=(1, 0, 0)) for n in ("upper", "lower"))
+    m.revolute("shoulder", m.ground, upper)
+    m.revolute("elbow", upper.at(1, 0, 0), lower)
+    m.output("forearm", lower.angle)
+    m.output("grip", lower.at(1, 0, 0, rpy=(0, 0, 0.5)).angle)
+    module = m.compile(target="numpy")
+    assert module.outputs(0.0, [3.0, 2.0, 0.1, 0.2]) == pytest.approx([5.0, 5.5], abs=1e-14)

@@ -1,0 +1,55 @@
+"""Stage emit: Program -> the Python calls of a model: arguments, shapes of results, and what they are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..program import Program
+
+
+class Call(NamedTuple):
+    """One call, as a user writes it."""
+
+    text: str  #: with its arguments
+    result: str  #: shape of the result for one state
+    meaning: str
+
+
+def describe_calls(program: Program) -> list[Call]:
+    """Every call of a generated package or Module, with its sizes as numbers."""
+    s = program.sizes
+    rows = len(program.metadata.get("independent_rows", range(s.n_c)))
+    independent = "q_i, v_i, a_i"
+    calls = [
+        Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
+        Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs"),
+        Call("mass_matrix(q)", _shape(s.n_v, s.n_v), "M of the spanning tree"),
+        Call("embedded_mass_matrix(q)", _shape(s.n_dof, s.n_dof), "M of the independent coordinates"),
+        Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
+        Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
+        Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
+        Call("constraints(q)", _shape(rows), "independent loop residuals (m, rad)"),
+        Call("constraint_jacobian(q)", _shape(rows, s.n_v), "their derivatives with respect to q"),
+        Call('constraints(q, rows="all")', _shape(s.n_c), "all loop residuals, redundant ones included"),
+        Call('constraint_jacobian(q, rows="all")', _shape(s.n_c, s.n_v), "likewise"),
+        Call("project(x, t=0.0)", _shape(s.n_x), "the nearest state on the constraints"),
+        Call("x0(**values)", _shape(s.n_x), "a state assembled from named values"),
+        Call("assemble(**guess)", _shape(s.n_q), "q with the loops closed, from a guess"),
+        Call(
+            f"kinematics({independent})",
+            ", ".join(_shape(n) for n in (s.n_q, s.n_v, s.n_v)),
+            f"q, v, a of the whole tree; {independent} are {_shape(s.n_dof)}",
+        ),
+        Call("poses(q)", _shape(s.n_bodies, 4, 4), "body frames to ground, homogeneous"),
+        Call("outputs(t, x)", _shape(s.n_y), "the outputs of the model at the projected state"),
+        Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),
+        Call("minimal.x0(**values)", _shape(2 * s.n_dof), "x_min assembled from named values"),
+        Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
+        Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
+        Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
+    ]
+    return [call for call in calls if s.n_c or "constraint" not in call.text]
+
+
+def _shape(*sizes: int) -> str:
+    return str(sizes)
