@@ -54,6 +54,8 @@ def measure(name: str, quick: bool, console: Console) -> tuple[Report, dict[str,
     show(report, console)
     calibration = {key: max(before[key], after[key]) for key in before}
     console.print("  calibration: " + ", ".join(f"{k} {v:.3g}" for k, v in calibration.items()), style="dim")
+    if calibration["disturbance"] > 1.3:
+        console.print("  the machine was busy with other work: limits on seconds say little", style="yellow")
     return report, {"calibration": calibration}
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from .derivation import Equations
 from .equations import METHODS, TreeEquations
-from .errors import AssemblyError, EomgenError, EvaluationError, ModelError, UsageError
+from .errors import AssemblyError, EvaluationError, ModelError, UsageError
 from .graph.evaluate import compile_evaluator
 from .kinematics import Kinematics, analyse
 from .kinematics.mobility import ConstraintFunctions, Mobility, judge
@@ -210,21 +210,17 @@ def generate(
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/`` and return that path.
 
+    Files of an earlier generation that are no longer needed are removed; those of others are left alone.
+
     Raises
     ------
     EomgenError
-        The folder exists and holds something that eomgen did not write.
+        The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
     """
     from .emit import emit_package
+    from .emit.write import write_package
 
     equations = derive(model, method, independent)
     program = build(equations, target)
     sources = emit_package(program, target)
-    folder = Path(directory) / equations.name
-    if folder.exists() and any(folder.iterdir()) and not (folder / "model.json").exists():
-        raise EomgenError(f"{folder} exists and is not a generated package; choose another --out or remove it")
-    for name, text in sources.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    return folder
+    return write_package(sources, Path(directory) / equations.name)

@@ -46,7 +46,8 @@ def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping
     -------
     EnergyBalance
     """
-    energy, largest = trajectory["energy"], float(np.abs(trajectory["T"]).max())
+    T, _, energy = trajectory.energies
+    largest = float(np.abs(T).max())
     work = _work(equations.kinematics, trajectory, inputs)
     balance = None
     if work is not None and largest:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -76,6 +77,24 @@ def _missing(path: Path) -> str:
     names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml")]
     near = difflib.get_close_matches(path.name, names, 1)
     return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
+
+
+def require_folder(option: str, file: Path | None) -> None:
+    """Fail before the work if a file cannot be written where it is asked for; makes nothing.
+
+    Raises
+    ------
+    UsageError
+    """
+    if file is None:
+        return
+    if file.is_dir():
+        raise UsageError(f"{option} {file}: is a folder; name a file in it")
+    folder = next(parent for parent in file.absolute().parents if parent.exists())
+    if not folder.is_dir():
+        raise UsageError(f"{option} {file}: {folder} is a file, not a folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
 
 
 def parse_settings(settings: tuple[str, ...]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import MissingDependencyError
+from ..errors import MissingDependencyError, UsageError
 
 if TYPE_CHECKING:
     from ..describe.mechanism import Mechanism
@@ -18,17 +18,20 @@ _BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), 
 POINTS = 2000  #: of a smooth curve, from the dense output
 
 
-def require_matplotlib() -> None:
-    """Fail before the work if there is nothing to draw with.
+def require_plotting(file: Path) -> None:
+    """Fail before the work if there is nothing to draw with, or no such kind of picture.
 
     Raises
     ------
-    MissingDependencyError
+    MissingDependencyError, UsageError
     """
     try:
-        import matplotlib  # noqa: F401
+        from matplotlib.backend_bases import FigureCanvasBase
     except ImportError as error:
         raise MissingDependencyError('--plot needs matplotlib: pip install "eomgen[plot]"') from error
+    known = sorted(FigureCanvasBase.get_supported_filetypes())
+    if file.suffix[1:].lower() not in known:
+        raise UsageError(f"--plot {file}: the ending says what kind of picture; there are .{', .'.join(known)}")
 
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:

@@ -19,6 +19,7 @@ from .options import (
     method_option,
     model_argument,
     parse_settings,
+    require_folder,
 )
 from .screen import finite, print_heading, print_json, print_rows, stage
 
@@ -65,9 +66,11 @@ def run(
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: a run is written as {' or '.join(TABLES)}")
     if plot is not None:
-        from .plot import require_matplotlib
+        from .plot import require_plotting
 
-        require_matplotlib()
+        require_plotting(plot)
+    require_folder("--out", out)
+    require_folder("--plot", plot)
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:

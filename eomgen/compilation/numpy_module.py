@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import tempfile
 from collections.abc import Mapping
+from pathlib import Path
 from types import ModuleType
 
+from ..errors import ToolchainError
 from .cache import Cache, cache_directory, compute_key
 
 SOURCE = "_core.py"
@@ -33,16 +36,36 @@ def load_numpy(sources: Mapping[str, str], name: str) -> ModuleType:
     module_name = f"eomgen._{name}_{key[:16]}"
     if module_name in sys.modules:
         return sys.modules[module_name]
+    try:
+        module = _execute(module_name, _cached(key, name, text))
+    except ToolchainError:  # the cache cannot be used, and nothing here needs it
+        with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
+            module = _execute(module_name, _written(Path(private), text))
+    sys.modules[module_name] = module
+    return module
+
+
+def _cached(key: str, name: str, text: str) -> Path:
+    """The file in the cache; raises ToolchainError where there can be none."""
     cache = Cache(cache_directory())
     entry = cache.find(key)
     if entry is None:
         with cache.attempt(key) as attempt:
-            (attempt / SOURCE).write_text(text, encoding="utf-8")
+            _written(attempt, text)
             entry = cache.publish(attempt, key, "numpy", name, SOURCE, {})
-    spec = importlib.util.spec_from_file_location(module_name, entry.product)
+    return entry.product
+
+
+def _written(folder: Path, text: str) -> Path:
+    path = folder / SOURCE
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _execute(module_name: str, path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(module_name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    sys.modules[module_name] = module
     return module

@@ -17,7 +17,7 @@ from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
-from .names import fault_of_name, nearest
+from .names import fault_of_model_name, nearest
 from .reading import Reader
 from .scope import Namespace
 from .sympy_face import name_of
@@ -47,7 +47,7 @@ def build(description: Description) -> Mechanism:
     values, sections = description.values, description.sections
 
     name = values.get("name")
-    fault = ("is missing", "give the model a name") if name is None else fault_of_name(name, symbol=True)
+    fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
     if fault:
         faults.add("name", *fault)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])

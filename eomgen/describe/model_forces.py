@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from ..errors import UsageError
 from .description import Description, items
 from .handles import JointHandle, MarkerHandle
+from .keywords import names_keywords
 from .references import joint_reference, marker_reference
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 Value = Any  # a number, a text or a SymPy expression
 
 
+@names_keywords
 class ForceMethods:
     """Methods of Model that add force elements.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from ..joints import JOINTS
 from .description import Description
 from .handles import JointHandle
+from .keywords import names_keywords
 from .references import marker_reference
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 Axis = str | Sequence[float]
 
 
+@names_keywords
 class JointMethods:
     """Methods of Model that add joints.
 

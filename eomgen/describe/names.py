@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
+import sys
 from collections.abc import Iterable
 
 #: Functions an expression may call, with the least and the greatest number of arguments.
@@ -43,6 +44,9 @@ _C_KEYWORDS = frozenset(
     )
     for word in line.split()
 )
+#: Packages that an exported package imports, or the like, and its own parts.
+_NEEDED = frozenset(("numpy", "scipy", "pandas", "matplotlib", "sympy", "cython", "setuptools", "eomgen"))
+_NEEDED |= {"errors", "numeric", "runtime"}
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
@@ -83,6 +87,14 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         if name in FUNCTIONS:
             return f"{name!r} is a function", f"choose another name, e.g. {name}_"
     return None
+
+
+def fault_of_model_name(name: object) -> tuple[str, str] | None:
+    """What is wrong with the name of a model, which is that of the package generated; see :func:`fault_of_name`."""
+    if isinstance(name, str) and (name in _NEEDED or name in sys.stdlib_module_names):
+        whose = "that it needs" if name in _NEEDED else "of Python's library"
+        return f"a package {name!r} would hide the module {whose}", f"choose another name, e.g. {name}_model"
+    return fault_of_name(name, symbol=True)
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -73,7 +73,8 @@ class Reader:
             if is_number(value):
                 return self.graph.constant(float(value))
         except ExpressionError as error:
-            self.faults.add(path, error.place(), error.remedy)
+            if not self.names.explains(error):
+                self.faults.add(path, error.place(), error.remedy)
             return self.stand_in
         except OverflowError:
             self.faults.add(path, f"{value!r} is not a finite number")

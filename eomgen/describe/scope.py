@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import re
 from collections.abc import Callable, Iterator
 
@@ -42,12 +43,14 @@ class Namespace:
         self.faults = faults
         self.kinds: dict[str, str] = {"t": "time"}
         self.places: dict[str, str] = {}
+        self.refused: set[str] = set()
 
     def declare(self, kind: str, name: object, path: str) -> bool:
         """Take a name in; faults of the name, and clashes with others, are noted.  Returns whether it is usable."""
         fault = fault_of_name(name, symbol=True)
         if fault or not isinstance(name, str):
             self.faults.add(path, *(fault or ("", "")))
+            self._refuse(kind, name, path)
             return False
         names = [name + suffix for suffix in RATES] if kind == "coordinate" else [name]
         clash = next((n for n in names if n in self.kinds), None)
@@ -66,6 +69,19 @@ class Namespace:
             )
             return False
         return True
+
+    def _refuse(self, kind: str, name: object, path: str) -> None:
+        """Take in a name that cannot be used, so that expressions that use it are not at fault too."""
+        if isinstance(name, str):
+            self.refused.add(name)
+            if self.kinds.get(name) in (None, "time"):
+                self.kinds[name], self.places[name] = kind, path
+
+    def explains(self, error: ExpressionError) -> bool:
+        """Whether an expression is wrong only because of a name that was refused where it was declared."""
+        return any(
+            f"'{name}'" in error.message or (keyword.iskeyword(name) and name in error.text) for name in self.refused
+        )
 
     def of(self, *kinds: str) -> Iterator[str]:
         """Names of the given kinds, in order of declaration."""

@@ -65,6 +65,8 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "n_const": n_const,
         "n_work": n_work,
         "hoisted": len(program.hoisted),
+        "work_at": len(program.parameters) + len(program.hoisted),
+        "rank": sizes.n_v - sizes.n_dof,
         "helpers": used_helpers(program, roots),
         "blocks": printed if program.hoisted else printed[1:],
         "drivers": [read_template(f"c/drivers/{file}.c") for file in driver_files(program)],

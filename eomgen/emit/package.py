@@ -73,7 +73,9 @@ def _numpy(program: Program) -> dict[str, str]:
 
 def _c_library(program: Program) -> dict[str, str]:
     sources = emit_c(program)
-    context = _context(program) | {"c_files": [name for name in sources if name.endswith(".c")]}
+    c_files = [name for name in sources if name.endswith(".c")]
+    objects = [name.removesuffix(".c") + ".o" for name in c_files]
+    context = _context(program) | {"c_files": c_files, "object_files": objects}
     return {
         **sources,
         "Makefile": render("c/Makefile.j2", context),

@@ -13,6 +13,7 @@ from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..numeric import (
+    Assembly,
     Scales,
     assemble,
     choose_independent,
@@ -61,7 +62,8 @@ class Mobility:
     configurations: int = 1
     ranks: tuple[int, ...] = ()
     assumed: bool = False
-    residual: float = 0.0
+    residual: float = 0.0  #: largest scaled residual of the loops at the reference
+    restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
 
 
@@ -130,8 +132,8 @@ class ConstraintFunctions:
             [loop.names[j] for j in picked],
         )
 
-    def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> tuple[Array, float]:
-        """Assemble with the given values exact; returns q and the largest scaled residual."""
+    def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+        """Assemble with the given values exact, near the guess."""
         k = self.kinematics
         start = np.array([given.get(n, guess.get(n, 0.0)) for n in k.names], dtype=float)
         held = [j for j, n in enumerate(k.names) if n in given]
@@ -140,7 +142,7 @@ class ConstraintFunctions:
             free = np.array([0.0 if n in given else 1.0 for n in k.names])
             start = close(System(self.position, self.scales, free, rough), start)[0]
         equations = self._equations(given)
-        found = assemble(
+        return assemble(
             self.position,
             start,
             self.scales,
@@ -150,7 +152,6 @@ class ConstraintFunctions:
             names=k.names,
             labels=k.constraints.labels,
         )
-        return found.q, found.residual
 
 
 def _flat(rows: Sequence[Sequence[Expr]]) -> list[Expr]:
@@ -191,8 +192,9 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     given = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
     positions = {n: x for n, x in given.items() if not n.endswith("_dot")}
-    q, residual = functions.close(positions, guess)
-    return replace(_partition(functions, [q, *_probe(functions, q)], wanted), residual=residual)
+    found = functions.close(positions, guess)
+    judged = _partition(functions, [found.q, *_probe(functions, found.q)], wanted)
+    return replace(judged, residual=found.residual, restarts=found.restarts)
 
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
@@ -228,7 +230,7 @@ def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mob
         trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
         attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
         try:
-            q, _ = attempt.close({}, {n: 0.3 + 0.1 * j for j, n in enumerate(functions.kinematics.names)})
+            q = attempt.close({}, {n: 0.3 + 0.1 * j for j, n in enumerate(functions.kinematics.names)}).q
         except AssemblyError:
             continue
         return _partition(attempt, [q, *_probe(attempt, q)], wanted)
@@ -251,7 +253,7 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
             break
         start = q + (0.1 + 0.1 * k) / length * step * functions.scales.q
         try:
-            closed, _ = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True)))
+            closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
         except AssemblyError:
             continue
         found.append(closed)

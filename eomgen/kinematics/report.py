@@ -47,6 +47,7 @@ class MechanismReport:
     conditioning: float
     length_scale: float
     reference: dict[str, float]
+    assembly_restarts: int
     assumed: bool
 
     def to_dict(self) -> dict[str, Any]:
@@ -82,6 +83,9 @@ class MechanismReport:
         say("independent", _list(self.independent) or "none")
         if self.dependent:
             say("dependent", f"{_list(self.dependent)} (conditioning {self.conditioning:.2g})")
+        if self.loop_joints and not self.assumed:
+            away = f"after {self.assembly_restarts} restarts: one of several ways to close it; a guess says which"
+            say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
         if self.assumed:
             lines.append("  some parameters have no value: the rank was judged with made-up ones")
         return "\n".join(lines)
@@ -140,6 +144,7 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
         conditioning=mobility.conditioning,
         length_scale=mobility.length_scale,
         reference=dict(zip(kinematics.names, mobility.q_reference, strict=True)),
+        assembly_restarts=mobility.restarts,
         assumed=mobility.assumed,
     )
 

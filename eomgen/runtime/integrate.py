@@ -5,7 +5,7 @@ Runs ``solve_ivp`` once between two corners of tabulated inputs, so that no corn
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,6 +76,32 @@ def choose_solver(method: Any) -> Any:
     raise UsageError(f"method must be one of {', '.join(METHODS)}, or a subclass of OdeSolver, not {method!r}")
 
 
+def check_options(solver: Any, options: Collection[str], own: Collection[str]) -> None:
+    """Refuse options that one of SciPy's own methods would only warn about.
+
+    Parameters
+    ----------
+    solver : OdeSolver subclass
+        One that is not SciPy's may take anything.
+    options : names
+    own : names
+        Options of ``simulate`` itself, to suggest.
+
+    Raises
+    ------
+    UsageError
+    """
+    from inspect import signature
+
+    if not solver.__module__.startswith("scipy."):
+        return
+    taken = [*signature(solver.__init__).parameters]
+    allowed = [name for name in taken if name not in ("self", "fun", "t0", "y0", "t_bound", "extraneous")]
+    for name in options:
+        if name not in allowed:
+            raise unknown(f"option of simulate with {solver.__name__}", name, [*own, *allowed])
+
+
 def takes_jacobian(solver: Any) -> bool:
     """Whether a solver class has an argument ``jac``."""
     from inspect import signature
@@ -110,10 +136,10 @@ def integrate(
         )
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)
-        t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), -1)
+        t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
         for e in range(len(events)):
             t_events[e].append(np.asarray(part.t_events[e]))
-            x_events[e].append(np.asarray(part.y_events[e]).reshape(-1, len(x0)).T)
+            x_events[e].append(np.asarray(part.y_events[e]).reshape(len(part.t_events[e]), len(x0)).T)
             if events[e].terminal:
                 events[e].terminal = max(events[e].terminal - len(part.t_events[e]), 1)
         if dense and part.sol is not None:

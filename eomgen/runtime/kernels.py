@@ -167,7 +167,8 @@ class Constant:
         shape = np.shape(x)
         if shape[:1] != (self.n_in,) or len(shape) > 2:
             raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
-        return np.zeros(self.value.shape + shape[1:]) if out is None else out
+        expected = self.value.shape + shape[1:]
+        return np.zeros(expected) if out is None else _fitting(out, expected)
 
 
 class Identity(Constant):
@@ -212,7 +213,14 @@ class Selected:
 
 
 def _write(out: Array, result: Array) -> Array:
-    if out.shape != result.shape:
-        raise UsageError(f"out must have shape {result.shape}, not {out.shape}")
-    out[...] = result
+    _fitting(out, result.shape)[...] = result
+    return out
+
+
+def _fitting(out: Array, shape: tuple[int, ...]) -> Array:
+    if not isinstance(out, np.ndarray) or out.dtype != np.float64:
+        kind = getattr(out, "dtype", type(out).__name__)
+        raise UsageError(f"out must be a float64 array of shape {shape}, not {kind}")
+    if out.shape != shape:
+        raise UsageError(f"out must have shape {shape}, not {out.shape}")
     return out

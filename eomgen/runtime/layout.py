@@ -82,7 +82,7 @@ class Layout:
         """Unit of a quantity, derived for rates and accelerations; empty when unknown."""
         if name in self.units:
             return self.units[name]
-        if name in ("T", "V", "energy"):
+        if name in ("T", "V", "energy") and name not in self.x + self.loops + self.y + self.u:
             return "J"
         for suffix, per in (("_ddot", "s^2"), ("_dot", "s")):
             base = name.removesuffix(suffix)

@@ -165,8 +165,8 @@ class NumpyKernel:
         if t.shape not in ((), x.shape[1:]):
             raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
         expected = (*self.shape, *x.shape[1:])
-        if out is not None and (out.shape != expected or out.dtype != np.float64):
-            raise self.error(f"out of {self.name} must be a float64 array of shape {expected}, not {out.shape}")
+        if out is not None:
+            _check_out(out, expected, self.name, self.error)
         with np.errstate(all="ignore"):
             if x.ndim == 1 or self.vectorised:
                 result = self._batch(t, x, force, c, expected)
@@ -254,6 +254,14 @@ def _real(value: object, label: str, error: Any) -> Array:
     if array.dtype.kind not in "biufO":
         raise error(f"{label} must hold real numbers, not {array.dtype}")
     return array.astype(float, copy=False)
+
+
+def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) -> None:
+    wanted = f"out of {name} must be a float64 array of shape {expected}"
+    if not isinstance(out, np.ndarray):
+        raise error(f"{wanted}, not a {type(out).__name__}")
+    if out.shape != expected or out.dtype != np.float64:
+        raise error(f"{wanted}, not {out.shape} of {out.dtype}")
 
 
 def _vector(value: object, n: int, label: str, error: Any) -> Array:

@@ -84,10 +84,11 @@ class Drivers:
         """The scales for a set of constants; the last ones are kept."""
         if "scales" not in self.blocks:
             return self.layout.scales
-        if self._scales is None or self._scales[0] is not c:
+        kept = self._scales  # read once: another thread may replace it
+        if kept is None or kept[0] is not c:
             values = np.asarray(self.blocks["scales"](0.0, np.empty(0), np.empty(0), c), dtype=float)
-            self._scales = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :]))
-        return self._scales[1]
+            self._scales = kept = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :]))
+        return kept[1]
 
     def position(self, t: float, u: Array, c: Array, q: Array) -> tuple[Array, Array]:
         """C (m,), C_q (m, n)."""
@@ -113,7 +114,7 @@ class Drivers:
         if "residual_jacobian" in self.blocks:
             flat = np.asarray(self.blocks["residual_jacobian"](t, x, u, c), dtype=float)
             parts = np.split(flat, np.cumsum([n * n, n * n, m * n, m * n]))
-            return embedded.Residuals(*(part.reshape(-1, n) for part in parts))
+            return embedded.Residuals(*(part.reshape(k, n) for part, k in zip(parts, (n, n, m, m, m), strict=True)))
         directions = np.eye(2 * n)
         x = np.vstack([np.repeat(x[:, None], 2 * n, axis=1), directions])
         flat = np.asarray(self.blocks["residual_tangent"](t, x, u, c), dtype=float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,10 +41,10 @@ class Columns:
             (loops, self._loops),
             (layout.y, self._outputs),
             (layout.u, lambda: self.u),
-            (("T", "V", "energy"), self._energies),
+            (("T", "V", "energy"), lambda: self.energies),
         ]
         self._known: dict[str, Array] = {}
-        # an output may repeat the coordinate of its own name; the coordinate wins
+        # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
         self.names = tuple(dict.fromkeys(name for names, _ in self._groups for name in names))
 
     def __getitem__(self, name: str) -> Array:
@@ -73,7 +74,9 @@ class Columns:
         y[0, angles] = np.unwrap(y[0, angles], axis=-1)
         return y.reshape(3 * layout.n_k, -1)
 
-    def _energies(self) -> Array:
+    @cached_property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (3, n_t), whatever the model calls T and V."""
         T, V = self.module.energy(self.x, u=self._varying(), t=self.t)
         return np.array([T, V, T + V])
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
-from .integrate import Event, Solution, choose_solver, integrate, takes_jacobian
+from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .progress import Progress, wanted
 from .recording import record
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
+OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress")
 
 
 def simulate(
@@ -69,7 +70,7 @@ def simulate(
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
     **options
-        Passed on to the solver.
+        Passed on to the solver; unknown ones are an error for SciPy's methods.
 
     Returns
     -------
@@ -90,6 +91,7 @@ def simulate(
     """
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     solver = choose_solver(declared["method"] if method is None else method)
+    check_options(solver, options, OPTIONS)
     start, end = _span(span, float(declared["end"]))
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants)

@@ -20,12 +20,20 @@ FORMAT = "eomgen trajectory 1"
 class Stored:
     """Columns read from a file."""
 
-    def __init__(self, names: tuple[str, ...], values: Array) -> None:
+    def __init__(self, names: tuple[str, ...], values: Array, energies: Array | None = None) -> None:
         self.names = names
+        self._energies = energies
         self._rows = dict(zip(names, values, strict=True))
 
     def __getitem__(self, name: str) -> Array:
         return np.asarray(self._rows[name])
+
+    @property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (3, n_t)."""
+        if self._energies is None:  # a file of an earlier version
+            return np.array([self["T"], self["V"], self["energy"]])
+        return self._energies
 
 
 def save(trajectory: Trajectory, path: str | Path) -> Path:
@@ -47,6 +55,7 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
         "t": trajectory.t,
         "x": trajectory.x,
         "columns": values,
+        "energies": trajectory.energies,
         "header": np.array(json.dumps(header)),
     }
     for k, (t, x) in enumerate(zip(trajectory.t_events, trajectory.x_events, strict=True)):
@@ -94,7 +103,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     return Trajectory(
         arrays["t"],
         arrays["x"],
-        Stored(names, arrays["columns"]),
+        Stored(names, arrays["columns"], arrays.get("energies")),
         header,
         [arrays[f"t_events_{k}"] for k in range(count)],
         [arrays[f"x_events_{k}"] for k in range(count)],

@@ -33,6 +33,9 @@ class Source(Protocol):
 
     names: tuple[str, ...]
 
+    @property
+    def energies(self) -> Array: ...
+
     def __getitem__(self, name: str) -> Array: ...
 
 
@@ -40,7 +43,8 @@ class Trajectory:
     """The result of a simulation.
 
     ``traj["theta"]`` is a column (n_t,): coordinates, velocities (``theta_dot``), accelerations (``theta_ddot``),
-    coordinates of cut joints (angles without jumps) and their rates, outputs, inputs, ``T``, ``V`` and ``energy``.
+    coordinates of cut joints (angles without jumps) and their rates, outputs, inputs, ``T``, ``V`` and ``energy`` (the
+    model's own quantities of these names come first; see ``energies``).
     SI units and radians.  What was not integrated is evaluated when first asked for.
 
     Attributes
@@ -159,9 +163,15 @@ class Trajectory:
         return frame
 
     @property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (J), (3, n_t)."""
+        return self._columns.energies
+
+    @property
     def energy_drift(self) -> float:
         """max |E - E(0)| / max T, the measure of an energy that should be kept."""
-        change, motion = float(np.abs(self["energy"] - self["energy"][0]).max()), float(np.abs(self["T"]).max())
+        T, _, energy = self.energies
+        change, motion = float(np.abs(energy - energy[0]).max()), float(np.abs(T).max())
         return change / motion if motion else (0.0 if change == 0.0 else float("inf"))
 
     def save(self, path: str | Path) -> Path:

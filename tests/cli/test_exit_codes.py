@@ -62,6 +62,8 @@ def test_a_coordinate_with_no_inertia(call: Call, model_file: Callable[[str], Pa
         (["run", EXAMPLES / "pendulum.yaml", "--end", "-1"], "-1"),
         (["run", EXAMPLES / "pendulum.yaml", "--method", "kane"], "embedding, lagrange"),
         (["run", EXAMPLES / "pendulum.yaml", "--out", "run.xls"], ".npz"),
+        (["run", EXAMPLES / "pendulum.yaml", "--plot", "run.xyz"], ".png"),
+        (["run", EXAMPLES / "pendulum.yaml", "--plot", "run"], ".png"),
         (["derive", EXAMPLES / "four_bar.yaml", "--independent", "thet"], "theta"),
         (["generate", EXAMPLES / "pendulum.yaml"], "--out"),
         (["generate", EXAMPLES / "pendulum.yaml", "--out", "x", "--target", "rust"], "cython"),
@@ -71,6 +73,17 @@ def test_a_coordinate_with_no_inertia(call: Call, model_file: Callable[[str], Pa
 )
 def test_usage(call: Call, words: list[object], said: str) -> None:
     expect(call(*words), 2, said)
+
+
+@pytest.mark.parametrize("option", ["--out", "--plot"])
+def test_files_that_cannot_be_written_are_told_before_the_work(call: Call, tmp_path: Path, option: str) -> None:
+    ending = {"--out": ".npz", "--plot": ".png"}[option]
+    (tmp_path / "file").write_text("")
+    result = call("run", EXAMPLES / "pendulum.yaml", option, f"file/deeper/run{ending}")
+    expect(result, 2, f"{option} file/deeper/run{ending}", "is a file, not a folder")
+    assert "derive" not in result.err
+    (tmp_path / f"folder{ending}").mkdir()
+    expect(call("run", EXAMPLES / "pendulum.yaml", option, f"folder{ending}"), 2, "is a folder")
 
 
 def test_an_unknown_suffix(call: Call, tmp_path: Path) -> None:

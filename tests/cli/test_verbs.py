@@ -16,6 +16,7 @@ REPORT_KEYS = {
     "name", "bodies", "joints", "tree", "loop_joints", "coordinates", "loop_coordinates", "independent", "dependent",
     "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "gruebler_kutzbach",
     "gruebler_kutzbach_planar", "redundant", "conditioning", "length_scale", "reference", "assumed",
+    "assembly_restarts",
 }  # fmt: skip
 MODELS = sorted(EXAMPLES.glob("*.yaml"))
 
@@ -94,6 +95,12 @@ def test_generate_json(call: Call, tmp_path: Path) -> None:
     assert Path(written["folder"]) == tmp_path / "out" / "pendulum"
     assert {"model.json", "pyproject.toml", "README.md"} <= set(written["files"])
     assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
+
+
+def test_generate_again_for_another_target_leaves_nothing_stale(call: Call, tmp_path: Path) -> None:
+    for target in ("cython", "numpy", "c"):
+        words = ("generate", EXAMPLES / "pendulum.yaml", "--target", target, "--json", "--out")
+        assert call(*words, "again").json["files"] == call(*words, target).json["files"]
 
 
 def test_examples_list(call: Call) -> None:

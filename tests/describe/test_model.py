@@ -257,3 +257,33 @@ def test_importing_the_builder_loads_no_sympy() -> None:
     code = "import eomgen.describe, sys; print('sympy' in sys.modules, 'ruamel.yaml' in sys.modules)"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert result.stdout.split() == ["False", "False"]
+
+
+def test_misspelt_keywords_name_the_nearest() -> None:
+    m = Model("m")
+    b = m.body("b", mass=1)
+    with pytest.raises(UsageError, match=r"revolute has no argument 'axiss'; did you mean 'axis'\?"):
+        m.revolute("A", m.ground, b, axiss="x")  # type: ignore[call-arg]
+    with pytest.raises(UsageError, match=r"spring has no argument 'stifness'; did you mean 'stiffness'\?"):
+        m.spring("k", m.ground, b, stifness=1)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("name", ["numpy", "scipy", "json", "errors", "eomgen"])
+def test_names_of_models_that_would_hide_modules(name: str) -> None:
+    m = Model(name)
+    m.revolute("A", m.ground, m.body("b", mass=1, com=(1, 0, 0)))
+    with pytest.raises(ModelError) as error:
+        m.mechanism()
+    (problem,) = error.value.problems
+    assert problem.path == "name"
+    assert f"{name}_model" in problem.remedy
+
+
+@pytest.mark.parametrize("name", ["sin", "pi", "t", "int", "lambda"])
+def test_a_reserved_name_is_told_once(name: str) -> None:
+    m = Model("m")
+    m.parameter(name, 1)
+    m.revolute("A", m.ground, m.body("b", mass=name, com=(1, 0, 0)))
+    with pytest.raises(ModelError) as error:
+        m.mechanism()
+    assert [p.path for p in error.value.problems] == [f"parameters.{name}"]

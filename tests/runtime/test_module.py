@@ -272,3 +272,26 @@ def test_importing_the_runtime_costs_numpy_alone():
     subprocess.run([sys.executable, "-c", code], check=True)  # once, so that the byte code is there
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert float(result.stdout) < 0.2
+
+
+@pytest.mark.parametrize("out", [[0.0] * 6, np.zeros(6, np.float32), np.zeros(5)], ids=["list", "single", "short"])
+def test_results_go_into_fitting_arrays_only(crank, pendulum, out):
+    m = crank()
+    x = m.x0()
+    with pytest.raises(UsageError, match="out"):
+        m.rhs(0.0, x, out=out)
+    with pytest.raises(UsageError, match="out"):
+        m.constraints(x[:3], out=out)
+    with pytest.raises(UsageError, match="out"):
+        pendulum.constraints([0.1], out=out)
+    with pytest.raises(UsageError, match="out"):
+        pendulum.project(pendulum.x0(), out=out)
+
+
+def test_coordinates_called_like_arguments_go_in_a_dict(pendulum, models):
+    metadata = json.loads(pendulum.core.metadata)
+    metadata |= {"q_names": ["u"], "v_names": ["u_dot"], "x_names": ["u", "u_dot"], "initial": {}}
+    m = Module(NumpyCore(metadata, pendulum.core.blocks))
+    with pytest.raises(UsageError, match="the coordinate 'u' goes in a dict: {'u': ...}"):
+        m.x0(u=0.4)
+    assert m.x0({"u": 0.4})[0] == 0.4

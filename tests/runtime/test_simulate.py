@@ -281,3 +281,18 @@ def test_without_scipy_the_message_says_what_to_install(models):
         "else:\n    raise SystemExit('no error')\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_unknown_options_are_refused_with_the_nearest(pendulum):
+    with pytest.raises(UsageError, match="'rtoll'; did you mean rtol"):
+        pendulum.simulate(0.1, rtoll=1e-3)
+    with pytest.raises(UsageError, match="'min_step'"):
+        pendulum.simulate(0.1, min_step=1e-3)
+    assert pendulum.simulate(0.1, method="LSODA", min_step=1e-9).t[-1] == 0.1
+
+    class Mine(DOP853):
+        def __init__(self, *args, anything=None, **options):
+            assert anything == 3
+            super().__init__(*args, **options)
+
+    assert pendulum.simulate(0.1, method=Mine, anything=3).t[-1] == 0.1

@@ -127,3 +127,16 @@ def test_plots_carry_units(traj):
     with pytest.raises(UsageError, match="did you mean theta"):
         traj.plot("thetta")
     plt.close("all")
+
+
+def test_outputs_called_like_energies_come_first_and_the_balance_stays_right(crank, tmp_path):
+    plain = crank().simulate(0.2, {"theta": 0.3, "theta_dot": 10.0})
+    traj = crank(y_names=["T", "energy"]).simulate(0.2, {"theta": 0.3, "theta_dot": 10.0})
+    np.testing.assert_array_equal(traj["T"], plain[plain.metadata["y_names"][0]])
+    assert traj.energy_drift == plain.energy_drift
+    np.testing.assert_array_equal(traj.energies, plain.energies)
+    np.testing.assert_array_equal(traj["V"], plain["V"])
+    again = load_trajectory(traj.save(tmp_path / "run.npz"))
+    assert again.energy_drift == plain.energy_drift
+    np.testing.assert_array_equal(again["T"], traj["T"])
+    assert "T" not in traj.units

@@ -1,0 +1,37 @@
+"""Stage describe, keywords of the builder: a class of methods -> the same, answering a misspelt one by the nearest."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from ..errors import UsageError
+from .names import nearest
+
+Class = TypeVar("Class", bound=type[Any])
+
+
+def names_keywords(cls: Class) -> Class:
+    """Make the public methods of a class raise UsageError for a keyword they do not have, naming those they have."""
+    for name, value in list(vars(cls).items()):
+        if inspect.isfunction(value) and not name.startswith("_"):
+            setattr(cls, name, _checked(value))
+    return cls
+
+
+def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
+    parameters = list(inspect.signature(method).parameters.values())[1:]
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return method
+    allowed = [p.name for p in parameters if p.kind is not p.VAR_POSITIONAL]
+
+    @functools.wraps(method)
+    def checked(*args: Any, **keys: Any) -> Any:
+        for key in keys:
+            if key not in allowed:
+                raise UsageError(f"{method.__name__} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")
+        return method(*args, **keys)
+
+    return checked

@@ -1,0 +1,96 @@
+"""Stage emit: the files of a package -> a folder that holds them, and none that an earlier generation left."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..errors import EomgenError
+
+MANIFEST = "model.json"  #: lists the files of the package under "files"
+
+
+def write_package(sources: Mapping[str, str], folder: Path) -> Path:
+    """Write a package so that no file is ever half there.
+
+    Files of an earlier generation that are not part of this one are removed; others are left alone.
+
+    Parameters
+    ----------
+    sources : mapping of str to str
+        Relative file names and their text; ``model.json`` among them.
+    folder : Path
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    EomgenError
+        The folder holds something else, or a file in the way that eomgen did not write.
+    """
+    earlier = _earlier_files(folder)
+    for name in sources:
+        if earlier is not None and name not in earlier and (folder / name).exists():
+            raise EomgenError(f"{folder / name} is in the way, not from eomgen; move it or choose another --out")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
+        stage = Path(private) / folder.name
+        for name, text in {**sources, MANIFEST: _with_files(sources)}.items():
+            (stage / name).parent.mkdir(parents=True, exist_ok=True)
+            (stage / name).write_text(text, encoding="utf-8")
+        if not folder.exists():
+            os.rename(stage, folder)
+            return folder
+        for name in sorted(sources, key=lambda name: name == MANIFEST):  # the list of files last
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(stage / name, folder / name)
+    for name in sorted((earlier or set()) - set(sources)):
+        _remove(folder, name)
+    return folder
+
+
+def _earlier_files(folder: Path) -> set[str] | None:
+    """Files that eomgen wrote here; None if it kept no list."""
+    if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
+        return set()
+    try:
+        listed: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        if "abi" not in listed:
+            raise ValueError
+    except (OSError, ValueError, TypeError):
+        message = f"{folder} exists and is not a generated package; choose another --out or remove it"
+        raise EomgenError(message) from None
+    files = listed.get("files")
+    return {name for name in files if isinstance(name, str)} if isinstance(files, list) else None
+
+
+def _with_files(sources: Mapping[str, str]) -> str:
+    """model.json with the list of files."""
+    data = json.loads(sources[MANIFEST]) | {"files": sorted(sources)}
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _remove(folder: Path, name: str) -> None:
+    """Remove a file of an earlier generation, with its folders if nothing else is in them."""
+    path = folder / name
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        return  # not a name that eomgen wrote
+    with suppress(FileNotFoundError):
+        path.unlink()
+    for parent in path.parents:
+        if parent == folder:
+            return
+        shutil.rmtree(parent / "__pycache__", ignore_errors=True)  # of modules that are gone
+        try:
+            parent.rmdir()
+        except OSError:
+            return
