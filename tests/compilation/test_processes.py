@@ -21,7 +21,8 @@ import pytest
 from eomgen.compilation import Cache, compile_c_library, compile_sources, load_core
 
 BUILD = """
-import pathlib, sys
+import pathlib, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
 from eomgen.compilation import compile_c_library
 folder = pathlib.Path(sys.argv[1])
 artifact = compile_c_library({f.name: f.read_text() for f in folder.iterdir()}, "pendulum")
