@@ -35,10 +35,12 @@ $(VENV)/.installed-plot: EXTRAS := plot
 $(VENV)/.installed-test: EXTRAS := test,dev
 
 # uv installs in seconds what takes pip a minute; where uv cannot be had or cannot reach the index, pip does it.
+# Bytecode is made now: without it every start costs a second more where PYTHONDONTWRITEBYTECODE is set.
 $(VENV)/.installed-%: pyproject.toml | $(VENV)/pyvenv.cfg
 	@echo "installing eomgen[$(EXTRAS)] into $(VENV)" >&2
-	@if $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip install --quiet -p $(BIN)/python -e ".[$(EXTRAS)]"; \
+	@if $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip install --quiet --compile-bytecode -p $(BIN)/python -e ".[$(EXTRAS)]"; \
 	then :; else $(BIN)/python -m pip install --quiet -e ".[$(EXTRAS)]"; fi
+	@$(BIN)/python -m compileall -q eomgen templates
 	@touch $@
 
 $(VENV)/pyvenv.cfg:

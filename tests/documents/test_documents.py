@@ -84,7 +84,7 @@ def test_commands_run_in_order(path: Path, here: Path) -> None:
         program, *words = shlex.split(command)
         assert program == "eomgen"
         result = subprocess.run(
-            [sys.executable, "-m", "eomgen.cli", *words], capture_output=True, text=True, env=dict(os.environ)
+            [sys.executable, "-m", "eomgen", *words], capture_output=True, text=True, env=dict(os.environ)
         )
         assert result.returncode == 0, f"{command}\n{result.stderr}"
 

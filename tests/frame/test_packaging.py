@@ -70,8 +70,8 @@ def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path) -> 
     where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(tmp_path / "cache")}
     origin = run("-c", "import eomgen; print(eomgen.__file__)", cwd=tmp_path, **where).strip()
     assert Path(origin).is_relative_to(home)
-    run("-m", "eomgen.cli", "examples", "pendulum", cwd=tmp_path, **where)
-    out = run("-m", "eomgen.cli", "run", "pendulum.yaml", "--end", "0.1", cwd=tmp_path, **where)
+    run("-m", "eomgen", "examples", "pendulum", cwd=tmp_path, **where)
+    out = run("-m", "eomgen", "run", "pendulum.yaml", "--end", "0.1", cwd=tmp_path, **where)
     assert "energy" in out
 
 
