@@ -1,8 +1,6 @@
 """``python -m eomgen``: the ``eomgen`` command where its script is not on the path."""
 
-import sys
-
 from .cli import main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()
