@@ -5,6 +5,7 @@ Each stage is a package whose functions take frozen values and return frozen val
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,6 +36,18 @@ def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
     start = perf_counter()
     yield
     seconds[stage] = perf_counter() - start
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Pause the garbage collector, which would walk the many small objects of a graph again and again."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def choose_method(mechanism: Mechanism, method: str) -> str:
@@ -72,10 +85,10 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     with _timed(seconds, "describe"):
         mechanism = model.mechanism()
     chosen = choose_method(mechanism, method)
-    with _timed(seconds, "kinematics"):
+    with _without_collection(), _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
         mobility = _judge(kinematics, independent or ())
-    with _timed(seconds, "equations"):
+    with _without_collection(), _timed(seconds, "equations"):
         tree = METHODS[chosen](kinematics)
     return Equations(kinematics, mobility, tree, seconds)
 

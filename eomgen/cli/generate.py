@@ -7,7 +7,15 @@ from pathlib import Path
 import click
 
 from .failures import reports_failures
-from .options import blaming_option, independent_option, json_option, load_model, method_option, model_argument
+from .options import (
+    blaming_option,
+    independent_option,
+    json_option,
+    load_model,
+    method_option,
+    model_argument,
+    target_option,
+)
 from .screen import print_json, stage
 
 
@@ -18,13 +26,7 @@ from .screen import print_json, stage
 )
 @method_option
 @independent_option
-@click.option(
-    "--target",
-    type=click.Choice(["c", "cython", "numpy"]),
-    default="cython",
-    show_default=True,
-    help="C library, extension module, or Python that imports NumPy alone.",
-)
+@target_option("c", "cython", "numpy")
 @json_option
 @reports_failures
 def generate(model: Path, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool) -> None:

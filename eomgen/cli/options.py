@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,24 @@ if TYPE_CHECKING:
 model_argument = click.argument("model", metavar="MODEL", type=click.Path(path_type=Path))
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 method_option = click.option(
-    "--method", default="auto", show_default=True, metavar="M", help="Method of derivation: auto, embedding, lagrange."
+    "--method",
+    default="auto",
+    show_default=True,
+    metavar="M",
+    help="Method of derivation: auto, embedding, lagrange (the integrator's method stands in the model file).",
 )
+
+
+def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """``--target`` with these choices."""
+    about = {"c": "C library", "cython": "extension module", "numpy": "Python that imports NumPy alone, no compiler"}
+    return click.option(
+        "--target",
+        type=click.Choice(list(targets)),
+        default="cython",
+        show_default=True,
+        help="; ".join(f"{target}: {about[target]}" for target in targets) + ".",
+    )
 
 
 def _split(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:

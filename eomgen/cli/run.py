@@ -20,6 +20,7 @@ from .options import (
     model_argument,
     parse_settings,
     require_folder,
+    target_option,
 )
 from .screen import finite, print_heading, print_json, print_rows, stage
 
@@ -36,6 +37,7 @@ TABLES = (".npz", ".csv")
 @model_argument
 @method_option
 @independent_option
+@target_option("cython", "numpy")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option(
     "--set",
@@ -52,6 +54,7 @@ def run(
     model: Path,
     method: str,
     independent: tuple[str, ...],
+    target: str,
     end: float | None,
     settings: tuple[str, ...],
     out: Path | None,
@@ -80,7 +83,7 @@ def run(
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)
-        module = equations.compile()
+        module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
     initial, parameters, inputs = _sort(module, chosen)
     start = perf_counter()

@@ -15,7 +15,7 @@ from ..forces import (
     Path,
     PointForce,
     Spring,
-    Twist,
+    Turn,
 )
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
@@ -91,7 +91,7 @@ class _Element:
         if "joint" in self.values:
             return self.coordinate(angle=True)
         pair = self.reader.pair(f"{self.entry.path}.between", self.values["between"])
-        return None if pair is None else Twist(*pair)
+        return None if pair is None else Turn(*pair)
 
     def joint_or_line(self) -> Path | None:
         return self.coordinate() if "joint" in self.values else self.line()

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import EomgenError
+from ..errors import UsageError
 
 MANIFEST = "model.json"  #: lists the files of the package under "files"
 
@@ -34,13 +34,13 @@ def write_package(sources: Mapping[str, str], folder: Path) -> Path:
 
     Raises
     ------
-    EomgenError
+    UsageError
         The folder holds something else, or a file in the way that eomgen did not write.
     """
     earlier = _earlier_files(folder)
     for name in sources:
         if earlier is not None and name not in earlier and (folder / name).exists():
-            raise EomgenError(f"{folder / name} is in the way, not from eomgen; move it or choose another --out")
+            raise UsageError(f"{folder / name} is in the way, not from eomgen; move it or choose another --out")
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
         stage = Path(private) / folder.name
@@ -68,7 +68,7 @@ def _earlier_files(folder: Path) -> set[str] | None:
             raise ValueError
     except (OSError, ValueError, TypeError):
         message = f"{folder} exists and is not a generated package; choose another --out or remove it"
-        raise EomgenError(message) from None
+        raise UsageError(message) from None
     files = listed.get("files")
     return {name for name in files if isinstance(name, str)} if isinstance(files, list) else None
 

@@ -2,7 +2,7 @@
 
 from .base import CoordinateLoad, Force, Load, MarkerLoad, View
 from .elements import Actuator, BodyTorque, Damper, PointForce, Spring
-from .paths import JointCoordinate, Line, Path, Twist
+from .paths import JointCoordinate, Line, Path, Turn
 
 FORCES: dict[str, type[Force]] = {
     force.type_name: force for force in (Spring, Damper, Actuator, PointForce, BodyTorque)
@@ -22,6 +22,6 @@ __all__ = [
     "Path",
     "PointForce",
     "Spring",
-    "Twist",
+    "Turn",
     "View",
 ]

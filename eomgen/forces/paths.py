@@ -61,7 +61,7 @@ class Line(Path):
 
 
 @dataclass(frozen=True)
-class Twist(Path):
+class Turn(Path):
     """The angle by which the end marker is turned about the z axis of the start marker (rad).
 
     Meant for markers whose z axes stay in line; it is then the sum of the joint angles between them.

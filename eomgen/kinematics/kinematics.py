@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, is_dataclass
 
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
-from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring
+from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring, Turn
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -122,8 +122,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))
     coordinates = {n: (q[j], v[j], a[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
-    _refuse_wrapping(mechanism, wrapping)
     motion = Motion(poses, twists, (q, v, a, t), coordinates)
+    _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
         topology=topology,
@@ -212,8 +212,8 @@ def _resolve_force(force: Force, motion: Motion, mechanism: Mechanism) -> ForceT
     return ForceTerms(force, tuple(markers), tuple(along), potential)
 
 
-def _refuse_wrapping(mechanism: Mechanism, wrapping: Sequence[str]) -> None:
-    """Refuse force laws of an angle that jumps by a full turn: the force would jump with it.
+def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Sequence[str]) -> None:
+    """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it.
 
     Raises
     ------
@@ -223,6 +223,10 @@ def _refuse_wrapping(mechanism: Mechanism, wrapping: Sequence[str]) -> None:
     for force in mechanism.forces:
         used = symbols_of(_expressions(force))
         path = getattr(force, "path", None)
+        if isinstance(path, Turn) and not path.is_exact(motion):
+            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+            remedy = "turn the markers (rpy) so that z is the axis of the joint between them, or give joint="
+            problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
         if isinstance(force, Spring) and isinstance(path, JointCoordinate):
             used.add(path.name)
         for name in wrapping:

@@ -176,5 +176,6 @@ class _Failure(NamedTuple):
             e = np.concatenate([e, y / self.system.equations.scales])
             found += list(y)
             labels += list(self.system.equations.names)
-        order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= 1e-8]
+        order = np.argsort(-np.abs(e), kind="stable")[:3]
+        order = [i for i in order if not abs(e[i]) <= 1e-8] or list(order[:1])
         return [(labels[i], abs(float(found[i]))) for i in order]

@@ -59,7 +59,7 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     Raises
     ------
     SingularMassMatrixError
-        A pivot is not above 1e-13 of the largest diagonal entry.
+        A pivot is not above 1e-13 of the terms that its diagonal entry is the sum of.
     PartitionError
         As :func:`~.partitions.partition`.
     """
@@ -73,7 +73,8 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     except np.linalg.LinAlgError:
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is not positive definite") from None
     # the squares of its diagonal are the pivots of L D L^T
-    if matrix.size and factor.diagonal().min() ** 2 <= SINGULAR * matrix.diagonal().max():
+    size = (split.B**2 * scaled.diagonal()[:, None]).sum(axis=0).max(initial=0.0)
+    if matrix.size and factor.diagonal().min() ** 2 <= SINGULAR * size:
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
     return Embedded(scaled, matrix, factor, split)
 

@@ -69,7 +69,7 @@ def conditioning(J: Array, independent: Sequence[int] | Indices) -> float:
     The smallest singular value of J_d divided by the largest of J, where d are the other columns.
     """
     n = J.shape[1]
-    dependent = np.setdiff1d(np.arange(n), np.asarray(independent, dtype=np.intp))
+    dependent = np.delete(np.arange(n), np.asarray(independent, dtype=np.intp))
     if not dependent.size:
         return 1.0
     values = np.linalg.svd(J[:, dependent], compute_uv=False)

@@ -218,7 +218,7 @@ class Initial:
         """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
         layout = self.layout
         J = self.scales.jacobian(self._C_q(q, t=self.t))
-        dependent = np.setdiff1d(np.arange(layout.n_v), layout.independent)
+        dependent = np.delete(np.arange(layout.n_v), layout.independent)
         return float(np.linalg.det(J[np.ix_(layout.rows, dependent)])) if len(layout.rows) else 1.0
 
     # velocities

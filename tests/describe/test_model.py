@@ -15,7 +15,7 @@ import sympy
 from eomgen.describe import Mechanism, Model
 from eomgen.describe.fields import BODY, FORCE, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
 from eomgen.errors import ModelError, UsageError
-from eomgen.forces import Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Twist
+from eomgen.forces import Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Turn
 from eomgen.frames import GROUND
 from eomgen.joints import JOINTS
 
@@ -137,7 +137,7 @@ def test_forces() -> None:
     assert made["s2"].path == JointCoordinate("theta")
     assert made["s2"].rest.value == 0.5
     assert isinstance(made["s3"], Spring)
-    assert isinstance(made["s3"].path, Twist)
+    assert isinstance(made["s3"].path, Turn)
     assert made["d2"].path == JointCoordinate("S_3")  # type: ignore[attr-defined]
     assert isinstance(made["d3"], Damper)
     assert isinstance(made["a1"], Actuator)

@@ -51,7 +51,7 @@ static int accelerate(double t, const double *restrict u, const double *restrict
         scaled[parts->dependent[j]] = rows[parts->row[j] * width + N];
     }
     embed_mass(w);
-    status = ldl_factor(w + AT_EMBEDDED);
+    status = ldl_factor(embedded_size(w + AT_B, w + AT_MASS), w + AT_EMBEDDED);
     if (status != 0) {
         return status;
     }

@@ -1,10 +1,20 @@
-/* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is not safely positive. */
-static int ldl_factor(double *restrict a)
+/* The largest sum of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. */
+static double embedded_size(const double *restrict B, const double *restrict mass)
 {
     double largest = 0.0;
-    for (int i = 0; i < F; i++) {
-        largest = a[i * F + i] > largest ? a[i * F + i] : largest;
+    for (int k = 0; k < F; k++) {
+        double sum = 0.0;
+        for (int i = 0; i < N; i++) {
+            sum += B[i * F + k] * B[i * F + k] * mass[i * N + i];
+        }
+        largest = sum > largest ? sum : largest;
     }
+    return largest;
+}
+
+/* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is lost in rounding. */
+static int ldl_factor(double largest, double *restrict a)
+{
     for (int j = 0; j < F; j++) {
         double d = a[j * F + j];
         for (int k = 0; k < j; k++) {
