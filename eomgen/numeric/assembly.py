@@ -176,6 +176,6 @@ class _Failure(NamedTuple):
             e = np.concatenate([e, y / self.system.equations.scales])
             found += list(y)
             labels += list(self.system.equations.names)
-        order = np.argsort(-np.abs(e), kind="stable")[:3]
-        order = [i for i in order if not abs(e[i]) <= 1e-8] or list(order[:1])
+        worst = np.argsort(-np.abs(e), kind="stable")[:3].tolist()
+        order = [i for i in worst if not abs(e[i]) <= 1e-8] or worst[:1]
         return [(labels[i], abs(float(found[i]))) for i in order]
