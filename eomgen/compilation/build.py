@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
+from ..layer import LAYER, read_layer
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
-from .cython_layer import HEADER, SOURCE, build_layer, describe_interpreter, describe_layer, read_layer
+from .cython_layer import HEADER, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags
 
 Progress = Callable[[str], None]
@@ -56,8 +57,8 @@ def compile_sources(
     Parameters
     ----------
     sources : mapping of str to str
-        Texts by file name: the C files and headers, ``eomgen.h`` among them, and perhaps ``_core.pyx``; without it, the
-        layer that comes with eomgen is used.
+        Texts by file name: the C files and headers, ``eomgen.h`` among them, and perhaps files of
+        the layer; those left out are the ones that come with eomgen.
     name : str
         Name of the model.
     options : Options, optional
@@ -75,7 +76,8 @@ def compile_sources(
     start = time.perf_counter()
     options = options or Options()
     sources = dict(sources)
-    layer = sources.pop(SOURCE, None) or read_layer()
+    own = read_layer()
+    layer = {name: sources.pop(name, own[name]) for name in LAYER}
     _check(sources, name)
     if HEADER not in sources:
         raise UsageError(f"the sources of {name!r} lack {HEADER}; there are {', '.join(sources)}")
@@ -92,7 +94,7 @@ def compile_sources(
     product = f"_core{describe_interpreter()['suffix']}"
 
     def objects() -> list[str]:
-        return [str(build_layer(cache, layer, sources[HEADER], compiler, progress).product)]
+        return list(map(str, build_layer(cache, layer, sources[HEADER], compiler, progress)))
 
     entry = _build(cache, key, "extension", name, sources, flags, product, objects, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
@@ -107,7 +109,7 @@ def compile_c_library(
     """
     start = time.perf_counter()
     options = options or Options()
-    sources = {file: text for file, text in sources.items() if file != SOURCE}
+    sources = {file: text for file, text in sources.items() if file not in LAYER}
     _check(sources, name)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, extension=False)

@@ -1,13 +1,12 @@
-"""Cython layer: _core.pyx -> an object file, compiled once per interpreter and linked with every model."""
+"""Cython layer: _core.pyx and the steppers -> object files, compiled once per interpreter, linked with every model."""
 
 from __future__ import annotations
 
-import importlib
 import importlib.machinery
 import platform
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +15,13 @@ import numpy as np
 from ..errors import MissingDependencyError, ToolchainError
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, raise_failure, run
-from .options import layer_flags
+from .options import layer_flags, stepper_flags
 
 SOURCE = "_core.pyx"
 HEADER = "eomgen.h"
-_OBJECT = "_core.o"
+STEPPERS = "eomgen_steppers.c"
+_OBJECTS = ("_core.o", "eomgen_steppers.o")
 _lock = threading.Lock()  # Cython keeps state of its own
-
-
-def read_layer() -> str:
-    """The text of _core.pyx that comes with eomgen."""
-    templates = importlib.import_module("eomgen.templates")
-    return (Path(templates.__path__[0]) / "cython" / SOURCE).read_text(encoding="utf-8")
 
 
 def describe_interpreter() -> dict[str, str]:
@@ -40,28 +34,34 @@ def describe_interpreter() -> dict[str, str]:
     }
 
 
-def describe_layer(text: str, header: str, compiler: CompilerInfo) -> dict[str, Any]:
+def describe_layer(texts: Mapping[str, str], header: str, compiler: CompilerInfo) -> dict[str, Any]:
     """What the layer depends on, apart from the version of Cython.
 
     Models' keys hold this: a module that is built already needs no Cython to be found.
     """
     return {
-        "kind": "layer", "sources": {SOURCE: text, HEADER: header}, "flags": layer_flags(compiler),
+        "kind": "layer", "sources": {**texts, HEADER: header}, "flags": layer_flags(compiler),
         "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
     }  # fmt: skip
 
 
 def build_layer(
-    cache: Cache, text: str, header: str, compiler: CompilerInfo, progress: Callable[[str], None] | None = None
-) -> CacheEntry:
-    """Find the layer's object file in the cache, or make it.
+    cache: Cache,
+    texts: Mapping[str, str],
+    header: str,
+    compiler: CompilerInfo,
+    progress: Callable[[str], None] | None = None,
+) -> list[Path]:
+    """Find the layer's object files in the cache, or make them.
 
     Parameters
     ----------
     cache : Cache
         Where it is kept.
-    text, header : str
-        Texts of _core.pyx and eomgen.h.
+    texts : mapping of str to str
+        The layer's files.
+    header : str
+        Text of eomgen.h.
     compiler : CompilerInfo
         Who compiles.
     progress : callable, optional
@@ -81,22 +81,32 @@ def build_layer(
             'target="cython" needs Cython to build its layer once: pip install cython. target="numpy" needs neither '
             "Cython nor a compiler"
         ) from error
-    key = compute_key({**describe_layer(text, header, compiler), "cython": version})
+    key = compute_key({**describe_layer(texts, header, compiler), "cython": version})
     if (entry := cache.find(key)) is not None:
-        return entry
+        return _objects(entry)
     includes = [f"-I{find_python_headers()}", f"-I{np.get_include()}"]
     if progress is not None:
         progress("building the Cython layer (once)")
     with cache.attempt(key) as directory:
-        (directory / SOURCE).write_text(text, encoding="utf-8")
-        (directory / HEADER).write_text(header, encoding="utf-8")
+        for name, text in {**texts, HEADER: header}.items():
+            (directory / name).write_text(text, encoding="utf-8")
         _run_cython(directory / SOURCE)
-        command = [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECT]
-        result = run(command, directory)
-        if result.returncode != 0:
-            raise_failure(f"compiling the Cython layer {directory / '_core.c'}", result, directory)
+        flags = {"_core.c": [*layer_flags(compiler), "-I.", *includes], STEPPERS: [*stepper_flags(compiler), "-I."]}
+        commands = [
+            [*compiler.command, *flags[source], "-c", source, "-o", made]
+            for source, made in zip(flags, _OBJECTS, strict=True)
+        ]
+        for command in commands:
+            result = run(command, directory)
+            if result.returncode != 0:
+                raise_failure(f"compiling the Cython layer {directory / command[-3]}", result, directory)
         (directory / "_core.c").unlink()
-        return cache.publish(directory, key, "layer", "_core", _OBJECT, {"command": command, "cython": version})
+        recipe = {"commands": commands, "cython": version}
+        return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))
+
+
+def _objects(entry: CacheEntry) -> list[Path]:
+    return [entry.directory / name for name in _OBJECTS]
 
 
 def _run_cython(source: Path) -> None:

@@ -90,6 +90,11 @@ def layer_flags(compiler: CompilerInfo) -> list[str]:
     return [*flags, "-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION", *machine_flags(Options(), compiler)]
 
 
+def stepper_flags(compiler: CompilerInfo) -> list[str]:
+    """Flags that compile the steppers: like a model's own code."""
+    return compile_flags(Options(), compiler, 0, hidden=True)
+
+
 def link_flags(options: Options, compiler: CompilerInfo, *, extension: bool) -> list[str]:
     """Flags that link object files into an extension module, or into a library for C programs."""
     if sys.platform == "darwin":

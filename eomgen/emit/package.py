@@ -9,12 +9,13 @@ from importlib.resources import files
 from typing import Any
 
 from ..errors import UsageError
+from ..layer import read_layer
 from ..program import Program
 from .c import emit_c
 from .calls import describe_calls
 from .layouts import describe_layouts
 from .numpy import emit_numpy
-from .sources import SourceSet, read_template, render
+from .sources import SourceSet, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -57,10 +58,10 @@ def emit_package(program: Program, target: str) -> SourceSet:
 
 def _cython(program: Program) -> dict[str, str]:
     sources = emit_c(program)
-    context = _context(program) | {"c_files": [name for name in sources if name.endswith(".c")]}
+    context = _context(program) | {"c_files": [name for name in (*sources, *read_layer()) if name.endswith(".c")]}
     return {
         **sources,
-        "_core.pyx": read_template("cython/_core.pyx"),
+        **read_layer(),
         "setup.py": render("python/setup.py.j2", context),
         **_python_files(context),
         **_runtime_files(),

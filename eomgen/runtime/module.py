@@ -376,6 +376,10 @@ class Module:
         return text(self)
 
     def __getattr__(self, name: str) -> Any:
+        if name in ("DOP853", "RK45", "RK23"):
+            from .steppers import find_solver
+
+            return find_solver(self, name)
         calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
         raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
 

@@ -33,8 +33,11 @@ class Progress:
     def __call__(self, t: float) -> None:
         """Tell that the integrator is at time t."""
         self.calls += 1
-        if self.calls % STRIDE:
-            return
+        if self.calls % STRIDE == 0:
+            self.look(t)
+
+    def look(self, t: float) -> None:
+        """Show the time t if it is long enough since something was shown."""
         now = perf_counter()
         if now < self.next:
             return

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
+from .compiled import can_run, integrate_compiled, stepper_options
 from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .progress import Progress, wanted
@@ -57,7 +58,8 @@ def simulate(
     inputs : mapping of str to number, (times, values) or callable f(t, x), optional
         Tables are linear in between and constant outside; their corners are stepped on exactly.
     method : str or OdeSolver subclass, optional
-        A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  Implicit ones get the exact Jacobian.
+        A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
+        SciPy's steps unless there are events or inputs that are functions; implicit ones get the exact Jacobian.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
@@ -87,13 +89,21 @@ def simulate(
     UsageError
         Unknown names, wrong shapes.
     MissingDependencyError
-        SciPy is not installed.
+        The run needs SciPy, which is not installed.
     """
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
-    solver = choose_solver(declared["method"] if method is None else method)
-    check_options(solver, options, OPTIONS)
-    start, end = _span(span, float(declared["end"]))
+    method = declared["method"] if method is None else method
+    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
     forcing = Forcing(module.layout, inputs)
+    compiled = can_run(module, method, forcing, listed)
+    if compiled:
+        solver, title = None, str(method)
+        stepper_options(module.n_x, np.inf, options, OPTIONS)
+    else:
+        solver = choose_solver(method)
+        title = solver.__name__
+        check_options(solver, options, OPTIONS)
+    start, end = _span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants)
     forcing.base = bound.u
     x0 = _initial_state(bound, initial, start)
@@ -105,27 +115,32 @@ def simulate(
     }
     steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
     options = {**tolerances, **steps, **options}
-    if takes_jacobian(solver):
+    if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
     nodes = [start, *forcing.corners(start, end), end]
     stored = None if t_eval is None else _times(t_eval, start, end)
     try:
-        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-            solution = integrate(
-                run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
+        if compiled:
+            solution, failure = integrate_compiled(
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch
             )
+            run.last = None if failure is None else ("rhs", *failure)
+        else:
+            with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+                solution = integrate(
+                    run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
+                )
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
-        raise run.ended(start, end, solver.__name__, str(error)) from run.cause()
+        raise run.ended(start, end, title, str(error)) from run.cause()
     finally:
         if watch is not None:
             watch.close()
-    _check(run, solution, start, end, solver.__name__)
+    _check(run, solution, start, end, title)
     try:
-        return record(bound, forcing, solution, solver.__name__, options)
+        return record(bound, forcing, solution, title, options)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error

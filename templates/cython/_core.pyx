@@ -398,3 +398,5 @@ def address(str name not None):
 def capsule(str name not None):
     """The same address as a capsule named ``eomgen_function``."""
     return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)
+
+include "_steppers.pxi"

@@ -13,6 +13,7 @@ import pytest
 
 import eomgen.errors
 from eomgen.emit import SourceSet, emit_c, emit_numpy, emit_package
+from eomgen.layer import LAYER
 
 ROOT = Path(eomgen.errors.__file__).parent
 ALONE = """
@@ -31,11 +32,17 @@ assert np.allclose(x_dot[:3], x[3:], rtol=1e-13) and np.isfinite(x_dot).all()
 assert set(crank.__all__) <= set(dir(crank)) | {"minimal"}
 assert crank.minimal.rhs(0.0, [0.3, 10.0]).shape == (2,)
 try:
-    crank.simulate((0, 1))
+    crank.simulate((0, 1), method="Radau")
 except crank.EomgenError as error:
     assert "scipy" in str(error).lower()
 else:
-    raise AssertionError("simulate ran without SciPy")
+    raise AssertionError("Radau ran without SciPy")
+try:
+    trajectory = crank.simulate((0, 0.1), initial=x)
+except crank.EomgenError as error:  # no compiler, no steppers of its own
+    assert crank.metadata["target"] == "numpy" and "scipy" in str(error).lower()
+else:
+    assert crank.metadata["target"] == "cython" and trajectory.t[-1] == 0.1
 print(repr(x_dot.tolist()))
 """
 
@@ -67,7 +74,7 @@ def test_the_files_of_each_target(packages):
     copied = {"errors.py"} | {str(p.relative_to(ROOT)) for d in ("numeric", "runtime") for p in (ROOT / d).glob("*.py")}
     python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}
-    assert files["cython"] == copied | python | {"_core.pyx", "setup.py", "crank.c", "crank.h", "eomgen.h"}
+    assert files["cython"] == copied | python | set(LAYER) | {"setup.py", "crank.c", "crank.h", "eomgen.h"}
     for name in copied:
         assert (packages["cython"] / "crank" / name).read_bytes() == (ROOT / name).read_bytes()
     for target, folder in packages.items():

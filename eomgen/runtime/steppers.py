@@ -1,0 +1,96 @@
+"""Stage runtime: Module -> its compiled steppers as SciPy's OdeSolver classes, for plain ``solve_ivp``."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+from .compiled import stepper_options
+from .names import require
+
+if TYPE_CHECKING:
+    from .module import Module
+
+
+def find_solver(module: Module, name: str) -> Any:
+    """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
+    if name in getattr(module.core, "methods", ()):
+        return solver_class(module.core, name)
+    return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
+
+
+@cache
+def solver_class(core: Any, name: str) -> Any:
+    """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
+
+    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs`` it is
+    SciPy's own.  A failed evaluation shortens the step.
+
+    Parameters
+    ----------
+    core : Core
+        Of a module with compiled steppers.
+    name : {'DOP853', 'RK45', 'RK23'}
+
+    Raises
+    ------
+    MissingDependencyError
+        SciPy is not installed.
+    """
+    scipy = require("scipy.integrate", "scipy", f"method {name}")
+    own: Any = getattr(scipy, name)
+    rhs = core.timed
+
+    class Dense(scipy.DenseOutput):  # type: ignore[name-defined, misc]
+        """The solution within one step."""
+
+        def __init__(self, piece: Any) -> None:
+            super().__init__(piece.t_old, piece.t)
+            self._call_impl = piece
+
+    class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
+        """A compiled stepper."""
+
+        def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
+            if isinstance(fun, rhs) and fun.name == "rhs":
+                return super().__new__(cls)
+            return own(fun, *args, **options)
+
+        def __init__(
+            self,
+            fun: Any,
+            t0: float,
+            y0: Array,
+            t_bound: float,
+            max_step: float = np.inf,
+            rtol: float = 1e-3,
+            atol: Any = 1e-6,
+            vectorized: bool = False,
+            first_step: float | None = None,
+            **extraneous: Any,
+        ) -> None:
+            super().__init__(fun, t0, y0, t_bound, vectorized)
+            options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
+            settings = stepper_options(self.n, abs(t_bound - t0), options)
+            self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
+            self.nfev = self._stepper.evaluations
+
+        def _step_impl(self) -> tuple[bool, str | None]:
+            stepper = self._stepper
+            moved = stepper.step()
+            self.nfev = stepper.evaluations
+            if not moved:
+                return False, self.TOO_SMALL_STEP
+            self.t, self.y = stepper.t, stepper.state()
+            return True, None
+
+        def _dense_output_impl(self) -> Any:
+            piece = self._stepper.interpolant()
+            self.nfev = self._stepper.evaluations
+            return Dense(piece)
+
+    Solver.__name__ = Solver.__qualname__ = name
+    return Solver

@@ -1,0 +1,171 @@
+/* Step control of explicit Runge-Kutta methods: E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
+   Equations I, section II.4, with the constants of SciPy's solve_ivp, so that the same steps are taken. */
+#include <math.h>
+#include <string.h>
+
+#include "eomgen_steppers.h"
+
+static double interpolated(const eomgen_signal *s, double t)
+{
+    int low = 0, high = s->n - 1;
+    const int size = s->order == 3 ? 4 : 1;
+    if (t <= s->times[0] || high == 0) {
+        return s->values[0];
+    }
+    if (t >= s->times[high]) {
+        return s->values[high * size];
+    }
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (s->times[middle] <= t) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const double x = t - s->times[low], *const v = s->values + low * size;
+    if (s->order == 0) {
+        return v[0];
+    }
+    if (s->order == 1) {
+        return v[0] + x * ((v[1] - v[0]) / (s->times[low + 1] - s->times[low]));
+    }
+    return v[0] + x * (v[1] + x * (v[2] + x * v[3]));
+}
+
+void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
+{
+    if (run->signals != NULL) {
+        for (int i = 0; i < run->n_u; i++) {
+            if (run->signals[i].n > 0) {
+                run->u[i] = interpolated(run->signals + i, t);
+            }
+        }
+    }
+    const int status = run->rhs(t, y, run->u, run->c, k, run->w);
+    run->evaluations++;
+    if (status == 0) {
+        return;
+    }
+    int finite = 1;
+    for (int i = 0; i < run->n; i++) {
+        finite = finite && isfinite(y[i]);
+        k[i] = NAN;
+    }
+    if (finite || run->failure == 0) { /* a state that an earlier failure made tells nothing */
+        run->failure = status, run->failure_time = t;
+        memcpy(run->failure_state, y, (size_t)run->n * sizeof(double));
+    }
+}
+
+static double stepper_norm(const double *x, const double *y, const eomgen_run *run)
+{
+    double sum = 0.0;
+    for (int i = 0; i < run->n; i++) {
+        const double part = (x[i] - (y != NULL ? y[i] : 0.0)) / (run->atol[i] + fabs(run->y[i]) * run->rtol);
+        sum += part * part;
+    }
+    return sqrt(sum / run->n);
+}
+
+/* The first step: section II.4, starting step size. */
+static double first_step(const eomgen_method *method, eomgen_run *run)
+{
+    const double length = fabs(run->t_bound - run->t);
+    if (run->n == 0 || length == 0.0) {
+        return length;
+    }
+    const double d0 = stepper_norm(run->y, NULL, run), d1 = stepper_norm(run->f, NULL, run);
+    double h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    h0 = h0 < length ? h0 : length;
+    double *const y1 = run->K, *const f1 = run->K + run->n;
+    for (int i = 0; i < run->n; i++) {
+        y1[i] = run->y[i] + h0 * run->direction * run->f[i];
+    }
+    eomgen_evaluate(run, run->t + h0 * run->direction, y1, f1);
+    const double d2 = stepper_norm(f1, run->f, run) / h0, d = d1 > d2 ? d1 : d2;
+    const double h1 = d1 <= 1e-15 && d2 <= 1e-15 ? fmax(1e-6, h0 * 1e-3)
+                                                 : pow(0.01 / d, 1.0 / (method->error_order + 1));
+    return fmin(fmin(100.0 * h0, h1), fmin(length, run->max_step));
+}
+
+void eomgen_start(const eomgen_method *method, eomgen_run *run)
+{
+    run->interpolates = 0;
+    eomgen_evaluate(run, run->t, run->y, run->f);
+    if (!(run->h_abs > 0.0)) {
+        run->h_abs = first_step(method, run);
+    }
+}
+
+int eomgen_step(const eomgen_method *method, eomgen_run *run)
+{
+    const int n = run->n;
+    const double exponent = -1.0 / (method->error_order + 1);
+    const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
+    double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs < least ? least : run->h_abs;
+    int rejected = 0;
+    double *const spare = run->y_old;
+    run->y_old = run->y, run->y = spare;
+    memcpy(run->K, run->f, (size_t)n * sizeof(double));
+    for (;;) {
+        if (!(h_abs >= least)) {
+            run->y = run->y_old, run->y_old = spare;
+            return EOMGEN_STEP_TOO_SMALL;
+        }
+        double t_new = run->t + h_abs * run->direction;
+        if (run->direction * (t_new - run->t_bound) > 0.0) {
+            t_new = run->t_bound;
+        }
+        const double h = t_new - run->t;
+        h_abs = fabs(h);
+        method->attempt(run, h);
+        const double error = method->error(run, h);
+        if (error < 1.0) {
+            double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * pow(error, exponent));
+            factor = rejected && factor > 1.0 ? 1.0 : factor;
+            run->h_abs = h_abs * factor;
+            run->t_old = run->t, run->t = t_new, run->step = h;
+            run->interpolates = 0;
+            return 0;
+        }
+        const double factor = 0.9 * pow(error, exponent);
+        h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
+        rejected = 1;
+        run->rejected++;
+    }
+}
+
+void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, double *y)
+{
+    if (!run->interpolates) {
+        method->prepare(run);
+        run->interpolates = 1;
+    }
+    method->interpolate(run, t, y);
+}
+
+int eomgen_advance(const eomgen_method *method, eomgen_run *run, long steps, const double *t_eval, long n_eval,
+                   long *done, double *times, double *states, long *stored)
+{
+    const size_t size = (size_t)run->n * sizeof(double);
+    for (long k = 0; k < steps; k++) {
+        if (run->direction * (run->t - run->t_bound) >= 0.0) {
+            return 1;
+        }
+        const int status = eomgen_step(method, run);
+        if (status != 0) {
+            return status;
+        }
+        if (n_eval < 0) {
+            times[*stored] = run->t;
+            memcpy(states + *stored * run->n, run->y, size);
+            ++*stored;
+        }
+        while (*done < n_eval && run->direction * (t_eval[*done] - run->t) <= 0.0) {
+            eomgen_between(method, run, t_eval[*done], states + *stored * run->n);
+            ++*stored, ++*done;
+        }
+    }
+    return run->direction * (run->t - run->t_bound) >= 0.0;
+}
