@@ -104,7 +104,7 @@ def simulate(
         title = solver.__name__
         check_options(solver, options, OPTIONS)
     start, end = _span(span, float(declared["end"]))
-    bound = module.bind(parameters, forcing.constants)
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
     x0 = _initial_state(bound, initial, start)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
