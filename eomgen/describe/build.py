@@ -73,6 +73,7 @@ def build(description: Description) -> Mechanism:
 
     if lagrangian_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
+    _check_mass(reader, bodies)
     check_bodies(bodies, {p.name: p.value for p in parameters if p.value is not None}, faults)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
@@ -154,6 +155,15 @@ def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
         reader.wrong(path, given, "markers")
         return []
     return [Entry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+
+
+def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
+    """Note centres of mass and momenta asked of a mechanism without mass."""
+    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level > 2]
+    if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
+        what = ", ".join(name.removesuffix("()") for name in asked)
+        message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
+        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
 
 
 def _outputs(reader: Reader, entries: list[Entry]) -> tuple[Output, ...]:

@@ -77,12 +77,20 @@ class JointSpec:
     named: bool
 
 
+ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2,
-    or 3 for its angle about the z axis of ground."""
+    or 3 for its angle about the z axis of ground.
 
-    marker: Marker
+    Sums over all bodies: ``level`` :data:`ANGULAR_MOMENTUM` or :data:`INERTIA` (``axis`` 0 to 5: xx yy zz xy xz yz)
+    about the marker's origin, :data:`MOMENTUM` and :data:`MASS` without a marker.  The marker None stands for the
+    centre of mass of all bodies.
+    """
+
+    marker: Marker | None
     level: int
     axis: int
 

@@ -51,7 +51,17 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         n_dof=mobility.n_dof,
         preferred=tuple(names.index(n) for n in mobility.independent),
         parent=kinematics.parent,
+        centroidal=tuple(_centroidal(kinematics)),
     )
+
+
+def _centroidal(kinematics: Kinematics) -> list[Expr]:
+    """Centre of mass, its Jacobian, momenta and inertia of a mechanism that has mass."""
+    total = kinematics.motion.momentum
+    if total.mass.is_zero:
+        return []
+    rows = [*total.jacobian(len(kinematics.v)), total.linear, total.angular, *total.inertia]
+    return [*total.centre, *(x for row in rows for x in row)]
 
 
 def _poses(kinematics: Kinematics) -> list[Expr]:
@@ -74,6 +84,7 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,
         graph.symbol("potential_energy()"): equations.potential_energy,
+        graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
     }
     return substitute(expressions, energies)
 

@@ -47,6 +47,7 @@ class Layout:
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)
         self.n_dof: int = data.get("n_dof", self.n_v)
+        self.n_com: int = data.get("n_com", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
@@ -72,7 +73,11 @@ class Layout:
 
     def shape(self, kernel: str) -> tuple[int, ...]:
         """Shape of a kernel's result for one state."""
-        sums = {"n_q+2n_v": self.n_q + 2 * self.n_v, "n_v+n_c": self.n_v + self.n_c}
+        sums = {
+            "n_q+2n_v": self.n_q + 2 * self.n_v,
+            "n_v+n_c": self.n_v + self.n_c,
+            "n_centroidal": self.n_com * (self.n_v + 6),
+        }
         return tuple(
             size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
             for size in KERNELS[kernel][1]
@@ -131,6 +136,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "bias": ("x", ("n_v",)),
     "inverse_dynamics": ("motion", ("n_v",)),
     "energy": ("x", (2,)),
+    "centroidal": ("x", ("n_centroidal",)),
     "constraints": ("q", ("n_c",)),
     "constraint_jacobian": ("q", ("n_c", "n_v")),
     "velocity_constraints": ("x", ("n_c",)),
