@@ -104,11 +104,23 @@ class Layout:
             result = np.array(current, dtype=float)
             for name, value in given.items():
                 result[names.index(name)] = number(f"{what} {name}", value)
+            self._check_masses(what, names, result)
             return result
         result = np.asarray(given, dtype=float)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
+        self._check_masses(what, names, result)
         return result
+
+    def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
+        """Refuse a negative value of a parameter that is a body's mass."""
+        for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():
+            value = values[names.index(name)]
+            if value < 0.0:
+                raise UsageError(
+                    f"parameter {name} is the mass of body {body!r}, which is 0 or positive, not {value:g}; "
+                    "check_inertia: false in the model lets it be negative"
+                )
 
 
 def number(label: str, value: object) -> float:

@@ -231,3 +231,16 @@ def test_forces_cannot_use_sums() -> None:
     m.torque("T", "q", "total_mass")
     with pytest.raises(eg.ModelError, match="total_mass"):
         m.mechanism()
+
+
+def test_a_negative_mass_is_refused_at_run_time_too() -> None:
+    mod = tree()
+    for given in ({"m_a": -1.0}, np.array([-1.0])):
+        with pytest.raises(eg.UsageError, match="m_a is the mass of body 'a', which is 0 or positive, not -1"):
+            mod.bind(p=given)
+    with pytest.raises(eg.UsageError, match="m_a is the mass"):
+        mod.simulate((0, 0.1), parameters={"m_a": -1.0})
+    m = pendulum("1", mass="m")
+    m.parameter("m", 1.0)
+    m.check_inertia = False
+    m.compile(target="numpy").bind(p={"m": -0.5})
