@@ -12,12 +12,14 @@ from ..graph.core import Expr, Graph
 from .build_forces import build_forces
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
-from .checks import check_bodies, check_connected, check_keys, check_names
+from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
+from .inertia import read_body
 from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
+from .physical import check_bodies
 from .reading import Reader
 from .scope import Namespace
 from .sympy_face import name_of
@@ -71,6 +73,7 @@ def build(description: Description) -> Mechanism:
 
     if lagrangian_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
+    _check_mass(reader, bodies)
     check_bodies(bodies, {p.name: p.value for p in parameters if p.value is not None}, faults)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
@@ -138,7 +141,8 @@ def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
         for marker in check_names(_marker_entries(reader, entry), "marker", faults):
             label = f"{entry.name}.{marker.name}"
             reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
-    return tuple(_body(reader, entry) for entry in usable)
+    check = reader.flag("check_inertia", reader.description.values.get("check_inertia", True))
+    return tuple(read_body(reader, entry, check) for entry in usable)
 
 
 def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
@@ -153,13 +157,13 @@ def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
     return [Entry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
 
 
-def _body(reader: Reader, entry: Entry) -> Body:
-    graph, path, values = reader.graph, entry.path, entry.values
-    o = vec.zero(graph)
-    mass = reader.expression(f"{path}.mass", values["mass"]) if "mass" in values else graph.zero
-    com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o
-    inertia = reader.inertia(f"{path}.inertia", values["inertia"]) if "inertia" in values else (o, o, o)
-    return Body(entry.name, mass, com, inertia)
+def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
+    """Note centres of mass and momenta asked of a mechanism without mass."""
+    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level > 2]
+    if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
+        what = ", ".join(name.removesuffix("()") for name in asked)
+        message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
+        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
 
 
 def _outputs(reader: Reader, entries: list[Entry]) -> tuple[Output, ...]:

@@ -9,6 +9,7 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from ..joints import JOINTS
+from ..solids import SOLIDS
 from .mechanism import Simulation
 
 # What the expressions of a field may depend on; each level includes those before it.
@@ -55,6 +56,11 @@ KINDS = {
     "choice": "one of the listed words",
     "forces": "a mapping of coordinates to expressions, or a list of one expression for each coordinate",
     "table": "a mapping",
+    "flag": "true or false",
+    "file": "the path of a file",
+    "about": "com, origin, a marker of the body or [x, y, z]",
+    "solids": "a list of solids {type, ...}",
+    "points": "a list of points {mass, at}",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -85,10 +91,41 @@ MARKER: Fields = {
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
 BODY: Fields = {
-    "mass": Field("expression", "mass (kg); 0 for a body without mass", required=True),
+    "mass": Field("expression", "mass (kg); 0 for a body without mass"),
     "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0)),
-    "inertia": Field("inertia", "inertia about the centre of mass in body axes (kg m^2)", default=(0, 0, 0)),
+    "inertia": Field(
+        "inertia",
+        "inertia (kg m^2) about the centre of mass in body axes, unless about and axes say",
+        default=(0, 0, 0),
+    ),
     "markers": Field("markers", "named frames fixed in the body", default=()),
+    "principal": Field("vector", "principal moments (kg m^2), instead of inertia"),
+    "first_moment": Field("vector", "first moment m c about the body's origin (kg m), instead of com"),
+    "about": Field("about", "point the inertia is about; a marker gives its axes too", default="com"),
+    "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body"),
+    "solids": Field("solids", "solids of uniform density, from which mass, com and inertia follow", default=()),
+    "points": Field("points", "point masses, added to the rest", default=()),
+    "check_inertia": Field("flag", "whether mass and inertia must be those of a possible body (the model's own)"),
+}
+POINT: Fields = {
+    "mass": Field("expression", "mass (kg)", required=True),
+    "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
+}
+_MASS = Field("expression", "mass (kg), instead of a density")
+_DENSITY = Field("expression", "density (kg/m^3)")
+_SUBTRACT = Field("flag", "whether it is taken away: a hole", default=False)
+#: Type of solid -> its own keys; ``mesh`` is read from a file, the others are formulas.
+SOLID: dict[str, Fields] = {
+    name: {key: Field(d.kind, d.doc, required=True) for key, d in solid.dimensions.items()}
+    | ({"axis": Field("axis", "where its z axis lies in the body", default="z")} if solid.has_axis else {})
+    | {solid.content_key: _DENSITY if solid.content_key == "density" else Field("expression", "mass of a metre (kg/m)")}
+    for name, solid in SOLIDS.items()
+} | {
+    "mesh": {
+        "file": Field("file", "STL file; its path from the folder of the model file", required=True),
+        "scale": Field("expression", "metres in one unit of the file", default=1),
+        "density": _DENSITY,
+    }
 }
 GROUND: Fields = {"markers": BODY["markers"]}
 
@@ -180,6 +217,7 @@ MODEL: Fields = {
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
     "simulation": Field("table", "defaults of a simulation"),
+    "check_inertia": Field("flag", "whether bodies must have a possible mass and inertia", default=True),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
@@ -204,3 +242,12 @@ def joint_fields(type_name: str) -> Fields:
 def force_fields(type_name: str) -> Fields:
     """The keys of one type of force, ``type`` among them."""
     return {"type": Field("choice", "type of the force", required=True, choices=tuple(FORCE)), **FORCE[type_name]}
+
+
+def solid_fields(type_name: str) -> Fields:
+    """The keys of one type of solid."""
+    kind = Field("choice", "type of the solid", required=True, choices=tuple(SOLID))
+    return {"type": kind, **SOLID[type_name], "mass": _MASS, **MARKER, "subtract": _SUBTRACT}
+
+
+SOLID_KEYS = frozenset(key for name in SOLID for key in solid_fields(name))

@@ -56,15 +56,16 @@ class MarkerHandle:
     @property
     def angle(self) -> Any:
         """Turn of the marker about the z axis of ground (rad), as a SymPy symbol for use in outputs."""
-        self._note()
+        self.note()
         return symbol(f"angle({self.label})")
 
-    def _note(self) -> None:
+    def note(self) -> None:
+        """Let the description know an unnamed marker whose motion is asked for."""
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
 
     def _motion(self, prefix: str) -> Triple:
-        self._note()
+        self.note()
         x, y, z = (symbol(f"{prefix}{axis}({self.label})") for axis in "xyz")
         return (x, y, z)
 

@@ -45,12 +45,20 @@ class Input:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes."""
+    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes.
+
+    ``moment`` (m c, kg m) and ``inertia_origin`` (about the body's origin) are there where the user gave them, so that
+    these parameters stay as they are; the centre of mass and the inertia about it follow from them then.
+    """
 
     name: str
     mass: Expr
     com: Vec3
     inertia: Mat3
+    moment: Vec3 | None = None
+    inertia_origin: Mat3 | None = None
+    checked: bool = True  #: whether mass and inertia must be those of a possible body
+    plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
 
 
 @dataclass(frozen=True)
@@ -69,12 +77,20 @@ class JointSpec:
     named: bool
 
 
+ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2,
-    or 3 for its angle about the z axis of ground."""
+    or 3 for its angle about the z axis of ground.
 
-    marker: Marker
+    Sums over all bodies: ``level`` :data:`ANGULAR_MOMENTUM` or :data:`INERTIA` (``axis`` 0 to 5: xx yy zz xy xz yz)
+    about the marker's origin, :data:`MOMENTUM` and :data:`MASS` without a marker.  The marker None stands for the
+    centre of mass of all bodies.
+    """
+
+    marker: Marker | None
     level: int
     axis: int
 

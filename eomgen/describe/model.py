@@ -10,8 +10,10 @@ from . import FORCE_FIELDS
 from .build import build
 from .description import GROUND_NAME, SECTIONS, Description
 from .handles import BodyHandle, JointHandle, Names, Settings
+from .model_bodies import BodyMethods
 from .model_forces import ForceMethods
 from .model_joints import JointMethods
+from .model_totals import TotalMethods
 from .sympy_face import name_of, symbol
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(JointMethods, ForceMethods):
+class Model(BodyMethods, JointMethods, ForceMethods, TotalMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
@@ -37,6 +39,8 @@ class Model(JointMethods, ForceMethods):
         Acceleration of gravity in ground axes (m/s^2).
     doc : str, optional
         One sentence about the model.
+    check_inertia : bool, optional
+        False lets bodies have masses and inertias that no rigid body can have.
 
     Examples
     --------
@@ -50,10 +54,12 @@ class Model(JointMethods, ForceMethods):
     ('theta',)
     """
 
-    def __init__(self, name: str, gravity: Vector = (0, 0, 0), doc: str = "") -> None:
+    def __init__(self, name: str, gravity: Vector = (0, 0, 0), doc: str = "", *, check_inertia: bool = True) -> None:
         values: dict[str, Any] = {"name": name, "gravity": gravity}
         if doc:
             values["doc"] = doc
+        if check_inertia is not True:
+            values["check_inertia"] = check_inertia
         self._start(Description(values=values))
 
     def _start(self, description: Description) -> None:
@@ -159,30 +165,6 @@ class Model(JointMethods, ForceMethods):
         return symbol("potential_energy")
 
     # -- bodies ---------------------------------------------------------------------------------------------------
-    def body(self, name: str, mass: Value = None, com: Vector = (0, 0, 0), inertia: Any = (0, 0, 0)) -> BodyHandle:
-        """Add a rigid body.
-
-        Parameters
-        ----------
-        name : str
-            Identifier.
-        mass : number, str or SymPy expression
-            Mass (kg); 0 for a body without mass.
-        com : sequence of three, optional
-            Centre of mass in body axes (m).
-        inertia : sequence of three, 3 x 3 tensor or mapping, optional
-            About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
-            with the tensor's own sign; what is missing is 0.
-
-        Returns
-        -------
-        BodyHandle
-        """
-        values: dict[str, Any] = {"com": com, "inertia": inertia}
-        if mass is not None:
-            values = {"mass": mass, **values}
-        return BodyHandle(self, name, self._description.add("bodies", name, values))
-
     @property
     def ground(self) -> BodyHandle:
         """The ground, which has markers like a body."""

@@ -35,6 +35,15 @@ QUANTITIES: dict[str, tuple[int, int]] = {
     prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
 }
 QUANTITIES["angle"] = (0, 3)  # turn about the z axis of ground
+# sums over all bodies about the marker's origin, ground axes: angular momentum, inertia (levels of mechanism.Quantity)
+QUANTITIES |= {f"angular_momentum_{axis}": (3, k) for k, axis in enumerate("xyz")}
+QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}
+#: Sums over all bodies that need no marker, in outputs; a name of the model's own comes first.
+TOTALS: dict[str, tuple[int, int]] = {f"momentum_{axis}": (5, k) for k, axis in enumerate("xyz")} | {
+    "total_mass": (6, 0)
+}
+#: The word that stands for the centre of mass of all bodies where a marker is asked for, unless a body bears it.
+COM = "com"
 
 _C_KEYWORDS = frozenset(
     word

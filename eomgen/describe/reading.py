@@ -101,6 +101,13 @@ class Reader:
             return ""
         return value
 
+    def flag(self, path: str, value: Any) -> bool:
+        """True or false; True when it is neither."""
+        if isinstance(value, bool):
+            return value
+        self.wrong(path, value, "flag")
+        return True
+
     def choice(self, path: str, value: Any, field: Field) -> str:
         """One of the words of a field; the default when it is another."""
         if isinstance(value, str) and value in field.choices:

@@ -18,12 +18,15 @@ from .fields import (
     OUTPUT_FIELDS,
     PARAMETER,
     PLACED,
+    POINT,
     SHORT,
     SIMULATION,
+    SOLID,
     Field,
     Fields,
     force_fields,
     joint_fields,
+    solid_fields,
 )
 from .names import LONGEST
 
@@ -63,6 +66,8 @@ def _definitions() -> Schema:
             ]
         },
         "names": {"type": "array", "items": _ref("name")},
+        "solids": {"type": "array", "items": {"oneOf": [_solid(name) for name in SOLID]}},
+        "points": {"type": "array", "items": _table(POINT)},
     }
 
 
@@ -81,6 +86,11 @@ _KINDS: dict[str, Schema] = {
     "inertia": _ref("inertia"),
     "markers": _ref("markers"),
     "marker": _ref("marker"),
+    "flag": {"type": "boolean"},
+    "file": {"type": "string"},
+    "about": {"anyOf": [_MARKER_NAME, _ref("vector")]},
+    "solids": _ref("solids"),
+    "points": _ref("points"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
     "forces": {
@@ -115,6 +125,17 @@ def _typed(fields: Fields, type_name: str) -> Schema:
     schema = _table(fields)
     schema["properties"]["type"] = {"const": type_name}
     return schema
+
+
+def _solid(type_name: str) -> Schema:
+    schema = _typed(solid_fields(type_name), type_name)
+    density = "line_density" if "line_density" in SOLID[type_name] else "density"
+    return {**schema, "oneOf": [{"required": ["mass"]}, {"required": [density]}]}
+
+
+def _body() -> Schema:
+    given = [{"required": [key]} for key in ("mass", "solids", "points")]
+    return {**_table(BODY), "anyOf": given}
 
 
 def _force(type_name: str) -> Schema:
@@ -153,7 +174,7 @@ def model_schema() -> dict[str, Any]:
     sections: Schema = {
         "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
         "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
-        "bodies": _section(_table(BODY), MODEL["bodies"].doc),
+        "bodies": _section(_body(), MODEL["bodies"].doc),
         "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
         "forces": _section({"oneOf": [_force(name) for name in FORCE]}, MODEL["forces"].doc),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),

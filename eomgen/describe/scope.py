@@ -12,7 +12,7 @@ from ..graph.core import Expr, Graph
 from .description import Faults
 from .fields import CONSTANT, MOTION, NUMBER, OUTPUT
 from .mechanism import Quantity
-from .names import QUANTITIES, fault_of_name, nearest
+from .names import COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
@@ -24,10 +24,10 @@ _LEVEL_REMEDY = {
     MOTION: "t, parameters, inputs, coordinates and their velocities can",
     OUTPUT: "t, parameters, inputs, coordinates, their rates, motion of markers and energies can",
 }
-_QUANTITY = re.compile(r"([va]?[xyz]|angle)\((.+)\)\Z", re.DOTALL)
+_QUANTITY = re.compile(rf"({'|'.join(QUANTITIES)})\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
 #: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
-ENERGIES = ("kinetic_energy", "potential_energy")
+ENERGIES = ("kinetic_energy", "potential_energy", "total_energy")
 
 
 def quantity_of(name: str) -> tuple[str, str] | None:
@@ -121,6 +121,9 @@ class Scope:
             self._refuse(name, "name")
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
+        elif kind is None and name in TOTALS and self.level >= OUTPUT:
+            self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
+            return self.graph.symbol(f"{name}()")
         elif kind is None:
             known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
@@ -136,8 +139,19 @@ class Scope:
             self._refuse(name, "motion of a marker")
             return self.graph.symbol(name)
         level, axis = QUANTITIES[quantity]
-        self.quantities[name] = Quantity(self.marker(marker), level, axis)
+        self.quantities[name] = Quantity(self._point(quantity, marker), level, axis)
         return self.graph.symbol(name)
+
+    def _point(self, quantity: str, marker: str) -> Marker | None:
+        """The marker of a label; None for the centre of mass of all bodies."""
+        try:
+            return self.marker(marker)
+        except ExpressionError:
+            if marker != COM:
+                raise
+        if quantity == "angle":
+            raise ExpressionError("the centre of mass of all bodies has no angle", 0, "give a marker")
+        return None
 
     def _refuse(self, name: str, kind: str) -> None:
         remedy = f"only {_LEVEL_REMEDY[self.level]}"

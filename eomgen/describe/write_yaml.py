@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import numbers
+import os
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -74,7 +75,11 @@ def _is_default(key: str, value: Any) -> bool:
 def _value(value: Any) -> str:
     if value is None:
         return "null"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real | str | Mapping | list | tuple):
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, os.PathLike):
+        return _text(os.fspath(value))
+    if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
         listed = items(value)
         if listed is not None:
             return _value(listed)

@@ -28,6 +28,10 @@ def describe_calls(program: Program) -> list[Call]:
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
         Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
         Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
+        Call("centre_of_mass(q)", _shape(3), "of all bodies, ground axes (m)"),
+        Call("com_jacobian(q)", _shape(3, s.n_v), "its velocity for each generalized velocity"),
+        Call("momentum(x)", _shape(6), "linear, then angular about the centre of mass, ground axes (kg m/s, kg m^2/s)"),
+        Call("centroidal_inertia(q)", _shape(3, 3), "of all bodies about their centre of mass, ground axes (kg m^2)"),
         Call("constraints(q)", _shape(rows), "independent loop residuals (m, rad)"),
         Call("constraint_jacobian(q)", _shape(rows, s.n_v), "their derivatives with respect to q"),
         Call('constraints(q, rows="all")', _shape(s.n_c), "all loop residuals, redundant ones included"),
@@ -48,7 +52,9 @@ def describe_calls(program: Program) -> list[Call]:
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
     ]
-    return [call for call in calls if s.n_c or "constraint" not in call.text]
+    sums = ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
+    kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
+    return [call for call in kept if s.n_c or "constraint" not in call.text]
 
 
 def _shape(*sizes: int) -> str:

@@ -21,6 +21,7 @@ from .sources import SourceSet, render
 ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs")),
     *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
+    *((name, "State") for name in ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
     ("inverse_dynamics", "Motion"),
     *((name, "Rows") for name in ("constraints", "constraint_jacobian")),
     *((name, "tuple[str, ...]") for name in

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
-from ..describe.mechanism import Mechanism
+from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, Mechanism, Quantity
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
+from .momentum import Momentum
 from .tree import Poses, Twist
 from .turns import sum_of_turns
 
@@ -98,6 +100,28 @@ class Motion:
         ground = Marker(GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph)), "ground")
         return self.turn(ground, marker)[0]
 
+    @cached_property
+    def momentum(self) -> Momentum:
+        """Mass, centre of mass and momentum of all bodies."""
+        return Momentum(self.poses, self.twists)
+
+    def _sum(self, quantity: Quantity) -> Expr:
+        """A sum over all bodies, or the motion of their centre of mass."""
+        total, k, marker = self.momentum, quantity.axis, quantity.marker
+        if quantity.level == MASS:
+            return total.mass
+        if quantity.level == MOMENTUM:
+            return total.linear[k]
+        if quantity.level == ANGULAR_MOMENTUM:
+            return (total.angular if marker is None else total.angular_about(self.position(marker)))[k]
+        if quantity.level == INERTIA:
+            tensor = total.inertia if marker is None else total.inertia_about(self.position(marker))
+            i, j = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))[k]
+            return tensor[i][j]
+        if quantity.level == 2:
+            return jvp(list(total.velocity), self._along)[k]
+        return (total.velocity if quantity.level == 1 else total.centre)[k]
+
     def derived_symbols(self, mechanism: Mechanism, used: set[str]) -> dict[Expr, Expr]:
         """What cut joints' coordinates and marker quantities stand for, as a substitution, for the symbols ``used``."""
         mapping: dict[Expr, Expr] = {}
@@ -110,6 +134,9 @@ class Motion:
         for name, quantity in mechanism.quantities.items():
             if name in used:
                 marker = quantity.marker
-                value = self._angle(marker) if quantity.axis == 3 else look[quantity.level](marker)[quantity.axis]
+                if marker is None or quantity.level > 2:
+                    value = self._sum(quantity)
+                else:
+                    value = self._angle(marker) if quantity.axis == 3 else look[quantity.level](marker)[quantity.axis]
                 mapping[self.graph.symbol(name)] = value
         return mapping

@@ -116,6 +116,7 @@ class BlockMaker:
             "bias": lambda: terms.bias,
             "inverse_dynamics": lambda: terms.inverse_dynamics,
             "energy": lambda: (terms.kinetic, terms.potential),
+            "centroidal": lambda: terms.centroidal,
             "constraints": lambda: terms.constraints,
             "constraint_jacobian": lambda: flat(terms.constraint_jacobian),
             "velocity_constraints": lambda: terms.velocity_constraints,

@@ -51,7 +51,24 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         n_dof=mobility.n_dof,
         preferred=tuple(names.index(n) for n in mobility.independent),
         parent=kinematics.parent,
+        centroidal=tuple(_centroidal(kinematics)),
     )
+
+
+def _centroidal(kinematics: Kinematics) -> list[Expr]:
+    """Centre of mass, its Jacobian, momenta and inertia of a mechanism that has mass."""
+    total = kinematics.motion.momentum
+    if total.mass.is_zero:
+        return []
+    rows = [*total.jacobian(len(kinematics.v)), total.linear, total.angular, *total.inertia]
+    return [*total.centre, *(x for row in rows for x in row)]
+
+
+def _mass_parameters(kinematics: Kinematics) -> list[tuple[str, str]]:
+    """Parameters that are the mass of a body by themselves, with the name of that body, which must not be negative."""
+    symbols = {kinematics.graph.symbol(name): name for name in kinematics.parameter_names}
+    bodies = kinematics.mechanism.bodies
+    return [(symbols[body.mass], body.name) for body in bodies if body.checked and body.mass in symbols]
 
 
 def _poses(kinematics: Kinematics) -> list[Expr]:
@@ -74,6 +91,7 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,
         graph.symbol("potential_energy()"): equations.potential_energy,
+        graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
     }
     return substitute(expressions, energies)
 
@@ -108,6 +126,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "p_names": list(kinematics.parameter_names),
         "y_names": [o.name for o in m.outputs],
         "body_names": [b.name for b in m.bodies],
+        "masses": dict(_mass_parameters(kinematics)),
         "joint_names": [j.name for j in m.joints],
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),

@@ -21,6 +21,7 @@ class Sizes:
     n_bodies: int
     n_k: int
     n_a: int
+    n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,9 @@ class Kernel:
     result: str
 
 
+#: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
+CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
+
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
     Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
@@ -52,6 +56,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
+    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL),
     Kernel("constraints", ("q",), lambda s: (s.n_c,), "loop residuals C, all rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows"),

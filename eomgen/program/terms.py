@@ -51,6 +51,9 @@ class SystemTerms:
     preferred: tuple[int, ...]  #: n_dof indices into v: independent coordinates, in the order of q_i
     parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
 
+    centroidal: Row = ()  #: (18 + 3n,) of (q, v), all bodies, ground axes; empty for a system without mass: centre of
+    #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
+
     @property
     def n_v(self) -> int:
         """Number of velocities."""
@@ -87,6 +90,7 @@ class SystemTerms:
             "velocity_constraints": (len(self.velocity_constraints), m),
             "gamma": (len(self.gamma), m),
             "loop_coordinates": (len(self.loop_coordinates), 3 * self.n_k),
+            "centroidal": (len(self.centroidal), 18 + 3 * n if self.centroidal else 0),
             "coordinate_scales": (len(self.coordinate_scales), n),
             "constraint_scales": (len(self.constraint_scales), m),
             "preferred": (len(self.preferred), self.n_dof),

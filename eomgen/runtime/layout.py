@@ -47,6 +47,7 @@ class Layout:
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)
         self.n_dof: int = data.get("n_dof", self.n_v)
+        self.n_com: int = data.get("n_com", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
@@ -72,7 +73,11 @@ class Layout:
 
     def shape(self, kernel: str) -> tuple[int, ...]:
         """Shape of a kernel's result for one state."""
-        sums = {"n_q+2n_v": self.n_q + 2 * self.n_v, "n_v+n_c": self.n_v + self.n_c}
+        sums = {
+            "n_q+2n_v": self.n_q + 2 * self.n_v,
+            "n_v+n_c": self.n_v + self.n_c,
+            "n_centroidal": self.n_com * (self.n_v + 6),
+        }
         return tuple(
             size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
             for size in KERNELS[kernel][1]
@@ -99,11 +104,23 @@ class Layout:
             result = np.array(current, dtype=float)
             for name, value in given.items():
                 result[names.index(name)] = number(f"{what} {name}", value)
+            self._check_masses(what, names, result)
             return result
         result = np.asarray(given, dtype=float)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
+        self._check_masses(what, names, result)
         return result
+
+    def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
+        """Refuse a negative value of a parameter that is a body's mass."""
+        for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():
+            value = values[names.index(name)]
+            if value < 0.0:
+                raise UsageError(
+                    f"parameter {name} is the mass of body {body!r}, which is 0 or positive, not {value:g}; "
+                    "check_inertia: false in the model lets it be negative"
+                )
 
 
 def number(label: str, value: object) -> float:
@@ -131,6 +148,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "bias": ("x", ("n_v",)),
     "inverse_dynamics": ("motion", ("n_v",)),
     "energy": ("x", (2,)),
+    "centroidal": ("x", ("n_centroidal",)),
     "constraints": ("q", ("n_c",)),
     "constraint_jacobian": ("q", ("n_c", "n_v")),
     "velocity_constraints": ("x", ("n_c",)),

@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .kernels import Kernels, Rows
 from .layout import Layout, number
+from .momenta import Momenta
 
 if TYPE_CHECKING:
     from .initial import Initial
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module:
+class Module(Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of

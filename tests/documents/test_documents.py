@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 import eomgen
-from eomgen.describe.fields import FORCE, LAGRANGIAN, MODEL, SIMULATION
-from eomgen.describe.names import FUNCTIONS, QUANTITIES
+from eomgen.describe.fields import BODY, FORCE, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
+from eomgen.describe.names import FUNCTIONS, QUANTITIES, TOTALS
+from eomgen.describe.scope import ENERGIES
 from eomgen.joints import JOINTS
 
 ROOT = Path(__file__).parents[2]
@@ -100,6 +101,7 @@ def test_the_model_file_page_knows_every_key() -> None:
     words = set(re.findall(r"\w+", text))
     keys = {*MODEL, *LAGRANGIAN, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
     keys |= {key for fields in FORCE.values() for key in fields} | {o for j in JOINTS.values() for o in j.options}
+    keys |= {*BODY, *SOLID, *TOTALS, *ENERGIES} | SOLID_KEYS
     assert keys - words == set()
 
 

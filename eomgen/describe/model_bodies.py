@@ -1,0 +1,92 @@
+"""Stage describe, the builder's bodies: Model.body with every way to give mass and inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from .handles import BodyHandle
+
+if TYPE_CHECKING:
+    from .description import Description
+
+
+class BodyMethods:
+    """The part of Model that adds bodies."""
+
+    _description: Description
+
+    def body(
+        self,
+        name: str,
+        mass: Any = None,
+        com: Sequence[Any] | None = None,
+        inertia: Any = None,
+        *,
+        principal: Sequence[Any] | None = None,
+        first_moment: Sequence[Any] | None = None,
+        about: Any = None,
+        axes: Sequence[Any] | None = None,
+        solids: Sequence[Mapping[str, Any]] | None = None,
+        points: Sequence[Mapping[str, Any]] | None = None,
+        check_inertia: bool | None = None,
+    ) -> BodyHandle:
+        """Add a rigid body.
+
+        Values are numbers, texts or SymPy expressions of parameters; parameters stay symbols in all that follows.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        mass : number, str or SymPy expression
+            Mass (kg); 0 for a body without mass.
+        com : sequence of three, optional
+            Centre of mass in body axes (m); the origin unless given.
+        inertia : sequence of three, 3 x 3 tensor or mapping, optional
+            About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
+            with the tensor's own sign; what is missing is 0.  One moment alone is that of a body moving in a plane.
+        principal : sequence of three, optional
+            Principal moments (kg m^2) instead of ``inertia``, along ``axes``.
+        first_moment : sequence of three, optional
+            m c about the body's origin (kg m) instead of ``com``.
+        about : {'com', 'origin'}, name of a marker of the body, or sequence of three, optional
+            The point that ``inertia`` or ``principal`` is about; a marker gives its axes too.
+        axes : sequence of three, optional
+            Fixed-axis roll, pitch, yaw (rad) of the axes that ``inertia`` or ``principal`` is written in.
+        solids : sequence of mappings, optional
+            Solids of uniform density, from which mass, centre of mass and inertia follow:
+            ``{"type": "box", "size": (a, b, c), "density": rho, "at": (x, y, z), "rpy": (r, p, y)}``; the types are
+            box, cylinder, tube, sphere, rod, cone, ellipsoid and mesh (an STL file); ``"subtract": True`` makes a hole.
+        points : sequence of mappings, optional
+            Point masses to add: ``{"mass": m, "at": (x, y, z)}``.
+        check_inertia : bool, optional
+            False takes a mass and inertia that no rigid body can have; the model's own setting unless given.
+
+        Returns
+        -------
+        BodyHandle
+        """
+        given = {
+            "mass": mass,
+            "com": com,
+            "inertia": inertia,
+            "principal": principal,
+            "first_moment": first_moment,
+            "about": about,
+            "axes": axes,
+            "solids": solids,
+            "points": points,
+            "check_inertia": check_inertia,
+        }
+        values = {key: value for key, value in given.items() if value is not None}
+        return BodyHandle(self, name, self._description.add("bodies", name, values))  # type: ignore[arg-type]
+
+    @property
+    def check_inertia(self) -> bool:
+        """Whether bodies must have a mass and inertia that a rigid body can have."""
+        return bool(self._description.values.get("check_inertia", True))
+
+    @check_inertia.setter
+    def check_inertia(self, check: bool) -> None:
+        self._description.values["check_inertia"] = check

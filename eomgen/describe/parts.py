@@ -1,0 +1,152 @@
+"""Stage describe, parts of a body: its solids, meshes and point masses -> mass properties in body axes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import UsageError
+from ..frames import Frame
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..solids import SOLIDS, MassProperties, point, turn_tensor
+from ..solids.mesh import measure_mesh
+from .checks import check_keys, unknown_key
+from .description import items, place_of
+from .fields import KINDS, POINT, SOLID, SOLID_KEYS, solid_fields
+from .names import nearest
+from .placement import TURNS, turn_matrix
+from .reading import Reader
+
+
+def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
+    """Mass properties of the solids and points of a body; those with faults are left out."""
+    parts: list[MassProperties] = []
+    for key, read in (("solids", _solid), ("points", _point)):
+        if key not in values:
+            continue
+        listed = items(values[key])
+        if listed is None:
+            reader.wrong(f"{path}.{key}", values[key], key)
+            continue
+        for k, given in enumerate(listed):
+            place = f"{path}.{key}[{k}]"
+            if not isinstance(given, Mapping):
+                reader.wrong(place, given, "table")
+                continue
+            part = read(reader, place, given)
+            if part is not None:
+                parts.append(part)
+    return parts
+
+
+def _point(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
+    check_keys(path, values, POINT, reader.faults)
+    if "mass" not in values:
+        return None
+    at = reader.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(reader.graph)
+    return point(reader.graph, reader.expression(f"{path}.mass", values["mass"]), at)
+
+
+def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperties | None:
+    faults, graph = reader.faults, reader.graph
+    kind = values.get("type")
+    if not isinstance(kind, str) or kind not in SOLID:
+        if kind is None:
+            faults.add(f"{path}.type", "is missing", f"give one of {', '.join(SOLID)}")
+        else:
+            faults.add(f"{path}.type", f"no solid of type {kind!r}", nearest(str(kind), SOLID, "types"))
+        return None
+    fields = solid_fields(kind)
+    for key in values:
+        if key not in fields:
+            message = f"a {kind} has no {key!r}" if key in SOLID_KEYS else "unknown key"
+            faults.add(f"{path}.{key}", message, unknown_key(key, fields))
+    for key, field in fields.items():
+        if field.required and key not in values:
+            faults.add(f"{path}.{key}", "is missing", f"give {KINDS[field.kind]}: {field.doc}")
+    density = "line_density" if "line_density" in fields else "density"
+    if ("mass" in values) == (density in values):
+        wrong = f"both mass and {density} are given" if "mass" in values else f"neither mass nor {density} is given"
+        faults.add(path, wrong, "give one of them")
+    given = {
+        key: reader.expression(f"{path}.{key}", values[key]) for key in ("mass", density, "scale") if key in values
+    }
+    frame = reader.frame(path, values)
+    if "axis" in values:
+        columns = reader.axis(f"{path}.axis", values["axis"])
+        if columns != TURNS["z"]:
+            frame = Frame(vec.product(frame.rotation, turn_matrix(graph, columns)), frame.position)
+    subtract = reader.flag(f"{path}.subtract", values["subtract"]) if "subtract" in values else False
+    own = _mesh(reader, path, values, given.get("scale")) if kind == "mesh" else _shape(reader, path, kind, values)
+    if own is None or faults.under(path):
+        return None
+    mass = given["mass"] if "mass" in given else given[density] * own.mass
+    if subtract:
+        mass = -mass
+    tensor = turn_tensor(frame.rotation, own.inertia)
+    x, y, z = (vec.scale(mass, row) for row in tensor)
+    com = vec.add(frame.position, vec.times(frame.rotation, own.com))
+    return MassProperties(mass, com, (x, y, z))
+
+
+def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> MassProperties | None:
+    """What a solid has at density 1, its inertia for each kg, in its own axes."""
+    solid, graph = SOLIDS[kind], reader.graph
+    lengths: dict[str, tuple[Expr, Expr, Expr]] = {}
+    for key, dimension in solid.dimensions.items():
+        if key not in values:
+            return None
+        place = f"{path}.{key}"
+        if dimension.kind == "vector":
+            lengths[key] = reader.vector(place, values[key])
+        else:
+            lengths[key] = (reader.expression(place, values[key]),) * 3
+        if any(x.value is not None and x.value < 0.0 for x in lengths[key]):
+            reader.faults.add(place, f"{values[key]!r} is negative", "lengths are 0 or positive")
+    inner, outer = (lengths[key][0].value if key in lengths else None for key in ("inner_radius", "outer_radius"))
+    if inner is not None and outer is not None and inner > outer:
+        reader.faults.add(f"{path}.inner_radius", f"{inner:g} exceeds the outer radius {outer:g}", "exchange them")
+    made, o = solid(lengths), graph.zero
+    a, b, c = made.gyration()
+    return MassProperties(made.content(), made.centre(), ((a, o, o), (o, b, o), (o, o, c)))
+
+
+def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None) -> MassProperties | None:
+    """The same of the solid that a mesh bounds."""
+    file = values.get("file")
+    if file is None:
+        return None
+    place = f"{path}.file"
+    if not isinstance(file, str | os.PathLike):
+        reader.wrong(place, file, "file")
+        return None
+    graph = reader.graph
+    try:
+        found = measure_mesh(_locate(reader, os.fspath(file)))
+    except UsageError as error:
+        reader.faults.add(place, str(error), "a mesh is a closed surface of triangles that face outwards")
+        return None
+    one = graph.one if scale is None else scale
+    x, y, z = (tuple(graph.constant(v / found.volume) * one * one for v in row) for row in found.inertia)
+    centre = vec.scale(one, vec.vector(graph, found.centre))
+    return MassProperties(found.volume * one * one * one, centre, (x, y, z))  # type: ignore[arg-type]
+
+
+def _locate(reader: Reader, file: str) -> str:
+    """The path of a file beside the model file, below its folder; from Python any path.
+
+    Raises
+    ------
+    UsageError
+        A model file names a file outside its own folder.
+    """
+    model = place_of("", reader.faults.lines)[0]
+    if not model:
+        return file
+    folder = os.path.realpath(os.path.dirname(os.path.abspath(model)))
+    path = os.path.realpath(os.path.join(folder, file))
+    if os.path.isabs(file) or os.path.commonpath((folder, path)) != folder:
+        raise UsageError(f"{file} lies outside the folder of the model file, which a model file cannot reach")
+    return path

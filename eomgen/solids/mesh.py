@@ -1,0 +1,78 @@
+"""Stage describe, meshes: an STL file -> volume, centre of mass and inertia of the solid it bounds, by trimesh."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ..errors import UsageError
+
+SIZE = 200_000_000  #: bytes of a file
+
+
+@dataclass(frozen=True)
+class MeshProperties:
+    """Volume, centre and inertia about it at density 1, in the units and axes of the file."""
+
+    volume: float
+    centre: tuple[float, float, float]
+    inertia: tuple[tuple[float, float, float], ...]
+
+
+def measure_mesh(path: str) -> MeshProperties:
+    """Mass properties of the solid that a mesh bounds.
+
+    Parameters
+    ----------
+    path : str
+        An STL file, text or binary.
+
+    Returns
+    -------
+    MeshProperties
+
+    Raises
+    ------
+    UsageError
+        There is no such file, it is no STL file, or its triangles do not bound a solid: the surface has holes, its
+        triangles are wound inconsistently or inside out.  Also when trimesh is not installed.
+    """
+    try:
+        stat = os.stat(path)
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror}") from None
+    if not path.lower().endswith(".stl"):
+        raise UsageError(f"{path}: only STL files (.stl) can be read")
+    if stat.st_size > SIZE:
+        raise UsageError(f"{path} has {stat.st_size} bytes; at most {SIZE}")
+    return _measure(os.path.abspath(path), stat.st_mtime_ns, stat.st_size)
+
+
+@lru_cache(maxsize=256)
+def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
+    try:
+        import trimesh
+    except ImportError:
+        raise UsageError("meshes need trimesh: pip install 'eomgen[mesh]', or pip install trimesh") from None
+    try:
+        mesh = trimesh.load(path, file_type="stl", force="mesh")
+    except Exception as error:  # whatever a parser meets in a broken file
+        raise UsageError(f"{path} is not an STL file that can be read ({error})") from None
+    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
+        raise UsageError(f"{path} holds no triangles, or vertices that are not finite")
+    if not mesh.is_watertight:
+        raise UsageError(f"{path} does not bound a solid: its surface has holes (edges of one triangle only)")
+    if not mesh.is_winding_consistent:
+        raise UsageError(f"{path} does not bound a solid: neighbouring triangles are wound in opposite senses")
+    measured = mesh.mass_properties
+    volume = float(measured["volume"])
+    if not volume > 0.0:
+        raise UsageError(f"{path} is inside out: its triangles face inwards, so the volume is {volume:.3g}")
+    centre = np.asarray(measured["center_mass"], dtype=float)
+    tensor = np.asarray(measured["inertia"], dtype=float)
+    tensor = 0.5 * (tensor + tensor.T)
+    x, y, z = centre.tolist()
+    return MeshProperties(volume, (x, y, z), tuple(tuple(row) for row in tensor.tolist()))
