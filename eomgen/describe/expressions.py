@@ -1,9 +1,9 @@
 """Stage describe, expressions: text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
-:data:`~eomgen.describe.names.FUNCTIONS` and, where markers can be resolved (in outputs), ``x y z vx vy vz ax ay az`` of
-a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.  Length, depth, size, numbers and exponents
-are bounded, so hostile text costs no more than honest text.
+:data:`~eomgen.describe.names.FUNCTIONS`, functions that the graph declares and, where markers can be resolved (in
+outputs), ``x y z vx vy vz ax ay az`` of a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
+Length, depth, size, numbers and exponents are bounded, so hostile text costs no more than honest text.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ class _Walker:
     def name(self, node: ast.Name) -> Expr:
         if node.id == "pi":
             return self.graph.constant(math.pi)
-        if node.id in FUNCTIONS:
+        if node.id in FUNCTIONS or node.id in self.graph.functions:
             raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
         try:
             return self.resolve(node.id)
@@ -228,20 +228,40 @@ class _Walker:
             raise self.fault(node, f"{name}() takes no keywords")
         if name in QUANTITIES and name not in FUNCTIONS:
             return self.quantity(node, name)
-        if name not in FUNCTIONS:
-            remedy = nearest(name, [*FUNCTIONS, *(QUANTITIES if self.locate else ())], "functions")
-            raise self.fault(node, f"unknown function {name!r}", remedy)
-        least, most = FUNCTIONS[name]
+        declared = self.graph.functions.get(name)
+        if name not in FUNCTIONS and declared is None:
+            known = [*FUNCTIONS, *self.graph.functions, *(QUANTITIES if self.locate else ())]
+            raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))
+        least, most = FUNCTIONS[name] if declared is None else (declared.arity, declared.arity)
         if not least <= len(node.args) <= most:
             number = f"{least}" if least == most else f"{least} or more"
             plural = "" if number == "1" else "s"
             raise self.fault(node, f"{name}() takes {number} argument{plural}, not {len(node.args)}", "")
+        if name == "diff":
+            return self.derivative(node, depth)
         arguments = [self.walk(argument, depth + 1) for argument in node.args]
+        if declared is not None:
+            zeros = (0,) * declared.arity
+            return Expr(self.graph, self.graph.call(declared, zeros, [x.id for x in arguments]))
         if name in ("min", "max"):
             return self.fold(node, name, arguments)
         if name == "heaviside":  # 0, 1/2 at 0, 1
             return 0.5 * (1.0 + self.apply(node, "sign", *arguments))
         return self.apply(node, "select" if name == "where" else name, *arguments)
+
+    def derivative(self, node: ast.Call, depth: int) -> Expr:
+        """``diff(f(x, y), 1, 0)``: a derivative of a declared function, one order for each of its arguments."""
+        call, *rest = node.args
+        name = call.func.id if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) else ""
+        declared = self.graph.functions.get(name)
+        if declared is None:
+            known = ", ".join(self.graph.functions) or "none"
+            raise self.fault(node, "diff() takes a call of a declared function", f"declared functions: {known}")
+        value = self.walk(call, depth + 1)
+        orders = [x.value for x in rest if isinstance(x, ast.Constant) and type(x.value) is int and x.value <= 3]
+        if len(orders) != len(rest) or len(orders) != declared.arity:
+            raise self.fault(node, f"diff() takes {declared.arity} order(s) after the call", "allowed: 0, 1, 2, 3")
+        return Expr(self.graph, self.graph.call(declared, tuple(map(int, orders)), value.node[1:]))
 
     def quantity(self, node: ast.Call, name: str) -> Expr:
         if self.locate is None:

@@ -11,6 +11,7 @@ from .build import build
 from .description import GROUND_NAME, SECTIONS, Description
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_forces import ForceMethods
+from .model_functions import FunctionMethods
 from .model_joints import JointMethods
 from .sympy_face import name_of, symbol
 
@@ -23,7 +24,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(JointMethods, ForceMethods):
+class Model(JointMethods, ForceMethods, FunctionMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
