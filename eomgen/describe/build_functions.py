@@ -32,7 +32,8 @@ def build_functions(reader: Reader, entries: list[Entry]) -> None:
         if function is None:
             arity = _arity_meant(entry)
             function = Function(str(entry.name), arity, Twin({(0,) * arity: lambda *arguments: 1.0}))
-        reader.graph.declare(function)
+        if reader.names.kinds.get(str(entry.name)) == "function":  # not taken by something else
+            reader.graph.declare(function)
 
 
 def _arity_meant(entry: Entry) -> int:

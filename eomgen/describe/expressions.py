@@ -65,7 +65,7 @@ _REFUSED: dict[type[ast.AST], str] = {
 }
 
 
-def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
+def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
     """The graph expression of a text.
 
     Parameters
@@ -78,6 +78,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         Gives the expression of a name.
     locate : callable, optional
         Gives the expression of a marker's motion; without it such calls are refused.
+    any_function : bool, optional
+        Whether functions that the graph does not declare pass; what they stand for has no meaning then.
 
     Returns
     -------
@@ -111,7 +113,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("a statement, not an expression", start + 1, ALLOWED, text)
-    return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
+    return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
 
 
 def names_in(text: str) -> list[str]:
@@ -123,7 +125,7 @@ def names_in(text: str) -> list[str]:
         return graph.symbol(name)
 
     try:
-        parse(text, graph, resolve)
+        parse(text, graph, resolve, any_function=True)
     except ExpressionError:
         return []
     return list(found)
@@ -132,8 +134,10 @@ def names_in(text: str) -> list[str]:
 class _Walker:
     """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
 
-    def __init__(self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None) -> None:
-        self.text, self.start, self.graph = text, start, graph
+    def __init__(
+        self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None, any_function: bool
+    ) -> None:
+        self.text, self.start, self.graph, self.any_function = text, start, graph, any_function
         self.resolve, self.locate = resolve, locate
         self.size = 0
 
@@ -229,6 +233,10 @@ class _Walker:
         if name in QUANTITIES and name not in FUNCTIONS:
             return self.quantity(node, name)
         declared = self.graph.functions.get(name)
+        if self.any_function and (name == "diff" or (name not in FUNCTIONS and declared is None)):
+            for argument in node.args:
+                self.walk(argument, depth + 1)
+            return self.graph.symbol("?")
         if name not in FUNCTIONS and declared is None:
             known = [*FUNCTIONS, *self.graph.functions, *(QUANTITIES if self.locate else ())]
             raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))

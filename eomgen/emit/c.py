@@ -22,7 +22,7 @@ def emit_c(program: Program) -> SourceSet:
     SourceSet
         ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.  A large model has
         further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
-        ``<name>_tables.c``, a native function ``f`` in ``<name>_native_f.c``.
+        ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
     printed = _print(program)
     parts = distribute(program, printed)

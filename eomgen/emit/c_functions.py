@@ -11,7 +11,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import UsageError
-from ..graph.core import Graph
 from ..graph.functions import Function
 from ..graph.traverse import reachable
 from ..numeric.functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
@@ -52,16 +51,13 @@ def declarations(program: Program, calls: Calls) -> list[str]:
 
 
 def function_files(program: Program, calls: Calls) -> dict[str, str]:
-    """The C files of the functions: one for all tables, one for each native function."""
+    """The C files of the functions: one for all tables, one for each source of native functions."""
     files = {}
     tables = [_table(program.name, f, used) for f, used in calls.values() if f.native is None]
     if tables:
         files[f"{program.name}_tables.c"] = render("c/tables.c.j2", {"name": program.name, "tables": tables})
-    for f, used in calls.values():
-        if f.native is not None:
-            files[f"{program.name}_native_{f.name}.c"] = render(
-                "c/native.c.j2", _native(program.graph, program.name, f, used)
-            )
+    for group in _by_source(calls):
+        files[f"{program.name}_native_{group[0][0].name}.c"] = render("c/native.c.j2", _native(program, group))
     return files
 
 
@@ -103,28 +99,39 @@ def _numbers(values: Sequence[float]) -> str:
     return ", ".join(repr(float(x)) for x in values)
 
 
-def _native(graph: Graph, program: str, function: Function, used: Sequence[Orders]) -> dict[str, object]:
-    """What the template of a native function shows."""
-    code = function.native
+def _by_source(calls: Calls) -> list[list[tuple[Function, list[Orders]]]]:
+    """Native functions of the same source together, so that what it defines is there once."""
+    groups: dict[str, list[tuple[Function, list[Orders]]]] = {}
+    for f, used in calls.values():
+        if f.native is not None:
+            groups.setdefault(f.native.text, []).append((f, used))
+    return list(groups.values())
+
+
+def _native(program: Program, group: Sequence[tuple[Function, list[Orders]]]) -> dict[str, object]:
+    """What the template of one source shows."""
+    first, code = group[0][0].name, group[0][0].native
     assert code is not None
-    known = dict(code.names)
-    # all functions of this source that the model knows, so that other copies of it can be linked with this one
-    copies = [f.native for f in graph.functions.values() if f.native is not None and f.native.text == code.text]
-    renamed = sorted({name for copy in copies for _, name in copy.names})
+    renamed: set[str] = set()
     wrappers: dict[str, str] = {}
-    for orders in used:
-        base = base_orders(orders, list(known))
-        differences = sum(orders) - sum(base)
-        call = _differences(program, function, orders, base, differences, known, wrappers)
-        names = ", ".join(f"x{k}" for k in range(function.arity))
-        head = f"EOMGEN_PIECE {_head(c_name(program, function.name, orders), function.arity)}"
-        wrappers[str(orders)] = f"{head};\n{head.removeprefix('EOMGEN_PIECE ')}\n{{\n    return {call}({names});\n}}\n"
+    for f, used in group:
+        assert f.native is not None
+        known = dict(f.native.names)
+        renamed.update(known.values())
+        for orders in used:
+            base = base_orders(orders, list(known))
+            differences = sum(orders) - sum(base)
+            call = _differences(program.name, f, orders, base, differences, known, wrappers)
+            head = _head(c_name(program.name, f.name, orders), f.arity)
+            arguments = ", ".join(f"x{k}" for k in range(f.arity))
+            wrappers[head] = f"EOMGEN_PIECE {head};\n{head}\n{{\n    return {call}({arguments});\n}}\n"
     return {
-        "name": program,
-        "function": function.name,
+        "name": program.name,
+        "functions": ", ".join(f.name for f, _ in group),
+        "first": first,
         "file": re.sub(r"[^\w.\-]", "_", code.file),
         "source": code.text if code.text.endswith("\n") else code.text + "\n",
-        "renamed": [(name, f"{program}_native_{function.name}_{name}") for name in renamed],
+        "renamed": [(name, f"{program.name}_native_{first}_{name}") for name in sorted(renamed)],
         "wrappers": list(wrappers.values()),
     }
 
