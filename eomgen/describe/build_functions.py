@@ -85,8 +85,13 @@ def _table(reader: Reader, entry: Entry) -> Function | None:
         y[-1] = y[0]
     if faults.under(path):
         return None
+    return curve_function(entry.name, x, y, kind, beyond == "linear")
+
+
+def curve_function(name: str, x: Array, y: Array, kind: str, linear: bool = True) -> Function:
+    """A function of one argument through checked points; ``linear`` is how it goes on beyond them."""
     period = float(x[-1] - x[0]) if kind == "periodic" else None
-    return Function(entry.name, 1, Curve(x, curve_coefficients(x, y, slopes(x, y, kind), beyond == "linear"), period))
+    return Function(name, 1, Curve(x, curve_coefficients(x, y, slopes(x, y, kind), linear), period))
 
 
 def _points(reader: Reader, path: str, given: Any) -> Array | None:

@@ -81,7 +81,9 @@ def _names(reader: Reader, entry: Entry, arity: int) -> list[tuple[Orders, str]]
         fault = fault_of_name(name, symbol=True)
         if fault:
             reader.faults.add(place, *fault)
-    if len({name for _, _, name in wanted if isinstance(name, str)}) < len(wanted):
+    if reader.faults.under(path):
+        return None
+    if len({name for _, _, name in wanted}) < len(wanted):
         reader.faults.add(path, "names one C function twice", "each derivative is a function of its own")
     return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
 

@@ -239,3 +239,21 @@ def test_twin_files_that_do_not_fit_are_told(sources: Path) -> None:
         eg.Model("m").native("f", "f.c", python="f.py", python_derivatives=[math.cos])
     with pytest.raises(UsageError, match="native has no argument 'sorce'"):
         eg.Model("m").native("f", sorce="f.c")  # type: ignore[call-arg]
+
+
+def test_long_models_in_several_files_call_functions_too(sources: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from dataclasses import replace
+
+    from eomgen.compilation import Options, compile_sources, load_core
+    from eomgen.emit import c_parts
+    from eomgen.runtime.module import Module
+
+    m = pendulum("-9.81*swing(q) - soft(q_dot)", full(sources))
+    x = np.array([0.4, 0.3])
+    expected = m.compile().rhs(0, x)
+    program = pipeline.build(m.derive())
+    monkeypatch.setattr(c_parts, "LENGTH", 100)
+    emitted = emit_c(replace(program, limits=replace(program.limits, statements=2)))
+    assert "swinging_part1.c" in emitted
+    module = Module(load_core(compile_sources(emitted, "swinging", Options(optimize=0))))
+    assert module.rhs(0, x).tolist() == expected.tolist()
