@@ -72,7 +72,10 @@ def _table(reader: Reader, entry: Entry) -> Function | None:
         z = _grid(reader, f"{path}.z", values["z"], len(x), len(y))
         if z is None or faults.under(path):
             return None
-        return Function(entry.name, 2, Surface(x, y, surface_nodes(x, y, z, kind), float(beyond == "linear")))
+        with np.errstate(all="ignore"):
+            nodes = surface_nodes(x, y, z, kind)
+        function = Function(entry.name, 2, Surface(x, y, nodes, float(beyond == "linear")))
+        return _finite(reader, path, function, nodes)
     if len(y) != len(x):
         faults.add(f"{path}.y", f"has {len(y)} values for {len(x)} points", "give one for each x")
     elif kind == "periodic":
@@ -85,7 +88,18 @@ def _table(reader: Reader, entry: Entry) -> Function | None:
         y[-1] = y[0]
     if faults.under(path):
         return None
-    return curve_function(entry.name, x, y, kind, beyond == "linear")
+    with np.errstate(all="ignore"):
+        curve = curve_function(entry.name, x, y, kind, beyond == "linear")
+    assert isinstance(curve.evaluator, Curve)
+    return _finite(reader, path, curve, curve.evaluator.coefficients)
+
+
+def _finite(reader: Reader, path: str, function: Function, numbers: Array) -> Function | None:
+    """The function, unless its slopes are too large for doubles."""
+    if np.isfinite(numbers).all():
+        return function
+    reader.faults.add(path, "is too steep for doubles", "scale its values or its points")
+    return None
 
 
 def curve_function(name: str, x: Array, y: Array, kind: str, linear: bool = True) -> Function:

@@ -101,6 +101,8 @@ BROKEN: list[tuple[str, str, str]] = [
         "functions.law.kind",
         "two",
     ),
+    ("  law: {type: table, x: [0, 1e-9, 1], y: [1e299, -1e299, 0]}", "functions.law", "is too steep for doubles"),
+    ("  law: {type: table, x: [0, 1e-9], y: [0, 1], z: [[9e299, -9e299], [0, 0]]}", "functions.law", "is too steep"),
     ("  2law: {type: table, x: [0, 1], y: [0, 1]}", "functions.2law", "is not an identifier"),
     ("  cos: {type: table, x: [0, 1], y: [0, 1]}", "functions.cos", "'cos' is a function"),
     ("  t: {type: table, x: [0, 1], y: [0, 1]}", "functions.t", "'t' is the time"),
