@@ -10,6 +10,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from .build_forces import build_forces
+from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .checks import check_connected, check_keys, check_names
@@ -54,6 +55,7 @@ def build(description: Description) -> Mechanism:
         faults.add("name", *fault)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])

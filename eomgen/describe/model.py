@@ -12,6 +12,7 @@ from .description import GROUND_NAME, SECTIONS, Description
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
 from .model_forces import ForceMethods
+from .model_functions import FunctionMethods
 from .model_joints import JointMethods
 from .model_totals import TotalMethods
 from .sympy_face import name_of, symbol
@@ -25,7 +26,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(BodyMethods, JointMethods, ForceMethods, TotalMethods):
+class Model(BodyMethods, JointMethods, ForceMethods, FunctionMethods, TotalMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
