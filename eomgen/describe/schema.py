@@ -83,6 +83,7 @@ _KINDS: dict[str, Schema] = {
     "marker": _ref("marker"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
+    "shape": _ref("vector"),
     "forces": {
         "anyOf": [
             {"type": "array", "items": _ref("expression")},
