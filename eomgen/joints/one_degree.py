@@ -93,9 +93,10 @@ class Screw(Joint):
         return [(unit(graph, 2), vec.scale(self.lead, unit(graph, 2)))]
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        """The turn that belongs to the advance z takes x_P to x_S: an equation that knows no full turns."""
+        """The angle from where the advance z wants x_S to where it is: an equation that knows no full turns."""
         turn = position[2] / self.lead
-        off = cos(turn) * rotation[1][0] - sin(turn) * rotation[0][0]
+        c, s = cos(turn), sin(turn)
+        off = atan2(c * rotation[1][0] - s * rotation[0][0], c * rotation[0][0] + s * rotation[1][0])
         return [*along(position, "xy"), *parallel_axes(rotation), Closure("thread", self.lead * off, "length")]
 
     def closure_in_turns(self, graph: Graph, rotation: Mat3, position: Vec3, turn: Expr) -> list[Closure]:

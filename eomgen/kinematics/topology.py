@@ -39,7 +39,7 @@ def _rank(spec: JointSpec, independent: Collection[str]) -> int:
         return -1
     if any(name in independent for name in spec.coordinates):
         return 0
-    return 1 if spec.named or not spec.coordinates else 2
+    return 1 if spec.named or not spec.coordinates or spec.joint.counts_turns else 2  # a thread is best kept whole
 
 
 class _Forest:
