@@ -1,8 +1,11 @@
 """Rotations: matrices, Euler angles and parameters, Rodrigues parameters, rotation vectors, quaternions, their rates.
 
 Every function takes numbers, SymPy expressions or graph expressions, as sequences, arrays or matrices, and answers
-in kind: NumPy arrays, SymPy matrices, or tuples of graph expressions.  A rotation matrix takes body axes to ground axes;
+in kind: NumPy arrays, SymPy matrices, or tuples of graph expressions.  A rotation matrix takes body to ground axes;
 quaternions and Euler parameters have the scalar first; angles are in radians.
+
+Numbers and graph expressions are right everywhere, at no rotation and half turns too.  SymPy answers with the general
+form, as textbooks do: it assumes e0 > 0 and an angle that is not 0, and may give angles a full turn off.
 
 >>> from eomgen import rotations
 >>> rotations.euler_angles_from_matrix("zxz", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(6) + 0

@@ -34,14 +34,16 @@ def apply(name: str, *x: Scalar) -> Scalar:
 
 
 def where_less(a: Scalar, b: Scalar, yes: Scalar, no: Scalar) -> Scalar:
-    """``yes`` where a < b, else ``no``."""
+    """``yes`` where a < b, else ``no``; in SymPy always ``no``, which every caller makes the general form.
+
+    Symbols then read as in textbooks; they say nothing of the exceptions: no rotation, half turns, further full turns.
+    """
     graph = next((value.graph for value in (a, b, yes, no) if isinstance(value, Expr)), None)
     if graph is not None:
         return graph.apply("select", graph.apply("lt", a, b), yes, no)
-    sympy = _sympy((a, b))
-    if sympy is None:
-        return yes if a < b else no
-    return sympy.Piecewise((yes, sympy.Lt(a, b)), (no, True))
+    if _sympy((a, b)) is not None:
+        return no
+    return yes if a < b else no
 
 
 def sin(x: Scalar) -> Scalar:
