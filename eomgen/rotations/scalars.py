@@ -99,7 +99,7 @@ def skew(a: Sequence[Scalar]) -> list[list[Scalar]]:
 def combine(one: Scalar, first: Scalar, second: Scalar, a: Sequence[Scalar]) -> list[list[Scalar]]:
     """one * I + first * skew(a) + second * a a^T."""
     tilde = skew(a)
-    return [[one * (i == j) + first * tilde[i][j] + second * (a[i] * a[j]) for j in range(3)] for i in range(3)]
+    return [[one * int(i == j) + first * tilde[i][j] + second * (a[i] * a[j]) for j in range(3)] for i in range(3)]
 
 
 # -- what comes in and goes out ---------------------------------------------------------------------------------------
