@@ -37,6 +37,8 @@ class Topology:
 def _rank(spec: JointSpec, independent: Collection[str]) -> int:
     if spec.joint.role == "tree":
         return -1
+    if spec.joint.role == "loop":
+        return 3
     if any(name in independent for name in spec.coordinates):
         return 0
     return 1 if spec.named or not spec.coordinates or spec.joint.counts_turns else 2  # a thread is best kept whole
