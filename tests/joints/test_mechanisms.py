@@ -121,7 +121,9 @@ def test_options_round_trip_through_a_file(tmp_path: Path) -> None:
     m.screw("w", a, b, pitch=p / 3, axis="x")
     m.distance("d", m.ground.at(1, 1, 1), b, length=2 * p)
     text = m.to_yaml()
-    assert "pitch: p/3" in text and "length: 2*p" in text and "surface: [" in text
+    assert "pitch: p/3" in text
+    assert "length: 2*p" in text
+    assert "surface: [" in text
     (tmp_path / "all.yaml").write_text(text, encoding="utf-8")
     assert eg.load(tmp_path / "all.yaml").to_yaml() == text
     assert m.check().degrees_of_freedom == 5
