@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,11 @@ from eomgen.describe.mechanism import Body, JointSpec, Mechanism
 from eomgen.forces import Actuator, Damper, Force, JointCoordinate, Line, PointForce, Spring
 from eomgen.frames import GROUND, Frame, Marker
 from eomgen.graph import Graph, vectors
-from eomgen.joints import JOINTS
+from eomgen.graph.core import Expr, cos, sin
+from eomgen.joints import JOINTS, Joint, Shape
 
-SPATIAL = tuple(JOINTS)
+#: Types that can be in the tree.
+SPATIAL = tuple(name for name, joint in JOINTS.items() if joint.role != "loop")
 PLANAR = ("revolute", "prismatic_x", "planar", "weld")
 
 
@@ -50,6 +53,31 @@ def frame(graph: Graph, placement: Placement) -> Frame:
     return Frame(matrix(graph, placement.rotation), vectors.vector(graph, placement.position.tolist()))
 
 
+def make_joint(graph: Graph, kind: str, names: Sequence[str]) -> Joint:
+    """A joint of a type, with options that exercise all of its terms."""
+    own = [graph.symbol(name) for name in names]
+    options: dict[str, Callable[[], object]] = {
+        "pitch": lambda: graph.constant(PITCH),
+        "length": lambda: graph.constant(LENGTH),
+        "curve": lambda: Shape(curve_point(own[0]), (own[0],)),
+        "surface": lambda: Shape(surface_point(own[0], own[1]), (own[0], own[1])),
+    }
+    return JOINTS[kind](**{key: options[key]() for key in JOINTS[kind].options if key in options})
+
+
+PITCH, LENGTH = 0.7, 1.3
+
+
+def curve_point(s: Expr) -> vectors.Vec3:
+    """A space curve: a wound and stretched helix."""
+    return (cos(2.0 * s) + 0.3 * s, 0.8 * sin(2.0 * s), s + 0.2 * s * s)
+
+
+def surface_point(u: Expr, v: Expr) -> vectors.Vec3:
+    """A bumpy saddle whose parameters are not at right angles."""
+    return (u + 0.2 * v, v + 0.1 * sin(u), u * v + 0.3 * u * u)
+
+
 def _inertia(random: np.random.Generator) -> np.ndarray:
     """A physical tensor: second moments of a cloud of points."""
     points = random.normal(size=(6, 3)) * random.uniform(0.1, 0.4, 3)
@@ -63,6 +91,7 @@ def random_mechanism(
     reverse: bool = False,
     forces: bool = True,
     loop: bool = False,
+    types: Sequence[str] = SPATIAL,
 ) -> Random:
     """A tree of mixed joints; ``loop`` adds a joint that closes a loop wherever the tree's zero position puts it."""
     random = np.random.default_rng(seed)
@@ -73,7 +102,7 @@ def random_mechanism(
     inner: list[Placement] = []
     for k in range(bodies):
         parents.append(int(random.integers(-1, k)) if random.random() < 0.5 else k - 1)
-        kinds.append(str(random.choice(("revolute", "prismatic", "revolute", "planar") if planar else SPATIAL)))
+        kinds.append(str(random.choice(("revolute", "prismatic", "revolute", "planar") if planar else types)))
         for side in (outer, inner):
             side.append(_placement(random, planar, kinds[-1], len(side) == 0))
     if all(kind == "weld" for kind in kinds):
@@ -86,11 +115,11 @@ def random_mechanism(
     gravity = np.array([0.3, -9.81, 0.0 if planar else 0.7])
     specs = []
     for k in range(bodies):
-        joint = JOINTS[kinds[k]]()
+        names = tuple(f"q{k}{c.suffix}" for c in JOINTS[kinds[k]].coordinates)
+        joint = make_joint(graph, kinds[k], names)
         a = Marker(parents[k], frame(graph, outer[k]), f"o{k}")
         b = Marker(k, frame(graph, inner[k]), f"i{k}")
         turned = reverse and random.random() < 0.5
-        names = tuple(f"q{k}{c.suffix}" for c in joint.coordinates)
         specs.append(JointSpec(f"q{k}", joint, *((b, a) if turned else (a, b)), names, False))
     elements: list[Force] = []
     if forces:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
+from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
-from ..joints import JOINTS, Joint
+from ..joints import JOINTS, Joint, Shape
 from .checks import check_names, unknown_key
 from .description import Entry, items
-from .fields import JOINT, JOINT_OPTIONS, KINDS, Field, joint_fields
+from .fields import JOINT, JOINT_OPTIONS, KINDS, MOTION, Field, joint_fields
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
@@ -21,7 +23,7 @@ from .sympy_face import name_of
 
 @dataclass(frozen=True)
 class Declared:
-    """A joint whose type and coordinates are known, before its markers are looked up."""
+    """A joint whose type and coordinates are known, before its markers and expressions are looked up."""
 
     entry: Entry
     joint: Joint
@@ -74,6 +76,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
     for joint in declared:
         path, values = joint.entry.path, joint.entry.values
         pair = reader.pair(f"{path}.between", values["between"]) if "between" in values else None
+        kind = _with_expressions(reader, joint)
         columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
         if pair is None:
             continue
@@ -87,7 +90,7 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
             pair = (_turned(pair[0], turn), _turned(pair[1], turn))
-        result.append(JointSpec(joint.entry.name, joint.joint, *pair, joint.coordinates, joint.named))
+        result.append(JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named))
     return tuple(result)
 
 
@@ -116,15 +119,65 @@ def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
             elsewhere = key in JOINT or key in JOINT_OPTIONS or key in ("axis", "coordinate", "coordinates")
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
             reader.faults.add(f"{entry.path}.{key}", message, unknown_key(key, fields))
-    if "between" not in entry.values:
-        reader.faults.add(f"{entry.path}.between", "is missing", f"give {KINDS['pair']}")
+    for key, field in fields.items():
+        if field.required and key not in entry.values and key != "type":
+            reader.faults.add(f"{entry.path}.{key}", "is missing", f"give {KINDS[field.kind]}")
     kind = JOINTS[type_name]
-    options = {}
+    options: dict[str, Any] = {}
     for option in kind.options:
-        if option in entry.values:
+        if fields[option].kind in _LATER:  # its names are not all known yet
+            options[option] = _LATER[fields[option].kind](reader)
+        elif option in entry.values:
             options[option] = _option(reader, f"{entry.path}.{option}", entry.values[option], fields[option])
     return kind(**options)
 
 
 def _option(reader: Reader, path: str, value: Any, field: Field) -> str:
     return reader.choice(path, value, field) if field.kind == "choice" else reader.text(path, value)
+
+
+#: Kinds of options that hold expressions, and what stands in for them until the names they use are declared.
+_LATER: dict[str, Callable[[Reader], Any]] = {
+    "expression": lambda reader: reader.stand_in,
+    "shape": lambda reader: Shape((reader.stand_in,) * 3, ()),
+}
+
+
+def _with_expressions(reader: Reader, declared: Declared) -> Joint:
+    """The joint with those of its options that are expressions."""
+    joint, entry = declared.joint, declared.entry
+    found: dict[str, Any] = {}
+    for option in joint.options:
+        kind, path = JOINT_OPTIONS[option].kind, f"{entry.path}.{option}"
+        if kind not in _LATER or option not in entry.values:
+            continue
+        if kind == "shape":
+            found[option] = _shape(reader, path, entry.values[option], declared.coordinates[: _PARAMETERS[option]])
+            continue
+        found[option] = reader.expression(path, entry.values[option])
+        if found[option].is_zero:
+            reader.faults.add(path, "is 0", f"{JOINT_OPTIONS[option].doc}; {_NOTHING[option]}")
+    return replace(joint, **found)
+
+
+_NOTHING = {
+    "pitch": "a screw without advance is a revolute joint",
+    "length": "a rod without length is a spherical joint",
+}
+
+
+_PARAMETERS = {"curve": 1, "surface": 2}
+
+
+def _shape(reader: Reader, path: str, value: Any, own: tuple[str, ...]) -> Shape:
+    """A point as expressions of parameters of the model and of the joint's own first coordinates."""
+    point = reader.vector(path, value, MOTION)
+    allowed = {*reader.names.of("parameter"), *own}
+    shown = " and ".join(own)
+    for name in sorted(symbols_of(point) - allowed):
+        if name in reader.names.kinds:
+            kind = reader.names.kinds[name]
+            reader.faults.add(path, f"the {kind} {name!r} cannot stand here", f"only parameters and {shown} can")
+    if not symbols_of(point) & set(own) and not reader.faults.under(path):
+        reader.faults.add(path, f"does not depend on {shown}", f"write it with the joint's own {shown}")
+    return Shape(point, tuple(reader.graph.symbol(name) for name in own))

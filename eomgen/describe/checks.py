@@ -51,8 +51,30 @@ def check_names(entries: Sequence[Entry], what: str, faults: Faults, reserved: S
 _PLURAL = {"body": "bodies"}
 
 
+#: Message and remedy for a body that only pure constraints (rods and the like) connect to ground.
+UNHELD = (
+    "only constraints without coordinates connect it to ground",
+    "add a joint that gives it coordinates; a body that otherwise moves freely has a joint of type free",
+)
+
+
 def check_connected(bodies: Sequence[Body], joints: Sequence[JointSpec], faults: Faults) -> None:
     """Note bodies that no chain of joints connects to ground."""
+    reached = _reached([joint for joint in joints if joint.joint.role != "loop"])
+    touched = _reached(joints)
+    for k, body in enumerate(bodies):
+        if k not in touched:
+            faults.add(
+                f"bodies.{body.name}",
+                "no chain of joints connects it to ground",
+                "add a joint; a body that moves freely has a joint of type free",
+            )
+        elif k not in reached:
+            faults.add(f"bodies.{body.name}", *UNHELD)
+
+
+def _reached(joints: Sequence[JointSpec]) -> set[int]:
+    """Bodies that these joints connect to ground."""
     neighbours: dict[int, list[int]] = {}
     for joint in joints:
         a, b = joint.predecessor.body, joint.successor.body
@@ -64,10 +86,4 @@ def check_connected(bodies: Sequence[Body], joints: Sequence[JointSpec], faults:
             if near not in reached:
                 reached.add(near)
                 waiting.append(near)
-    for k, body in enumerate(bodies):
-        if k not in reached:
-            faults.add(
-                f"bodies.{body.name}",
-                "no chain of joints connects it to ground",
-                "add a joint; a body that moves freely has a joint of type free",
-            )
+    return reached

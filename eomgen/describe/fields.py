@@ -66,6 +66,7 @@ KINDS = {
     "grid": "a list of lists of numbers, a row for each x",
     "count": "a whole number greater than 0",
     "functions": "a list of names of C functions, null for one that is not there",
+    "shape": "three expressions [x, y, z] of the joint's own first coordinates and of parameters",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -162,6 +163,10 @@ COORDINATE = Field("name", "name of the coordinate (the joint's name unless give
 COORDINATES = Field("names", "names of the coordinates, in order")
 JOINT_OPTIONS: Fields = {
     "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
+    "pitch": Field("expression", "advance in one turn (m), negative for a left-handed thread", required=True),
+    "length": Field("expression", "length of the rod (m)", required=True),
+    "curve": Field("shape", "point of the curve in the predecessor's axes (m), by the joint's s", required=True),
+    "surface": Field("shape", "point of the surface in the predecessor's axes (m), by the joint's u, v", required=True),
 }
 
 _ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")

@@ -39,7 +39,7 @@ class JointMethods:
         predecessor, successor : handle or str
             Bodies or markers.
         **keys
-            Whatever the type knows: axis, coordinate, coordinates, sequence.
+            Whatever the type knows: axis, coordinate, coordinates, sequence, pitch, length, curve, surface.
 
         Returns
         -------
@@ -110,6 +110,98 @@ class JointMethods:
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Fix two bodies to each other; see :meth:`joint`."""
         return self.joint("weld", name, predecessor, successor)
+
+    def screw(
+        self, name: str, predecessor: Any, successor: Any, pitch: Any, axis: Axis = "z", coordinate: Any = None
+    ) -> JointHandle:
+        """Add a joint that turns about an axis and slides along it by ``pitch`` (m) a turn; see :meth:`joint`."""
+        return self.joint("screw", name, predecessor, successor, pitch=pitch, axis=axis, coordinate=coordinate)
+
+    def universal(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinates: Sequence[Any] | None = None,
+    ) -> JointHandle:
+        """Add a Cardan joint between shafts along the axis.
+
+        With the default axis its cross turns about x of the predecessor and y of the successor; see :meth:`joint`.
+        """
+        return self.joint("universal", name, predecessor, successor, axis=axis, coordinates=coordinates)
+
+    def constant_velocity(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinates: Sequence[Any] | None = None,
+    ) -> JointHandle:
+        """Add a joint that bends across the axis and passes turning about it on evenly; see :meth:`joint`."""
+        return self.joint("constant_velocity", name, predecessor, successor, axis=axis, coordinates=coordinates)
+
+    def distance(self, name: str, predecessor: Any, successor: Any, length: Any) -> JointHandle:
+        """Hold two points ``length`` (m) apart by a massless rod: a pure constraint; see :meth:`joint`."""
+        return self.joint("distance", name, predecessor, successor, length=length)
+
+    def point_on_curve(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        curve: Sequence[Any],
+        sequence: str | None = None,
+        coordinates: Sequence[Any] | None = None,
+    ) -> JointHandle:
+        """Guide the successor's origin along a curve of the predecessor; it turns freely.
+
+        ``curve`` is a point [x, y, z] (m) by the joint's first coordinate, ``<name>_s`` unless named; see
+        :meth:`joint`, and :meth:`curve_slider` for a successor that does not turn.
+        """
+        return self.joint(
+            "point_on_curve",
+            name,
+            predecessor,
+            successor,
+            curve=curve,
+            sequence=sequence,
+            coordinates=coordinates,
+        )
+
+    def curve_slider(
+        self, name: str, predecessor: Any, successor: Any, curve: Sequence[Any], coordinate: Any = None
+    ) -> JointHandle:
+        """Guide the successor's origin along a curve of the predecessor, without turning: a bead on a wire.
+
+        ``curve`` is a point [x, y, z] (m) by the joint's coordinate; see :meth:`joint`.
+        """
+        return self.joint("curve_slider", name, predecessor, successor, curve=curve, coordinate=coordinate)
+
+    def point_on_surface(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        surface: Sequence[Any],
+        sequence: str | None = None,
+        coordinates: Sequence[Any] | None = None,
+    ) -> JointHandle:
+        """Guide the successor's origin on a surface of the predecessor; it turns freely.
+
+        ``surface`` is a point [x, y, z] (m) by the joint's first two coordinates, ``<name>_u`` and ``<name>_v`` unless
+        named; see :meth:`joint`, and the type ``surface_slider`` for a successor that does not turn.
+        """
+        return self.joint(
+            "point_on_surface",
+            name,
+            predecessor,
+            successor,
+            surface=surface,
+            sequence=sequence,
+            coordinates=coordinates,
+        )
 
     def _joint_method(self, type_name: str) -> Callable[..., JointHandle] | None:
         """A method for a type of joint that has none written out here."""

@@ -99,6 +99,7 @@ _KINDS: dict[str, Schema] = {
     "points": _ref("points"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
+    "shape": _ref("vector"),
     "forces": {
         "anyOf": [
             {"type": "array", "items": _ref("expression")},

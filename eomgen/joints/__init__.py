@@ -1,23 +1,66 @@
 """Joints: one short class a type; :data:`JOINTS` is the literal table of all of them."""
 
-from .base import Closure, Coordinate, Joint
+from .base import Closure, Coordinate, Joint, Shape
+from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
 from .many_degrees import Cylindrical, Free, Planar, Spherical, Weld
-from .one_degree import Prismatic, Revolute
+from .one_degree import Continuous, Prismatic, Revolute, Screw
+from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
+from .two_angles import ConstantVelocity, Universal
 
 JOINTS: dict[str, type[Joint]] = {
-    joint.type_name: joint for joint in (Revolute, Prismatic, Cylindrical, Spherical, Planar, Free, Weld)
+    joint.type_name: joint
+    for joint in (
+        Revolute,
+        Continuous,
+        Prismatic,
+        Screw,
+        Cylindrical,
+        Universal,
+        ConstantVelocity,
+        Spherical,
+        Planar,
+        CurveSlider,
+        SurfaceSlider,
+        PointOnCurve,
+        PointOnSurface,
+        Free,
+        Weld,
+        Distance,
+        RevoluteSpherical,
+        Inline,
+        Inplane,
+        Parallel,
+        Perpendicular,
+        Orientation,
+    )
 }
 
 __all__ = [
     "JOINTS",
     "Closure",
+    "ConstantVelocity",
+    "Continuous",
     "Coordinate",
+    "CurveSlider",
     "Cylindrical",
+    "Distance",
     "Free",
+    "Inline",
+    "Inplane",
     "Joint",
+    "Orientation",
+    "Parallel",
+    "Perpendicular",
     "Planar",
+    "PointOnCurve",
+    "PointOnSurface",
     "Prismatic",
     "Revolute",
+    "RevoluteSpherical",
+    "Screw",
+    "Shape",
     "Spherical",
+    "SurfaceSlider",
+    "Universal",
     "Weld",
 ]

@@ -30,6 +30,13 @@ class Closure(NamedTuple):
     kind: str
 
 
+class Shape(NamedTuple):
+    """A curve or surface: a point (m) as expressions of one or two parameters, which are symbols in them."""
+
+    point: Vec3
+    parameters: tuple[Expr, ...]
+
+
 @dataclass(frozen=True)
 class Joint(ABC):
     """Questions every joint type answers.
@@ -40,12 +47,22 @@ class Joint(ABC):
     has_axis : whether ``axis=`` is accepted
     options : names of further keywords of this type (fields of the dataclass)
     coordinates : the coordinates, in order
+    role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
+        cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
+    counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
     """
 
     type_name: ClassVar[str]
     has_axis: ClassVar[bool] = True
+    role: ClassVar[str] = "either"
+    counts_turns: ClassVar[bool] = False
     options: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
+
+    @property
+    def allows(self) -> int:
+        """The relative degrees of freedom the joint leaves, of six."""
+        return len(self.coordinates)
 
     @abstractmethod
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -62,6 +79,10 @@ class Joint(ABC):
     @abstractmethod
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         """The coordinates as functions of a relative pose the joint allows."""
+
+    def closure_in_turns(self, graph: Graph, rotation: Mat3, position: Vec3, turn: Expr) -> list[Closure]:
+        """The closure where ``turn``, the angle of S about the z axis of P, is known beyond half a turn."""
+        return self.closure(graph, rotation, position)
 
     def aligned(self, rotation: Mat3) -> list[Expr]:
         """Expressions that must be positive: the closure equations alone also admit anti-parallel axes."""

@@ -1,13 +1,14 @@
-"""Joints of one degree of freedom: revolute (turn about z) and prismatic (slide along z)."""
+"""Joints of one degree of freedom: revolute (turn about z), prismatic (slide along z), screw (both in proportion)."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, atan2
+from ..graph.core import Expr, Graph, atan2, cos, sin
 from ..graph.vectors import Mat3, Vec3
 from .base import Closure, Coordinate, Joint
 from .closures import along, parallel_axes, same_orientation
@@ -38,6 +39,13 @@ class Revolute(Joint):
 
 
 @dataclass(frozen=True)
+class Continuous(Revolute):
+    """A revolute joint without limits, as URDF calls it.  Allows 1, removes 5."""
+
+    type_name: ClassVar[str] = "continuous"
+
+
+@dataclass(frozen=True)
 class Prismatic(Joint):
     """Slides along the common z axis without turning.  Allows 1, removes 5."""
 
@@ -58,3 +66,45 @@ class Prismatic(Joint):
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return [position[2]]
+
+
+@dataclass(frozen=True)
+class Screw(Joint):
+    """Turns about the common z axis and slides along it by ``pitch`` (m) a turn.  Allows 1, removes 5.
+
+    The coordinate is the angle; a positive pitch is a right-handed thread (Shabana, sec. 7.7, screw joint).
+    """
+
+    type_name: ClassVar[str] = "screw"
+    options: ClassVar[tuple[str, ...]] = ("pitch",)
+    counts_turns: ClassVar[bool] = True
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
+    pitch: Expr
+
+    @property
+    def lead(self) -> Expr:
+        """Advance per radian (m)."""
+        return self.pitch / (2 * math.pi)
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return about(graph, 2, q[0]), (graph.zero, graph.zero, self.lead * q[0])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(unit(graph, 2), vec.scale(self.lead, unit(graph, 2)))]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        """The angle from where the advance z wants x_S to where it is: an equation that knows no full turns."""
+        turn = position[2] / self.lead
+        c, s = cos(turn), sin(turn)
+        off = atan2(c * rotation[1][0] - s * rotation[0][0], c * rotation[0][0] + s * rotation[1][0])
+        return [*along(position, "xy"), *parallel_axes(rotation), Closure("thread", self.lead * off, "length")]
+
+    def closure_in_turns(self, graph: Graph, rotation: Mat3, position: Vec3, turn: Expr) -> list[Closure]:
+        thread = Closure("thread", position[2] - self.lead * turn, "length")
+        return [*along(position, "xy"), *parallel_axes(rotation), thread]
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [position[2] / self.lead]

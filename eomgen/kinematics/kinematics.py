@@ -21,7 +21,10 @@ from .tree import Link, Poses, Twist, build_links, link_twists
 
 @dataclass(frozen=True)
 class LoopCoordinates:
-    """Coordinates y of cut joints as functions of the tree: values, rates, accelerations and dy/dq (n_k rows)."""
+    """Coordinates y of cut joints as functions of the tree: values, rates, accelerations and dy/dq (n_k rows).
+
+    Kinds are 'length', 'angle' (equal up to full turns) and 'turn' (an angle that counts full turns).
+    """
 
     names: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
@@ -116,7 +119,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         wrapping += loop_part.wrapping
         aligned += [(spec.name, condition) for condition in loop_part.aligned]
         loop_names += spec.coordinates
-        loop_kinds += [c.kind for c in spec.joint.coordinates]
+        loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
     constraints = differentiate_constraints(graph, rows, aligned, (q, v, t))
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))

@@ -65,7 +65,12 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
     gap = vec.sub(inner.position, outer.position)
     position = vec.transpose_times(outer.rotation, gap)
-    rows = spec.joint.closure(graph, rotation, position)
+    angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
+    turns = sum_of_turns(graph, rotation, q) if len(angles) == 1 else None
+    if turns is not None:
+        rows = spec.joint.closure_in_turns(graph, rotation, position, turns[0])
+    else:
+        rows = spec.joint.closure(graph, rotation, position)
     if {r.label for r in rows} >= {
         "r_x",
         "r_y",
@@ -74,12 +79,10 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)
-    angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
-    turns = sum_of_turns(graph, rotation, q) if len(angles) == 1 else None
     if turns is not None:
         measured[angles[0]] = turns[0]
     labelled = [Row(f"{spec.name}.{r.label}", r.expression, r.kind) for r in rows]
-    wrapping = [] if turns is not None else [spec.coordinates[k] for k in angles]
+    wrapping = [] if turns is not None or spec.joint.counts_turns else [spec.coordinates[k] for k in angles]
     return ClosedLoop(labelled, measured, spec.joint.aligned(rotation), wrapping)
 
 

@@ -118,7 +118,7 @@ class ConstraintFunctions:
         picked = [j for j, n in enumerate(loop.names) if n in wanted]
         if not picked:
             return None
-        scale = {"length": self.length_scale, "angle": 1.0}
+        scale = {"length": self.length_scale, "angle": 1.0, "turn": 1.0}
 
         def measure(q: Array) -> tuple[Array, Array]:
             y, y_q = self.loop(q)

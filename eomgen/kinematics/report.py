@@ -108,9 +108,9 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     names = ["ground", *(b.name for b in m.bodies)]
     spatial = planar = None
     if m.lagrangian is None:
-        freedoms = [len(j.coordinates) for j in m.joints]
+        freedoms = [j.joint.allows for j in m.joints]
         spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms)
-        if _moves_in_a_plane(kinematics):
+        if _moves_in_a_plane(kinematics) and all(j.joint.role != "loop" for j in m.joints):
             planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
     return MechanismReport(
         name=m.name,

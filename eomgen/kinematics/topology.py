@@ -2,7 +2,7 @@
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
 coordinates the user did not name before one they named; among equals the one that leaves the shortest chains; then
-the last declared.
+the last declared.  Pure constraints (a rod) are always cut, joints that cannot be cut (a point on a curve) never.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from ..describe.checks import UNHELD
 from ..describe.mechanism import JointSpec, Mechanism
+from ..errors import ModelError
 from ..frames import GROUND
 
 
@@ -33,9 +35,13 @@ class Topology:
 
 
 def _rank(spec: JointSpec, independent: Collection[str]) -> int:
+    if spec.joint.role == "tree":
+        return -1
+    if spec.joint.role == "loop":
+        return 3
     if any(name in independent for name in spec.coordinates):
         return 0
-    return 1 if spec.named or not spec.coordinates else 2
+    return 1 if spec.named or not spec.coordinates or spec.joint.counts_turns else 2  # a thread is best kept whole
 
 
 class _Forest:
@@ -104,6 +110,21 @@ def _length(branches: Sequence[Branch]) -> int:
     return sum(depth.values())
 
 
+def _check_tree(mechanism: Mechanism, tree: Collection[int], branches: Sequence[Branch]) -> None:
+    problems = []
+    for k, spec in enumerate(mechanism.joints):
+        if spec.joint.role == "tree" and k not in tree:
+            message = f"a {spec.joint.type_name} joint cannot close a loop, and all joints of its loop are of that kind"
+            remedy = "let one joint of the loop be of another type"
+            problems.append(mechanism.problem(f"joints.{spec.name}", message, remedy))
+    held = {branch.body for branch in branches}
+    for k, body in enumerate(mechanism.bodies):
+        if k not in held:
+            problems.append(mechanism.problem(f"bodies.{body.name}", *UNHELD))
+    if problems:
+        raise ModelError(problems)
+
+
 def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> Topology:
     """Choose the spanning tree.
 
@@ -113,13 +134,19 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
         Every body must be connected to ground (the description checks it).
     independent : names of coordinates
         Joints bearing one of these are kept in the tree first.
+
+    Raises
+    ------
+    ModelError
+        A loop has only joints that cannot be cut, or a body is held by pure constraints alone.
     """
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
     rank = [_rank(spec, independent) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
-    tree = {k for k in order if forest.join(*_ends(joints[k]))}
+    tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)
+    _check_tree(mechanism, tree, branches)
     improved = True
     while improved:
         improved = False

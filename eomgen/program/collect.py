@@ -103,7 +103,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     velocities = [n + "_dot" for n in names]
     units: dict[str, str] = {}
     for name, kind in (*zip(names, kinematics.kinds, strict=True), *zip(loop.names, loop.kinds, strict=True)):
-        unit = {"angle": "rad", "length": "m"}[kind]
+        unit = {"angle": "rad", "turn": "rad", "length": "m"}[kind]
         units |= {name: unit, f"{name}_dot": f"{unit}/s", f"{name}_ddot": f"{unit}/s^2"}
     if m.lagrangian is not None:
         units = {}

@@ -58,8 +58,8 @@ class Layout:
         kinds: Sequence[str] = data.get("loop_kinds") or [
             "length" if self.units.get(name) == "m" else "angle" for name in self.loops
         ]
-        self.loop_angles = np.array([kind != "length" for kind in kinds], dtype=bool)
-        self.loop_scales = np.where(self.loop_angles, 1.0, self.length)
+        self.loop_angles = np.array([kind == "angle" for kind in kinds], dtype=bool)  # known up to full turns
+        self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in kinds])
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
         reference = data.get("q_reference")

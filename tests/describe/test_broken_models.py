@@ -71,7 +71,7 @@ BROKEN = [
     ("axis: x", "axis: [0, 0, 0]", 19, "joints.D.axis", "no length", "three numbers"),
     ("axis: x", "axes: x", 19, "joints.D.axes", "unknown key", "did you mean 'axis'?"),
     ("type: prismatic", "type: prismatik", 19, "joints.D.type", "no joint of type 'prismatik'", "'prismatic'"),
-    ("{type: prismatic, ", "{", 19, "joints.D.type", "is missing", "revolute, prismatic"),
+    ("{type: prismatic, ", "{", 19, "joints.D.type", "is missing", "revolute, continuous"),
     ("between: [ground, slider], axis", "axis", 19, "joints.D.between", "is missing", "two markers"),
     ("between: [ground, slider], axis", "between: [ground], axis", 19, "joints.D.between", "is not a list of two", ""),
     (

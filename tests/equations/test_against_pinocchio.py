@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from mechanisms import Random, random_mechanism
+from mechanisms import PITCH, Random, random_mechanism
 
 from eomgen.equations import METHODS
 from eomgen.frames import Frame, Marker
@@ -14,6 +14,9 @@ from eomgen.kinematics import analyse
 
 STEPS = {
     "revolute": "RZ",
+    "continuous": "RZ",
+    "screw": "HZ",
+    "universal": "RX RY",
     "prismatic": "PZ",
     "cylindrical": "PZ RZ",
     "planar": "PX PY RZ",
@@ -33,7 +36,8 @@ def pinocchio_model(made: Random, bodies: list[int]) -> tuple[pin.Model, dict[in
         joint, base = holders[made.parents[k]] if made.parents[k] >= 0 else (0, pin.SE3.Identity())
         at = base * pin.SE3(made.outer[k].rotation, made.outer[k].position)
         for s, step in enumerate(STEPS[made.kinds[k]].split()):
-            joint = model.addJoint(joint, getattr(pin, f"JointModel{step}")(), at, f"j{k}_{s}")
+            pitch = (PITCH / (2 * np.pi),) if step == "HZ" else ()
+            joint = model.addJoint(joint, getattr(pin, f"JointModel{step}")(*pitch), at, f"j{k}_{s}")
             at = pin.SE3.Identity()
         body = at * pin.SE3(made.inner[k].rotation, made.inner[k].position).inverse()
         model.appendBodyToJoint(joint, pin.Inertia(made.masses[k], made.centers[k], made.inertias[k]), body)
@@ -46,7 +50,7 @@ def pinocchio_model(made: Random, bodies: list[int]) -> tuple[pin.Model, dict[in
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
-    made = random_mechanism(seed, bodies=1 + seed % 6, planar=planar, forces=False)
+    made = random_mechanism(seed, bodies=1 + seed % 6, planar=planar, forces=False, types=tuple(STEPS))
     kinematics = analyse(made.mechanism)
     tree = METHODS[method](kinematics)
     model, frames = pinocchio_model(made, [b.body for b in kinematics.topology.branches])

@@ -1,0 +1,135 @@
+"""Joints whose successor's origin is guided by a curve or a surface of the predecessor; they stay in the tree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jvp
+from ..graph.substitute import substitute
+from ..graph.vectors import Mat3, Vec3
+from .base import Closure, Coordinate, Joint, Shape
+from .rotations import euler, euler_rates
+
+ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
+ALONG_CURVE = (Coordinate("_s", "length"),)
+ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
+
+
+@dataclass(frozen=True)
+class Guide(Joint):
+    """The origin of S is at a point r of P that depends on the first coordinates, the parameters of the shape.
+
+    The parameters cannot be told from a pose without solving equations, so such a joint never closes a loop: another
+    joint of the loop is cut.  Singular where the derivatives of r by its parameters vanish or are parallel.
+    """
+
+    role: ClassVar[str] = "tree"
+    has_axis: ClassVar[bool] = False
+
+    @property
+    def shape(self) -> Shape:
+        """The point r and its parameters."""
+        raise NotImplementedError
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""
+        return vec.identity(graph), []
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q)[0], self._at(q, self.shape.point)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        rotation, rates = self.turn(graph, q)
+        o = vec.zero(graph)
+        point, parameters = self.shape
+        columns = []
+        for parameter in parameters:
+            x, y, z = jvp(list(point), {parameter: graph.one})
+            columns.append((o, vec.transpose_times(rotation, self._at(q, (x, y, z)))))
+        return [*columns, *((rate, o) for rate in rates)]
+
+    def _at(self, q: Sequence[Expr], point: Vec3) -> Vec3:
+        parameters = self.shape.parameters
+        x, y, z = substitute(list(point), dict(zip(parameters, q[: len(parameters)], strict=True)))
+        return (x, y, z)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        raise TypeError(f"a {self.type_name} joint cannot be cut")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        raise TypeError(f"a {self.type_name} joint cannot be cut")
+
+
+class Turning(Guide):
+    """A guide on which S also turns freely about its origin, in Euler angles."""
+
+    sequence: str
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
+        angles = q[len(self.shape.parameters) :]
+        return euler(graph, self.sequence, angles), euler_rates(graph, self.sequence, angles)
+
+
+@dataclass(frozen=True)
+class CurveSlider(Guide):
+    """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
+
+    type_name: ClassVar[str] = "curve_slider"
+    options: ClassVar[tuple[str, ...]] = ("curve",)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
+    curve: Shape
+
+    @property
+    def shape(self) -> Shape:
+        return self.curve
+
+
+@dataclass(frozen=True)
+class SurfaceSlider(Guide):
+    """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
+
+    type_name: ClassVar[str] = "surface_slider"
+    options: ClassVar[tuple[str, ...]] = ("surface",)
+    coordinates: ClassVar[tuple[Coordinate, ...]] = ON_SURFACE
+    surface: Shape
+
+    @property
+    def shape(self) -> Shape:
+        return self.surface
+
+
+@dataclass(frozen=True)
+class PointOnCurve(Turning):
+    """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
+
+    A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
+    """
+
+    type_name: ClassVar[str] = "point_on_curve"
+    options: ClassVar[tuple[str, ...]] = ("curve", "sequence")
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (*ALONG_CURVE, *ANGLES)
+    curve: Shape
+    sequence: str = "xyz"
+
+    @property
+    def shape(self) -> Shape:
+        return self.curve
+
+
+@dataclass(frozen=True)
+class PointOnSurface(Turning):
+    """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
+
+    type_name: ClassVar[str] = "point_on_surface"
+    options: ClassVar[tuple[str, ...]] = ("surface", "sequence")
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (*ON_SURFACE, *ANGLES)
+    surface: Shape
+    sequence: str = "xyz"
+
+    @property
+    def shape(self) -> Shape:
+        return self.surface

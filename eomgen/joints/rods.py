@@ -1,0 +1,131 @@
+"""Pure constraints between two bodies that other joints hold: massless rods and the elementary conditions on axes.
+
+They have no coordinates and always close a loop (Shabana, ch. 7: basic constraints; the primitive joints of ADAMS).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+from .base import Closure, Joint
+from .closures import along, parallel_axes, same_orientation
+
+
+@dataclass(frozen=True)
+class Constraint(Joint):
+    """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
+
+    role: ClassVar[str] = "loop"
+    removes: ClassVar[int]
+
+    @property
+    def allows(self) -> int:
+        return 6 - self.removes
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        raise TypeError(f"a {self.type_name} joint cannot be in the tree")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return []
+
+
+def apart(length: Expr, position: Vec3) -> Closure:
+    """The origins are ``length`` apart: (r . r - l^2) / 2 l = 0, whose gradient is a unit vector there."""
+    return Closure("length", (vec.dot(position, position) - length * length) / (2.0 * length), "length")
+
+
+@dataclass(frozen=True)
+class Distance(Constraint):
+    """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
+
+    type_name: ClassVar[str] = "distance"
+    has_axis: ClassVar[bool] = False
+    options: ClassVar[tuple[str, ...]] = ("length",)
+    removes: ClassVar[int] = 1
+    length: Expr
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [apart(self.length, position)]
+
+
+@dataclass(frozen=True)
+class RevoluteSpherical(Constraint):
+    """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
+
+    type_name: ClassVar[str] = "revolute_spherical"
+    options: ClassVar[tuple[str, ...]] = ("length",)
+    removes: ClassVar[int] = 2
+    length: Expr
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [apart(self.length, position), *along(position, "z")]
+
+
+@dataclass(frozen=True)
+class Inline(Constraint):
+    """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
+
+    type_name: ClassVar[str] = "inline"
+    removes: ClassVar[int] = 2
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xy")
+
+
+@dataclass(frozen=True)
+class Inplane(Constraint):
+    """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
+
+    type_name: ClassVar[str] = "inplane"
+    removes: ClassVar[int] = 1
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "z")
+
+
+@dataclass(frozen=True)
+class Parallel(Constraint):
+    """The z axes stay parallel.  Allows 4, removes 2."""
+
+    type_name: ClassVar[str] = "parallel"
+    removes: ClassVar[int] = 2
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return parallel_axes(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[2][2]]
+
+
+@dataclass(frozen=True)
+class Perpendicular(Constraint):
+    """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
+
+    type_name: ClassVar[str] = "perpendicular"
+    removes: ClassVar[int] = 1
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return [Closure("z.z", rotation[2][2], "angle")]
+
+
+@dataclass(frozen=True)
+class Orientation(Constraint):
+    """All axes stay parallel, the origins are free: S does not turn against P.  Allows 3, removes 3."""
+
+    type_name: ClassVar[str] = "orientation"
+    has_axis: ClassVar[bool] = False
+    removes: ClassVar[int] = 3
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
