@@ -101,6 +101,12 @@ COORDINATE = Field("name", "name of the coordinate (the joint's name unless give
 COORDINATES = Field("names", "names of the coordinates, in order")
 JOINT_OPTIONS: Fields = {
     "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
+    "rotation": Field(
+        "choice",
+        "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
+        default="euler_angles",
+        choices=("euler_angles", "euler_parameters"),
+    ),
 }
 
 _ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")

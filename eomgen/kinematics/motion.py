@@ -10,6 +10,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
+from .state import State
 from .tree import Poses, Twist
 from .turns import sum_of_turns
 
@@ -29,16 +30,14 @@ class Motion:
         self,
         poses: Poses,
         twists: Sequence[Twist],
-        state: tuple[Sequence[Expr], Sequence[Expr], Sequence[Expr], Expr],
+        state: State,
         coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
     ) -> None:
         self.graph = poses.graph
         self.poses = poses
         self.twists = twists
         self.coordinates = coordinates
-        q, v, a, t = state
-        self.q, self.v = q, v
-        self._along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True)) | {t: self.graph.one}
+        self.state = state
 
     def position(self, marker: Marker) -> Vec3:
         """Origin of the marker, ground axes (m)."""
@@ -66,7 +65,7 @@ class Motion:
 
     def acceleration(self, marker: Marker) -> Vec3:
         """Acceleration of the marker's origin, ground axes (m/s^2)."""
-        x, y, z = jvp(list(self.velocity(marker)), self._along)
+        x, y, z = jvp(list(self.velocity(marker)), self.state.along)
         return (x, y, z)
 
     def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
@@ -77,12 +76,12 @@ class Motion:
         base = self.poses.common(start, end)
         outer = self.poses.marker(start, base).rotation
         rotation = vec.product(vec.transpose(outer), self.poses.marker(end, base).rotation)
-        found = sum_of_turns(self.graph, rotation, self.q)
+        found = sum_of_turns(self.graph, rotation, self.state.q)
         if found is not None:
             angle, terms = found
             rate = self.graph.zero
             for j, factor in terms:
-                rate = rate + factor * self.v[j]
+                rate = rate + factor * self.state.rates[j]
             return angle, rate, True
         axis = vec.transpose(self.rotation(start))[2]
         relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))

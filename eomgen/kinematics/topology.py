@@ -33,7 +33,7 @@ class Topology:
 
 
 def _rank(spec: JointSpec, independent: Collection[str]) -> int:
-    if any(name in independent for name in spec.coordinates):
+    if any(name in independent for name in (*spec.coordinates, *spec.velocities)):
         return 0
     return 1 if spec.named or not spec.coordinates else 2
 

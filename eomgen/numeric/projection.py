@@ -73,12 +73,12 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
             raise NonFiniteError("the constraints are not finite")
         if step == STEPS:
             break
-        J = scales.jacobian(C_q)
+        J = scales.jacobian(C_q[: len(e)])
         dz = J.T @ gram_solve(J, e, max(TIKHONOV, size))
         longest = largest(dz)
         if longest > DAMPING:
             dz *= DAMPING / longest
-        q = q - scales.q * dz
+        q = scales.move(q, -dz)
         before = size
     if size <= ACCEPTED:
         return q, C_q
