@@ -104,7 +104,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Lagrangian:
-    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0."""
+    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0.
+
+    A constraint that contains velocities is linear in them.
+    """
 
     coordinates: tuple[str, ...]
     expression: Expr

@@ -22,6 +22,7 @@ from ..numeric import (
     rank,
 )
 from ..numeric.scales import Space
+from ..numeric.space import settle
 from ..numeric.closure import Equations, System, close
 from .kinematics import Kinematics
 
@@ -121,8 +122,8 @@ class ConstraintFunctions:
 
     def settle(self, values: Mapping[str, float]) -> dict[str, float]:
         """Named values with all four Euler parameters of a rotation where some are given."""
-        names, space = self.kinematics.names, self.scales.space
-        return dict(values) if space is None else space.settle(names, values)
+        k, loop = self.kinematics, self.kinematics.loop_coordinates
+        return settle((*k.names, *loop.names), (*k.kinds, *loop.kinds), values)
 
     def _equations(self, wanted: Mapping[str, float]) -> Equations | None:
         """Values for coordinates of cut joints as equations."""

@@ -107,31 +107,39 @@ class Space(NamedTuple):
         result[[i for i, _ in self.balls]] = 1.0
         return result
 
-    def settle(self, names: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:
-        """Named coordinates with all four Euler parameters of a ball where some are given.
 
-        Those left out are 0; together they must have length 1, up to rounding.
+def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, float]) -> dict[str, float]:
+    """Named coordinates with all four Euler parameters of a rotation where some are given.
 
-        Raises
-        ------
-        AssemblyError
-            They have not.
-        """
-        result = dict(values)
-        for i, _ in self.balls:
-            four = names[i : i + 4]
-            if not any(name in values for name in four):
-                continue
-            e = np.array([values.get(name, 0.0) for name in four])
-            length = float(np.sqrt(e @ e))
-            if not abs(length - 1.0) <= ROUNDING:
-                shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
-                raise AssemblyError(
-                    f"the Euler parameters {shown} have length {length:.6g} and must have length 1 (those not given "
-                    f"are 0): give {four[0]} = cos(angle/2) and {four[1]} .. {four[3]} = axis * sin(angle/2)"
-                )
-            result.update(zip(four, (e / length).tolist(), strict=True))
-        return result
+    Those left out are 0; together they must have length 1, up to rounding.
+
+    Parameters
+    ----------
+    names, kinds : sequences of str
+        Coordinates; the kind of Euler parameters, which come in fours, is ``"parameter"``.
+    values : mapping of str to float
+
+    Raises
+    ------
+    AssemblyError
+        They have another length.
+    """
+    result = dict(values)
+    parameters = [name for name, kind in zip(names, kinds, strict=True) if kind == "parameter"]
+    for k in range(0, len(parameters), 4):
+        four = parameters[k : k + 4]
+        if not any(name in values for name in four):
+            continue
+        e = np.array([values.get(name, 0.0) for name in four])
+        length = float(np.sqrt(e @ e))
+        if not abs(length - 1.0) <= ROUNDING:
+            shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
+            raise AssemblyError(
+                f"the Euler parameters {shown} have length {length:.6g} and must have length 1 (those not given are 0): "
+                f"give {four[0]} = cos(angle/2) and {four[1]} .. {four[3]} = axis * sin(angle/2)"
+            )
+        result.update(zip(four, (e / length).tolist(), strict=True))
+    return result
 
 
 def _turn(e: Array, w: Array) -> Array:

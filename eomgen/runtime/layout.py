@@ -58,12 +58,17 @@ class Layout:
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
+        self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
+        self.velocity_kinds = tuple(kinds)
         self.length: float = float(data.get("length_scale") or 1.0)
         self.scales = Scales.of_kinds(kinds, data.get("constraint_kinds", ()), self.length, self.space)
+        #: coordinates of the independent velocities, where each is the rate of one
+        self.independent_q = self.scales.coordinates(self.independent)
         self.units: dict[str, str] = data.get("units", {})
         loop_kinds: Sequence[str] = data.get("loop_kinds") or [
             "length" if self.units.get(name) == "m" else "angle" for name in self.loops
         ]
+        self.loop_kinds = tuple(loop_kinds)
         self.loop_angles = np.array([kind == "angle" for kind in loop_kinds], dtype=bool)
         self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in loop_kinds])
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
@@ -71,6 +76,25 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+
+    def require_minimal_form(self) -> None:
+        """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.
+
+        Raises
+        ------
+        UsageError
+        """
+        turning = [self.v[i] for i in self.independent if self.freedoms[i] == self.v[i]]
+        if self.n_h < self.n_c:
+            reason = "nonholonomic constraints restrict velocities and not positions"
+        elif turning:
+            reason = f"the independent {', '.join(turning)} are rates of no coordinate (rotation: euler_parameters)"
+        else:
+            return
+        remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
+        if turning:
+            remedy += "; or choose other independent coordinates, or rotation: euler_angles"
+        raise UsageError(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
