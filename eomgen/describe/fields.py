@@ -163,7 +163,9 @@ LAGRANGIAN: Fields = {
     "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
     "forces": Field("forces", "generalized forces", default=(), level=MOTION),
     "dissipation": Field("expression", "Rayleigh's dissipation function", default=0, level=MOTION),
-    "constraints": Field("expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION),
+    "constraints": Field(
+        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    ),
 }
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),

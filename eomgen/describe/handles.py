@@ -9,8 +9,8 @@ from ..errors import UsageError
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Entry, label_of
-from .scope import RATES
 from .mechanism import velocity_names
+from .scope import RATES
 from .sympy_face import symbol
 
 if TYPE_CHECKING:

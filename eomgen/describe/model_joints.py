@@ -83,7 +83,7 @@ class JointMethods:
         coordinates: Sequence[Any] | None = None,
         rotation: str | None = None,
     ) -> JointHandle:
-        """Add a ball joint in Euler angles (intrinsic, ``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
+        """Add a ball joint, in Euler angles (``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
         keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
         return self.joint("spherical", name, predecessor, successor, **keys)
 

@@ -1,10 +1,10 @@
 """Stage equations: Kinematics -> TreeEquations by Lagrange's equations, differentiated on the graph.
 
-d/dt (dT/dv) - dT/dq + dV/dq = Q (Shabana, Computational Dynamics, sec. 4.4 ff.).  Where q' = N v, for Euler parameters,
-d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v with the angular velocities w in body axes (Boltzmann and Hamel;
-Meirovitch, Methods of Analytical Dynamics, sec. 4.13, with the structure constants of the rotations).  T and V come from the velocity
+d/dt (dT/dv) - dT/dq + dV/dq = Q (Shabana, Computational Dynamics, sec. 4.4 ff.).  T and V come from the velocity
 recursion and are linear in the number of bodies; one reverse gradient and one forward derivative keep the equations
-linear too.  A bare Lagrangian goes the same way.
+linear too.  A bare Lagrangian goes the same way.  Where q' = N v, for Euler parameters, the equations are those of
+Boltzmann and Hamel with the structure constants of rotations, w being angular velocities in turned axes:
+d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Analytical Dynamics, 1970, sec. 4.13).
 """
 
 from __future__ import annotations

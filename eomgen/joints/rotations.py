@@ -1,4 +1,4 @@
-"""Joints: elementary rotations, Euler angles, Euler parameters as expressions (Shabana, Computational Dynamics, ch. 7)."""
+"""Joints: rotations, Euler angles and Euler parameters as expressions (Shabana, Computational Dynamics, ch. 7)."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from functools import cached_property
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring, Turn
+from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
@@ -145,7 +146,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     second = jvp(list(rates), state.along) if layout.balls else a
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
-    motion = Motion(poses, twists, state, coordinates)
+    motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
@@ -170,6 +171,16 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
         length_scale=_length_scale(mechanism),
     )
+
+
+def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker, Marker, int]]:
+    """Angular velocities that cut joints in Euler parameters would have as velocities."""
+    found = {}
+    for spec in (mechanism.joints[k] for k in topology.cut):
+        for ball in spec.joint.balls:
+            for axis, name in enumerate(spec.velocities[ball.velocity : ball.velocity + 3]):
+                found[name] = (spec.predecessor, spec.successor, axis)
+    return found
 
 
 def _loop_coordinates(

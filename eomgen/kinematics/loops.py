@@ -20,9 +20,9 @@ from .turns import sum_of_turns
 class Constraints:
     """C(q, t) = 0 and its derivatives (Shabana, ch. 3): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
 
-    C_q stands for the derivative of C' by v, which is dC/dq N where q' = N v.  Nonholonomic rows A(q, t) v + b(q, t) = 0
-    come after the holonomic ones and have no value C: for them C_q is A and C_t is b.  Rows that vanish identically are
-    left out and listed in ``vanishing``; redundant ones stay.
+    C_q stands for the derivative of C' by v, dC/dq N where q' = N v.  Nonholonomic rows A(q, t) v + b(q, t) = 0
+    come after the holonomic ones and have no value C: for them C_q is A and C_t is b.  Rows that vanish identically
+    are left out and listed in ``vanishing``; redundant ones stay.
     """
 
     labels: tuple[str, ...] = ()

@@ -21,9 +21,9 @@ from ..numeric import (
     independent_rows,
     rank,
 )
+from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
-from ..numeric.closure import Equations, System, close
 from .kinematics import Kinematics
 
 Array = NDArray[np.float64]
@@ -252,13 +252,13 @@ def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mob
         trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
         attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
         try:
-            bent = functions.scales.move(functions.neutral, 0.3 + 0.1 * np.arange(functions.n))
+            bent = functions.scales.move(functions.neutral, 0.3 + 0.1 * np.arange(float(functions.n)))
             q = attempt.close({}, dict(zip(functions.kinematics.names, bent, strict=True))).q
         except AssemblyError:
             continue
         return _partition(attempt, [q, *_probe(attempt, q)], wanted)
     generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, functions.n))
-    return _partition(functions, [functions.scales.move(zero, step) for step in generic], wanted)
+    return _partition(functions, [functions.scales.move(zero, step) for step in generic.astype(float)], wanted)
 
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:

@@ -24,6 +24,8 @@ class Motion:
     ----------
     coordinates : mapping
         ``name -> (value, rate, acceleration)`` of every joint coordinate, tree and cut.
+    turning : mapping, optional
+        ``name -> (predecessor, successor, axis)`` of the angular velocities that are velocities of cut joints.
     """
 
     def __init__(
@@ -32,12 +34,14 @@ class Motion:
         twists: Sequence[Twist],
         state: State,
         coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
+        turning: Mapping[str, tuple[Marker, Marker, int]] | None = None,
     ) -> None:
         self.graph = poses.graph
         self.poses = poses
         self.twists = twists
         self.coordinates = coordinates
         self.state = state
+        self.turning = turning or {}
 
     def position(self, marker: Marker) -> Vec3:
         """Origin of the marker, ground axes (m)."""
@@ -105,6 +109,12 @@ class Motion:
                 symbol = self.graph.symbol(name + suffix)
                 if name + suffix in used and symbol != value:
                     mapping[symbol] = value
+        for name, (start, end, axis) in self.turning.items():
+            if name in used or f"{name}_dot" in used:
+                relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
+                value = vec.transpose_times(self.rotation(end), relative)[axis]
+                mapping[self.graph.symbol(name)] = value
+                mapping[self.graph.symbol(f"{name}_dot")] = jvp([value], self.state.along)[0]
         look = (self.position, self.velocity, self.acceleration)
         for name, quantity in mechanism.quantities.items():
             if name in used:

@@ -102,7 +102,9 @@ def rhs(
     """x' = [q', a] (n_x,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
     q, v = project(position, rate, q, v, scales)
     here = terms(q, v)
-    return np.concatenate([scales.rates(q, v), accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))])
+    return np.concatenate(
+        [scales.rates(q, v), accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))]
+    )
 
 
 class Residuals(NamedTuple):

@@ -115,6 +115,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "y_names": [o.name for o in m.outputs],
         "body_names": [b.name for b in m.bodies],
         "joint_names": [j.name for j in m.joints],
+        "euler_angles": _euler_angles(kinematics),
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),
         "loop_kinds": list(loop.kinds),
@@ -142,6 +143,18 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "atol": m.simulation.atol,
         },
     }
+
+
+def _euler_angles(kinematics: Kinematics) -> list[list[Any]]:
+    """Tree joints in Euler angles: name, middle angle's place in q, and where it is singular: cos or sin = 0."""
+    found: list[list[Any]] = []
+    for branch in kinematics.topology.branches:
+        spec = kinematics.mechanism.joints[branch.joint]
+        sequence = getattr(spec.joint, "sequence", None)
+        if sequence is not None and not spec.joint.balls:
+            vanishing = "sin" if sequence[0] == sequence[2] else "cos"
+            found.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
+    return found
 
 
 def _numbers(kinematics: Kinematics, which: str) -> dict[str, float]:

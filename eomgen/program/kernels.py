@@ -59,7 +59,9 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
     Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
-    Kernel("kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"),
+    Kernel(
+        "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
+    ),
     Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),

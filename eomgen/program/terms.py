@@ -15,7 +15,8 @@ class SystemTerms:
     """A mechanism's equations as expressions of one graph, with the names of their symbols.
 
     n is the number of velocities, m the number of constraint rows, redundant ones included.  There are as many
-    coordinates, with q' = v, but for Euler parameters, where q' = N(q) v.  Quantities at acceleration level use the symbols `a`, multipliers do not appear in any expression.
+    coordinates, with q' = v, but for Euler parameters, where q' = N(q) v.  Quantities at acceleration level use the
+    symbols `a`, multipliers do not appear in any expression.
     """
 
     graph: Graph

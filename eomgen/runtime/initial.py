@@ -301,7 +301,7 @@ class Initial:
         return {name: value for name, value in kept.items() if name not in torn}
 
     def _row(self, q: Array, name: str) -> list[Array]:
-        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, and none for e1 .. e3."""
+        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
         layout, unit = self.layout, np.eye(self.layout.n_v)
         if name in layout.v:
             return [unit[layout.v.index(name)]]

@@ -330,13 +330,7 @@ class Module:
 
     @cached_property
     def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``; see :class:`~.minimal.Minimal`.
-
-        Raises
-        ------
-        UsageError
-            The model has none: nonholonomic constraints, or an independent angular velocity.
-        """
+        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
         from .minimal import Minimal
 
         self.layout.require_minimal_form()

@@ -79,6 +79,12 @@ class Columns:
         y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
         angles = layout.loop_angles
         y[0, angles] = np.unwrap(y[0, angles], axis=-1)
+        parameters = [k for k, kind in enumerate(layout.loop_kinds) if kind == "parameter"]
+        for k in range(0, len(parameters), 4):  # e and -e are one rotation: the nearer one goes on
+            four = parameters[k : k + 4]
+            e = y[0, four]
+            turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
+            y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_k, -1)
 
     @cached_property
