@@ -146,7 +146,7 @@ def test_a_chosen_angular_velocity_keeps_its_joint_in_the_tree() -> None:
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_spatial_slider_crank(target: str) -> None:
-    """iftomm_spatial_slider_crank.json (Haug; EXUDYN): a spherical joint in Euler parameters, universal joint by hand."""
+    """iftomm_spatial_slider_crank.json (Haug; EXUDYN): spherical joint in Euler parameters, universal one by hand."""
     case = reference("iftomm_spatial_slider_crank")
     p, start = case["parameters_SI"], case["initial_conditions"]
     m = eg.Model("spatial", gravity=(0, 0, -p["g"]))

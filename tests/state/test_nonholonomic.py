@@ -66,7 +66,7 @@ def disc_model() -> eg.Model:
 
 def newton_euler_disc(_: float, s: np.ndarray) -> np.ndarray:
     """Disc of unit mass ratio by Newton and Euler about the contact point, in the axes of lean (r = 0.5, g = 9.81)."""
-    X, Y, psi, theta, phi, a, b, c = s  # a = theta', b = spin about the axle, c = psi' cos(theta)
+    _, _, psi, theta, _, a, b, c = s  # a = theta', b = spin about the axle, c = psi' cos(theta)
     r, g = 0.5, 9.81
     psi_dot = c / np.cos(theta)
     frame = np.array([a, psi_dot * np.sin(theta), c])
@@ -100,6 +100,8 @@ def test_rolling_disc(target: str) -> None:
     np.testing.assert_allclose(traj.x[:5, -1], judge.y[:5, -1], atol=1e-8)
     assert traj.energy_drift < 1e-10
     assert traj.residuals.velocity < 1e-11
+    assert module.velocity_constraints(traj.x).shape == (2, len(traj.t))
+    assert np.abs(module.velocity_constraints(traj.x, rows="all")).max() < 1e-13
 
 
 def test_rolling_disc_in_steady_circles() -> None:
@@ -138,6 +140,7 @@ def test_jacobian_projection_and_multipliers(target: str) -> None:
 
 def test_holonomic_and_nonholonomic_rows_together_and_driven() -> None:
     """A skate whose centre is also led along a moving circle; sideways speed prescribed: both levels, both with t."""
+
     def rows(x: Any, y: Any, phi: Any) -> list[Any]:
         return [x.diff(t) * sp.sin(phi) - y.diff(t) * sp.cos(phi) - sp.Rational(1, 10) * sp.cos(t),
                 x**2 + y**2 - (1 + sp.sin(t) / 5) ** 2]  # fmt: skip

@@ -86,7 +86,7 @@ def test_tree_equals_pinocchio(seed: int, method: str) -> None:
         tau = pin.rnea(model, data, theirs, v, a)
         np.testing.assert_allclose(module.inverse_dynamics(q, v, a), tau, atol=1e-11 * np.abs(tau).max())
         T, V = module.energy(np.concatenate([q, v]))
-        assert T == pytest.approx(pin.computeKineticEnergy(model, data, theirs, v), rel=1e-11)
+        assert pytest.approx(pin.computeKineticEnergy(model, data, theirs, v), rel=1e-11) == T
         offsets.append(V - pin.computePotentialEnergy(model, data, theirs))  # welded to ground: a constant of ours
     assert np.ptp(offsets) < 1e-11 * max(1.0, np.abs(offsets).max())
 
