@@ -90,6 +90,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     for name, kind in (*zip(names, kinematics.kinds, strict=True), *zip(loop.names, loop.kinds, strict=True)):
         unit = {"angle": "rad", "length": "m", "parameter": "1"}[kind]
         units |= {name: unit, f"{name}_dot": f"{unit}/s", f"{name}_ddot": f"{unit}/s^2"}
+        if kind == "parameter":
+            del units[name]
     for _, j in kinematics.balls:
         for name in velocities[j : j + 3]:
             units |= {name: "rad/s", acceleration_name(name): "rad/s^2"}
