@@ -53,10 +53,11 @@ def frame(graph: Graph, placement: Placement) -> Frame:
     return Frame(matrix(graph, placement.rotation), vectors.vector(graph, placement.position.tolist()))
 
 
-def make_joint(graph: Graph, kind: str, names: Sequence[str]) -> Joint:
+def make_joint(graph: Graph, kind: str, names: Sequence[str], rotation: str = "euler_angles") -> Joint:
     """A joint of a type, with options that exercise all of its terms."""
     own = [graph.symbol(name) for name in names]
     options: dict[str, Callable[[], object]] = {
+        "rotation": lambda: rotation,
         "pitch": lambda: graph.constant(PITCH),
         "length": lambda: graph.constant(LENGTH),
         "curve": lambda: Shape(curve_point(own[0]), (own[0],)),
@@ -92,8 +93,12 @@ def random_mechanism(
     forces: bool = True,
     loop: bool = False,
     types: Sequence[str] = SPATIAL,
+    rotation: str = "euler_angles",
 ) -> Random:
-    """A tree of mixed joints; ``loop`` adds a joint that closes a loop wherever the tree's zero position puts it."""
+    """A tree of mixed joints; ``loop`` adds a joint that closes a loop wherever the tree's zero position puts it.
+
+    ``rotation`` is that of spherical and free joints.
+    """
     random = np.random.default_rng(seed)
     graph = Graph()
     parents: list[int] = []
@@ -116,14 +121,14 @@ def random_mechanism(
     specs = []
     for k in range(bodies):
         names = tuple(f"q{k}{c.suffix}" for c in JOINTS[kinds[k]].coordinates)
-        joint = make_joint(graph, kinds[k], names)
+        joint = make_joint(graph, kinds[k], names, rotation)
         a = Marker(parents[k], frame(graph, outer[k]), f"o{k}")
         b = Marker(k, frame(graph, inner[k]), f"i{k}")
         turned = reverse and random.random() < 0.5
         specs.append(JointSpec(f"q{k}", joint, *((b, a) if turned else (a, b)), names, False))
     elements: list[Force] = []
     if forces:
-        coordinates = [c for s in specs for c in s.coordinates]
+        coordinates = [c for s in specs for c in s.coordinates if s.coordinates and not s.joint.balls]
         here = Marker(bodies - 1, frame(graph, _placement(random, planar, "", False)), "here")
         there = Marker(GROUND, Frame(vectors.identity(graph), vectors.vector(graph, (3.0, 2.0, 0.0))), "there")
         line, along = Line(there, here), JointCoordinate(coordinates[0])

@@ -167,6 +167,12 @@ JOINT_OPTIONS: Fields = {
     "length": Field("expression", "length of the rod (m)", required=True),
     "curve": Field("shape", "point of the curve in the predecessor's axes (m), by the joint's s", required=True),
     "surface": Field("shape", "point of the surface in the predecessor's axes (m), by the joint's u, v", required=True),
+    "rotation": Field(
+        "choice",
+        "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
+        default="euler_angles",
+        choices=("euler_angles", "euler_parameters"),
+    ),
 }
 
 _ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")
@@ -223,7 +229,9 @@ LAGRANGIAN: Fields = {
     "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
     "forces": Field("forces", "generalized forces", default=(), level=MOTION),
     "dissipation": Field("expression", "Rayleigh's dissipation function", default=0, level=MOTION),
-    "constraints": Field("expressions", "holonomic constraints, each = 0", default=(), level=MOTION),
+    "constraints": Field(
+        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    ),
 }
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),

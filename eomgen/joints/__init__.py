@@ -1,10 +1,11 @@
 """Joints: one short class a type; :data:`JOINTS` is the literal table of all of them."""
 
-from .base import Closure, Coordinate, Joint, Shape
+from .base import Ball, Closure, Coordinate, Joint, Shape, Velocity
 from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
-from .many_degrees import Cylindrical, Free, Planar, Spherical, Weld
+from .many_degrees import Cylindrical, Planar, Weld
 from .one_degree import Continuous, Prismatic, Revolute, Screw
 from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
+from .turning import Free, Spherical
 from .two_angles import ConstantVelocity, Universal
 
 JOINTS: dict[str, type[Joint]] = {
@@ -37,6 +38,7 @@ JOINTS: dict[str, type[Joint]] = {
 
 __all__ = [
     "JOINTS",
+    "Ball",
     "Closure",
     "ConstantVelocity",
     "Continuous",
@@ -62,5 +64,6 @@ __all__ = [
     "Spherical",
     "SurfaceSlider",
     "Universal",
+    "Velocity",
     "Weld",
 ]

@@ -1,8 +1,9 @@
 """Stage kinematics: Mechanism -> Topology, the spanning tree and the joints that close loops.
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
-coordinates the user did not name before one they named; among equals the one that leaves the shortest chains; then
-the last declared.  Pure constraints (a rod) are always cut, joints that cannot be cut (a point on a curve) never.
+coordinates the user did not name (and whose angular velocity they did not give) before one they named; among equals
+the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are always cut, joints that
+cannot be cut (a point on a curve) never.
 """
 
 from __future__ import annotations
@@ -34,14 +35,16 @@ class Topology:
     cut: tuple[int, ...]
 
 
-def _rank(spec: JointSpec, independent: Collection[str]) -> int:
+def _rank(spec: JointSpec, independent: Collection[str], initial: Collection[str]) -> int:
     if spec.joint.role == "tree":
         return -1
     if spec.joint.role == "loop":
         return 3
-    if any(name in independent for name in spec.coordinates):
+    if any(name in independent for name in (*spec.coordinates, *spec.velocities)):
         return 0
-    return 1 if spec.named or not spec.coordinates or spec.joint.counts_turns else 2  # a thread is best kept whole
+    if spec.joint.counts_turns:  # a thread is best kept whole
+        return 1
+    return 1 if spec.named or not spec.coordinates or any(name in initial for name in spec.velocities) else 2
 
 
 class _Forest:
@@ -142,7 +145,9 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     """
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
-    rank = [_rank(spec, independent) for spec in joints]
+    rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
+    given = rates.intersection(mechanism.initial)
+    rank = [_rank(spec, independent, given) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
     tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)

@@ -37,8 +37,9 @@ class Kernels:
         self.layout = layout
         self.context = core.context(p, u, UsageError)
         self.fail = Fail(layout, self._culprit)
-        self.constraints = Rows(self.state("constraints"), layout.rows)
+        self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
+        self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
@@ -52,7 +53,7 @@ class Kernels:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
             if layout.rank == 0 and name == "project":
-                return Identity(layout.n_x)
+                return Identity(layout.n_x, [i for i, _ in layout.balls])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
         kernel: State = self._make(self.core.state, name, nan)
@@ -77,17 +78,18 @@ class Kernels:
                 return ""
             values, vectors = np.linalg.eigh(M)
             weights = np.abs(vectors[:, 0])
-            names = [layout.q[i] for i, w in zip(layout.independent, weights, strict=True) if w > 0.1 * weights.max()]
+            moved = zip(layout.independent, weights, strict=True)
+            names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
             moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
             return f"moving {moving} meets no inertia (smallest eigenvalue {values[0]:.2g})"
         if status == 3:
             e = self.state("constraints", nan=True)(q, t=t)
             if not np.isfinite(e).all() or not e.size:
                 return ""
-            worst = int(np.abs(e / layout.scales.c).argmax())
+            worst = int(np.abs(layout.scales.residual(e)).argmax())
             return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
         if status == 4:
-            return f"independent are {', '.join(layout.q[i] for i in layout.independent)}"
+            return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
         return ""
 
 
@@ -130,7 +132,7 @@ class Rows:
 
         Parameters
         ----------
-        q : (n_q,) or (n_q, k) array
+        q : (n_q,) or (n_q, k) array; x, (n_x,) or (n_x, k), for velocity_constraints
         p, u : arrays, optional
         out : array, optional
         t : float
@@ -172,10 +174,11 @@ class Constant:
 
 
 class Identity(Constant):
-    """The projection of a tree: nothing to do."""
+    """The projection of a tree: nothing to do but for the length of Euler parameters, which start at ``balls``."""
 
-    def __init__(self, n_in: int) -> None:
+    def __init__(self, n_in: int, balls: Sequence[int] = ()) -> None:
         super().__init__(np.zeros(n_in), n_in)
+        self.balls = balls
 
     def __call__(
         self,
@@ -186,8 +189,10 @@ class Identity(Constant):
         t: ArrayLike = 0.0,
     ) -> Array:
         """A copy of x."""
-        result = super().__call__(x, out=out)
-        return _write(result, np.asarray(x, dtype=float))
+        result = _write(super().__call__(x, out=out), np.asarray(x, dtype=float))
+        for i in self.balls:
+            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+        return result
 
 
 class Selected:

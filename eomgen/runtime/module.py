@@ -27,10 +27,10 @@ class Module(Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
-    ``x_names``.  Every state may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last
-    axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None``
-    to write into; calls of positions alone take ``t=0.0`` too.  A call that fails raises an
-    :class:`~..errors.EvaluationError` with the time and the state.
+    ``x_names``; q' = v but for Euler parameters.  Every state may be one (n,) or a batch (n, k) of k states as columns;
+    results then carry the same last axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound
+    here by default, and ``out=None`` to write into; calls of positions alone take ``t=0.0`` too.  A call that fails
+    raises an :class:`~..errors.EvaluationError` with the time and the state.
 
     Parameters
     ----------
@@ -63,8 +63,9 @@ class Module(Momenta):
         ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.
     energy : callable
         ``energy(x)`` -> (T, V) in J.
-    constraints, constraint_jacobian : callable
-        ``constraints(q)`` -> (n_c,) in m and rad, (n_c, n_v): independent rows; ``rows="all"`` for all of them.
+    constraints, constraint_jacobian, velocity_constraints : callable
+        ``constraints(q)`` -> C of the holonomic rows (m, rad), C_q (n_c, n_v), ``velocity_constraints(x)`` ->
+        C_q v + C_t: independent rows, the holonomic ones first; ``rows="all"`` for redundant ones too.
     project : callable
         ``project(x, t=0.0)`` -> the nearest x on the constraints.
     poses : callable
@@ -83,6 +84,7 @@ class Module(Momenta):
     inverse_dynamics: Motion
     constraints: Rows
     constraint_jacobian: Rows
+    velocity_constraints: Rows
 
     def __init__(self, core: Core, p: Any = None, u: Any = None) -> None:
         self.core = core
@@ -109,13 +111,12 @@ class Module(Momenta):
         self.n_c, self.n_rows = len(layout.rows), layout.n_c
         self.rhs, self.jacobian = kernels.timed("rhs"), kernels.timed("jacobian")
         self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
-        self.mass_matrix, self.embedded_mass_matrix = (
-            kernels.state("mass_matrix"),
-            kernels.state("embedded_mass_matrix"),
-        )
+        self.mass_matrix = kernels.state("mass_matrix")
+        self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")
         self.energy, self.project, self.poses = (kernels.state(name) for name in ("energy", "project", "poses"))
         self.inverse_dynamics = kernels.motion("inverse_dynamics")
         self.constraints, self.constraint_jacobian = kernels.constraints, kernels.constraint_jacobian
+        self.velocity_constraints = kernels.velocity_constraints
 
     @property
     def p(self) -> Array:
@@ -226,7 +227,7 @@ class Module(Momenta):
         given = initial.sort(values)
         if given.rates:
             raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
-        return initial.from_guess(values) if values else initial.assembled({})
+        return initial.from_guess(given.positions) if values else initial.assembled({})
 
     def branches(
         self,
@@ -315,23 +316,25 @@ class Module(Momenta):
 
         Raises
         ------
-        ProjectionError, PartitionError
-            The position is out of reach, or the way to it leads through a dead centre.
+        ProjectionError, PartitionError, UsageError
+            The position is out of reach, or the way to it leads through a dead centre; or there is no minimal form
+            (nonholonomic constraints, an independent angular velocity).
         """
+        self.layout.require_minimal_form()
         if p is not None or u is not None:
             return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
         from .paths import motions
 
         path, reference = self._path
         start = None if guess is None else np.asarray(guess, dtype=float)
-        q, v, a = motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
-        return q, v, a
+        return motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
 
     @cached_property
     def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``; see :class:`~.minimal.Minimal`."""
+        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
         from .minimal import Minimal
 
+        self.layout.require_minimal_form()
         return Minimal(self)
 
     # integration
