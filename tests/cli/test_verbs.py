@@ -14,7 +14,8 @@ from .conftest import EXAMPLES, Call
 
 REPORT_KEYS = {
     "name", "bodies", "joints", "tree", "loop_joints", "coordinates", "loop_coordinates", "independent", "dependent",
-    "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "gruebler_kutzbach",
+    "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "configuration_freedoms",
+    "nonholonomic", "gruebler_kutzbach",
     "gruebler_kutzbach_planar", "redundant", "conditioning", "length_scale", "reference", "assumed",
     "assembly_restarts",
 }  # fmt: skip
