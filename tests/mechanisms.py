@@ -122,6 +122,7 @@ def random_mechanism(
     for k in range(bodies):
         names = tuple(f"q{k}{c.suffix}" for c in JOINTS[kinds[k]].coordinates)
         joint = make_joint(graph, kinds[k], names, rotation)
+        names = tuple(f"q{k}{c.suffix}" for c in joint.coordinates)
         a = Marker(parents[k], frame(graph, outer[k]), f"o{k}")
         b = Marker(k, frame(graph, inner[k]), f"i{k}")
         turned = reverse and random.random() < 0.5
