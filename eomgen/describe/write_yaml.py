@@ -74,7 +74,9 @@ def _is_default(key: str, value: Any) -> bool:
 def _value(value: Any) -> str:
     if value is None:
         return "null"
-    if isinstance(value, bool) or not isinstance(value, numbers.Real | str | Mapping | list | tuple):
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
         listed = items(value)
         if listed is not None:
             return _value(listed)

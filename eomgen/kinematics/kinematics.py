@@ -13,6 +13,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
+from .couplings import couple
 from .loops import Constraints, close_loop, differentiate_constraints, lagrangian_rows
 from .motion import Motion
 from .topology import Topology, find_topology
@@ -66,6 +67,8 @@ class Kinematics:
     loop_coordinates: LoopCoordinates
     forces: tuple[ForceTerms, ...]
     length_scale: Expr
+    coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
+    hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
 
     @property
     def graph(self) -> Graph:
@@ -118,11 +121,12 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_names += spec.coordinates
         loop_kinds += [c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
-    constraints = differentiate_constraints(graph, rows, aligned, (q, v, t))
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))
     coordinates = {n: (q[j], v[j], a[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, (q, v, a, t), coordinates)
+    coupled = couple(mechanism, motion)
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, (q, v, t))
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
@@ -139,6 +143,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         twists=twists,
         motion=motion,
         constraints=constraints,
+        coupled=tuple(row.label for row in coupled.rows),
+        hints=tuple(coupled.hints),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
         length_scale=_length_scale(mechanism),
@@ -234,6 +240,11 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
                 message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
                 remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
                 problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+    for constraint in mechanism.constraints:
+        for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
+            message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+            remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
     if problems:
         raise ModelError(problems)
 

@@ -41,6 +41,7 @@ class Row:
     label: str
     expression: Expr
     kind: str
+    level: str = "position"  #: 'velocity' for a nonholonomic one, held at velocity level only
 
 
 class ClosedLoop(NamedTuple):

@@ -80,6 +80,7 @@ class ConstraintFunctions:
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
+        self._hints = self._compile([value for _, value in kinematics.hints])
         (length,) = self._compile([kinematics.length_scale])(np.zeros(self.n))
         self.length_scale = float(length)
         self.scales = Scales.of_kinds(kinematics.kinds, c.kinds, self.length_scale)
@@ -141,6 +142,9 @@ class ConstraintFunctions:
         if rough is not None:  # come near the guessed coordinates of cut joints first
             free = np.array([0.0 if n in given else 1.0 for n in k.names])
             start = close(System(self.position, self.scales, free, rough), start)[0]
+        for (name, _), value in zip(k.hints, self._hints(start), strict=True):
+            if name not in given and name not in guess:
+                start[k.names.index(name)] = value
         equations = self._equations(given)
         return assemble(
             self.position,

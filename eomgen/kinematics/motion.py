@@ -17,7 +17,7 @@ COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 
 
 class Motion:
-    """Implements :class:`eomgen.forces.View`, and resolves every derived symbol of a mechanism.
+    """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
 
     Parameters
     ----------
@@ -39,6 +39,13 @@ class Motion:
         q, v, a, t = state
         self.q, self.v = q, v
         self._along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True)) | {t: self.graph.one}
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        base = self.poses.common(start, end)
+        outer, inner = self.poses.marker(start, base), self.poses.marker(end, base)
+        back = vec.transpose(outer.rotation)
+        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
 
     def position(self, marker: Marker) -> Vec3:
         """Origin of the marker, ground axes (m)."""

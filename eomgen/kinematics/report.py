@@ -18,11 +18,11 @@ class MechanismReport:
     Attributes
     ----------
     gruebler_kutzbach : int or None
-        6 (bodies) - sum over joints of 6 - f; None for a bare Lagrangian.
+        6 (bodies) - sum over joints of 6 - f - equations of constraint elements; None for a bare Lagrangian.
     gruebler_kutzbach_planar : int or None
-        3 (bodies) - sum of 3 - f, where the mechanism moves in a plane.
+        The same with 3 - f, where the mechanism moves in a plane.
     constraints : int
-        Loop-closure rows that do not vanish identically, of ``constraints_declared``.
+        Constraint rows that do not vanish identically, of ``constraints_declared``.
     redundant : list of str
         Rows that follow from the others at the reference configuration.
     """
@@ -109,9 +109,10 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     spatial = planar = None
     if m.lagrangian is None:
         freedoms = [len(j.coordinates) for j in m.joints]
-        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms)
+        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
         if _moves_in_a_plane(kinematics):
             planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
+            planar -= sum(label in c.labels for label in kinematics.coupled)
     return MechanismReport(
         name=m.name,
         bodies=names[1:],
