@@ -285,4 +285,5 @@ def _length_scale(mechanism: Mechanism) -> Expr:
     total = graph.zero
     for square in squares:
         total = total + square
-    return graph.apply("max", graph.apply("sqrt", total / float(len(squares))), 1e-9)
+    size = graph.apply("sqrt", total / float(len(squares)))
+    return graph.apply("select", graph.apply("lt", size, 1e-9), 1.0, size)  # parameters may make all of them 0
