@@ -30,6 +30,8 @@ def cam_contact(e: Element) -> Constraint | None:
     shape, axis, follower = e.choice("shape"), e.marker("cam"), e.marker("follower")
     if axis is not None and follower is not None and axis.body == follower.body:
         e.faults.add(f"{e.path}.follower", f"{axis.label} and {follower.label} are on the same body", "name another")
+    if e.faults.under(f"{e.path}.shape"):
+        return None
     if shape == "roller":
         if "radius" not in e.values:
             e.faults.add(f"{e.path}.radius", "is missing", "give the radius of the roller")

@@ -107,7 +107,7 @@ def planetary(e: Element) -> Planetary | None:
     key = "radii" if "radii" in e.values else "teeth"
     sizes = _wheels(e, key)
     found = {part: e.coordinate(part, "angle") for part in ("sun", "ring", "carrier", "planet") if part in e.values}
-    if any(x is None for x in found.values()) or sizes is None:
+    if any(x is None for x in found.values()) or sizes is None or e.faults.under(e.path):
         return None
     parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
     for part in ("sun", "ring"):

@@ -56,6 +56,9 @@ class Surroundings:
             group |= more
 
 
+_A = {"length": "a length", "angle": "an angle"}
+
+
 class Element:
     """One entry on its way to a constraint; parts are None or a stand-in where they are at fault."""
 
@@ -122,7 +125,7 @@ class Element:
         """A coordinate from the name of its joint, or its own."""
         found = find_coordinate(self.reader, self.around.declared, path, value)
         if found is not None and kind and found.joint is not None and found.kind != kind:
-            self.faults.add(path, f"the coordinate {found.name!r} is a {found.kind}", f"give one that is a {kind}")
+            self.faults.add(path, f"the coordinate {found.name!r} is {_A[found.kind]}", f"give one that is {_A[kind]}")
             return None
         return found
 

@@ -259,4 +259,3 @@ def test_a_face_does_not_touch_the_far_side() -> None:
     m.guess(s=0.05, touch_contact=-1.5)
     mod = m.compile(target="numpy")
     assert mod.x0(phi=0.1)[mod.x_names.index("s")] > 0.04
-
