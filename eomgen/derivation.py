@@ -14,6 +14,7 @@ from .graph.count import Operations, count
 from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
+from .kinematics.state import acceleration_name
 
 if TYPE_CHECKING:
     from .runtime.module import Module
@@ -77,7 +78,7 @@ class Equations:
             "inverse_dynamics": tree.inverse_dynamics,
             "energy": [tree.kinetic_energy, tree.potential_energy],
         }
-        if c.values:
+        if c.labels:
             rows = [x for row in c.jacobian for x in row]
             parts["constraints"] = [*c.values, *rows, *c.gamma]
         return {name: count(list(part)) for name, part in parts.items()}
@@ -96,7 +97,7 @@ class Equations:
     @property
     def v(self) -> tuple[Any, ...]:
         """Velocities of the spanning tree, SymPy symbols."""
-        return self._symbols([n + "_dot" for n in self.kinematics.names])
+        return self._symbols(self.kinematics.velocity_names)
 
     @property
     def parameters(self) -> tuple[Any, ...]:
@@ -191,6 +192,7 @@ class Equations:
             return None
         import sympy
 
-        rates = [sympy.Symbol(n + "_ddot") for n in self.independent]
+        names = [self.kinematics.velocity_names[self.kinematics.freedoms.index(n)] for n in self.independent]
+        rates = [sympy.Symbol(acceleration_name(n)) for n in names]
         left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
         return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"

@@ -130,13 +130,13 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     ModelError
         Names the coordinates that move nothing.
     """
-    m, names = kinematics.mechanism, kinematics.names
+    m, names = kinematics.mechanism, kinematics.freedoms
     numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
     functions = ConstraintFunctions(kinematics, numbers)
     n, r = len(names), mobility.rank
     if n == r:
         return
-    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*names, *numbers, "t"))
+    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
     scales = functions.scales.q
     worst: tuple[float, np.ndarray] | None = None
     for sample in mobility.samples:
@@ -157,7 +157,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     problems = []
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():
-            spec = next((s for s in m.joints if names[j] in s.coordinates), None)
+            spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
             path = f"joints.{spec.name}" if spec else f"lagrangian.{names[j]}"
             what = "negative inertia" if size < 0.0 else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"

@@ -219,7 +219,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     if listed is None:
         reader.wrong("independent", given, "names")
         return ()
-    known = list(reader.names.of("coordinate"))
+    coordinates = list(reader.names.of("coordinate"))
+    rates = {name + "_dot" for name in coordinates}
+    known = [*coordinates, *(name for name in reader.names.of("velocity") if name not in rates)]
     result: list[str] = []
     for k, item in enumerate(listed):
         name = name_of(item)

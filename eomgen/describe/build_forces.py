@@ -121,6 +121,10 @@ class _Element:
             return None
         name = str(given) if home is not None else joint.coordinates[0]
         kind = joint.joint.coordinates[joint.coordinates.index(name)].kind
+        if kind == "parameter":
+            remedy = "give the torque as a vector on the body: body: <body>, value: [x, y, z]"
+            faults.add(path, f"{name!r} is an Euler parameter, which takes no torque", remedy)
+            return None
         if angle and kind != "angle":
             faults.add(path, f"the coordinate {name!r} is a {kind}", "a torsional element acts on an angle")
             return None

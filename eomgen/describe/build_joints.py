@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +30,9 @@ class Declared:
     named: bool
 
 
-def coordinate_names(type_name: str, name: str, values: dict[str, Any]) -> tuple[tuple[Any, ...], bool]:
+def coordinate_names(
+    type_name: str, name: str, values: dict[str, Any], joint: Joint | None = None
+) -> tuple[tuple[Any, ...], bool]:
     """Names of a joint's coordinates as given or by default, and whether they were given."""
     if "coordinate" in values:
         return (name_of(values["coordinate"]),), True
@@ -37,7 +40,13 @@ def coordinate_names(type_name: str, name: str, values: dict[str, Any]) -> tuple
         given = values["coordinates"]
         listed = [given] if isinstance(given, str) else items(given)
         return tuple(name_of(x) for x in listed or ()), True
-    return tuple(name + c.suffix for c in JOINTS[type_name].coordinates), False
+    return tuple(name + c.suffix for c in (joint or sketch(type_name, values)).coordinates), False
+
+
+def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
+    """A joint from its raw keys, whose faults are told elsewhere."""
+    kind = JOINTS[type_name]
+    return kind(**{key: values[key] for key in kind.options if isinstance(values.get(key), str)})
 
 
 def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
@@ -52,7 +61,7 @@ def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
                         reader.names.declare("coordinate", name, f"{entry.path}.{key}")
             continue
         joint = _joint(reader, entry, type_name)
-        names, named = coordinate_names(type_name, entry.name, entry.values)
+        names, named = coordinate_names(type_name, entry.name, entry.values, joint)
         count = len(joint.coordinates)
         path = entry.path
         if named:
@@ -61,8 +70,12 @@ def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
             remedy = f"name all {count}, in the order {', '.join(c.suffix.strip('_') for c in joint.coordinates)}"
             plural = "" if len(names) == 1 else "s"
             reader.faults.add(path, f"{len(names)} name{plural} for a joint of {count} coordinates", remedy)
-        for name in names:
-            reader.names.declare("coordinate", name, path)
+        for k, name in enumerate(names):
+            parameter = k < count and joint.coordinates[k].kind == "parameter"
+            reader.names.declare("parameter of rotation" if parameter else "coordinate", name, path)
+        for velocity in joint.velocities:
+            if velocity.of is None:
+                reader.names.declare("velocity", entry.name + velocity.suffix, entry.path)
         if len(names) == count:
             result.append(Declared(entry, joint, tuple(str(n) for n in names), named))
     return result

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
 from .fields import LAGRANGIAN, MOTION
@@ -59,8 +61,20 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
         expression,
         _forces(reader, f"{path}.forces", values.get("forces", ()), names),
         dissipation,
-        tuple(reader.expression(f"{path}.constraints[{k}]", c, MOTION) for k, c in enumerate(constraints)),
+        tuple(_constraint(reader, f"{path}.constraints[{k}]", c, names) for k, c in enumerate(constraints)),
     )
+
+
+def _constraint(reader: Reader, path: str, given: Any, names: list[str]) -> Expr:
+    """A constraint: of coordinates and t, or linear in the velocities."""
+    expression = reader.expression(path, given, MOTION)
+    rates = {name + "_dot": reader.graph.symbol(name + "_dot") for name in names}
+    if not symbols_of([expression]).isdisjoint(rates):
+        slopes = jacobian([expression], list(rates.values()))
+        if not symbols_of(list(slopes.values())).isdisjoint(rates):
+            remedy = "write it as a sum of terms a(q, t)*q_dot and b(q, t), each velocity to the first power"
+            reader.faults.add(path, "is not linear in the velocities", remedy)
+    return expression
 
 
 def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Expr, ...]:

@@ -106,6 +106,12 @@ COORDINATE = Field("name", "name of the coordinate (the joint's name unless give
 COORDINATES = Field("names", "names of the coordinates, in order")
 JOINT_OPTIONS: Fields = {
     "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
+    "rotation": Field(
+        "choice",
+        "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
+        default="euler_angles",
+        choices=("euler_angles", "euler_parameters"),
+    ),
 }
 
 _ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")
@@ -162,7 +168,9 @@ LAGRANGIAN: Fields = {
     "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
     "forces": Field("forces", "generalized forces", default=(), level=MOTION),
     "dissipation": Field("expression", "Rayleigh's dissipation function", default=0, level=MOTION),
-    "constraints": Field("expressions", "holonomic constraints, each = 0", default=(), level=MOTION),
+    "constraints": Field(
+        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    ),
 }
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
 from ..joints import JOINTS
-from .build_joints import coordinate_names
+from .build_joints import coordinate_names, sketch
 from .description import GROUND_NAME, Entry, label_of
+from .mechanism import velocity_names
 from .scope import RATES
 from .sympy_face import symbol
 
@@ -155,8 +156,10 @@ class JointHandle:
 
     @property
     def velocities(self) -> tuple[Any, ...]:
-        """Rates of all coordinates as SymPy symbols."""
-        return tuple(symbol(name + RATES[1]) for name in self.coordinate_names)
+        """All generalized velocities as SymPy symbols: rates of coordinates, or components of an angular velocity."""
+        names = self.coordinate_names
+        joint = sketch(str(self._entry.values.get("type")), self._entry.values)
+        return tuple(symbol(name) for name in velocity_names(joint, self.name, names))
 
     @property
     def coordinate(self) -> Any:

@@ -38,7 +38,7 @@ def describe_lagrangian(
     dissipation : sympy.Expr, optional
         Rayleigh's dissipation function D(q, q_dot); it adds the forces -dD/dq_dot.
     constraints : sequence of sympy.Expr, optional
-        Holonomic constraints, each = 0.
+        Constraints, each = 0: of coordinates and t (holonomic), or linear in the velocities (nonholonomic).
     parameters : mapping, optional
         Values by symbol or name.  Every other free symbol becomes a parameter without a value.
     inputs : mapping, optional

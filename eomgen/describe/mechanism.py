@@ -8,7 +8,7 @@ as a symbol named like ``vx(rod.tip)`` whose meaning is in :attr:`Mechanism.quan
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -69,6 +69,19 @@ class JointSpec:
     coordinates: tuple[str, ...]
     named: bool
 
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Full names of the generalized velocities."""
+        return velocity_names(self.joint, self.name, self.coordinates)
+
+
+def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple[str, ...]:
+    """``<coordinate>_dot`` for the rate of a coordinate, ``<joint>_wx`` .. for an angular velocity."""
+    return tuple(
+        f"{name}{velocity.suffix}" if velocity.of is None else f"{coordinates[velocity.of]}_dot"
+        for velocity in joint.velocities
+    )
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -92,7 +105,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Lagrangian:
-    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0."""
+    """A bare Lagrangian L(q, v, t): one generalized force a coordinate, Rayleigh dissipation D, constraints C = 0.
+
+    A constraint that contains velocities is linear in them.
+    """
 
     coordinates: tuple[str, ...]
     expression: Expr

@@ -39,7 +39,7 @@ class JointMethods:
         predecessor, successor : handle or str
             Bodies or markers.
         **keys
-            Whatever the type knows: axis, coordinate, coordinates, sequence.
+            Whatever the type knows: axis, coordinate, coordinates, sequence, rotation.
 
         Returns
         -------
@@ -81,9 +81,11 @@ class JointMethods:
         successor: Any,
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
+        rotation: str | None = None,
     ) -> JointHandle:
-        """Add a ball joint in Euler angles (intrinsic, ``"xyz"`` unless given); see :meth:`joint`."""
-        return self.joint("spherical", name, predecessor, successor, sequence=sequence, coordinates=coordinates)
+        """Add a ball joint, in Euler angles (``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        return self.joint("spherical", name, predecessor, successor, **keys)
 
     def planar(
         self,
@@ -103,9 +105,11 @@ class JointMethods:
         successor: Any,
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
+        rotation: str | None = None,
     ) -> JointHandle:
-        """Add six degrees of freedom: position, then Euler angles; see :meth:`joint`."""
-        return self.joint("free", name, predecessor, successor, sequence=sequence, coordinates=coordinates)
+        """Add six degrees of freedom: position, then rotation as for a spherical joint; see :meth:`joint`."""
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        return self.joint("free", name, predecessor, successor, **keys)
 
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Fix two bodies to each other; see :meth:`joint`."""

@@ -16,6 +16,7 @@ from .names import QUANTITIES, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
+LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
 LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
 
 _LEVEL_REMEDY = {
@@ -26,6 +27,12 @@ _LEVEL_REMEDY = {
 }
 _QUANTITY = re.compile(r"([va]?[xyz]|angle)\((.+)\)\Z", re.DOTALL)
 RATES = ("", "_dot", "_ddot")
+#: Kind declared -> kinds of the name, its ``_dot`` and its ``_ddot``.
+_RATES_OF = {
+    "coordinate": ("coordinate", "velocity", "acceleration"),
+    "parameter of rotation": ("coordinate", "rate", "rate of rate"),
+    "velocity": ("velocity", "acceleration"),
+}
 #: Energies of the whole mechanism, for outputs; a name of the model's own comes first.
 ENERGIES = ("kinetic_energy", "potential_energy")
 
@@ -46,17 +53,22 @@ class Namespace:
         self.refused: set[str] = set()
 
     def declare(self, kind: str, name: object, path: str) -> bool:
-        """Take a name in; faults of the name, and clashes with others, are noted.  Returns whether it is usable."""
+        """Take a name in; faults of the name, and clashes with others, are noted.  Returns whether it is usable.
+
+        A coordinate brings its rates along, a velocity (one that is no coordinate's rate) its own.
+        """
         fault = fault_of_name(name, symbol=True)
         if fault or not isinstance(name, str):
             self.faults.add(path, *(fault or ("", "")))
             self._refuse(kind, name, path)
             return False
-        names = [name + suffix for suffix in RATES] if kind == "coordinate" else [name]
+        levels = _RATES_OF.get(kind, (kind,))
+        names = [name + suffix for suffix in RATES[: len(levels)]]
+        kind = levels[0]
         clash = next((n for n in names if n in self.kinds), None)
-        for n, level in zip(names, ("coordinate", "velocity", "acceleration"), strict=False):
+        for n, level in zip(names, levels, strict=True):
             if n not in self.kinds:  # also after a clash, so that users of the name are not at fault too
-                self.kinds[n] = level if kind == "coordinate" else kind
+                self.kinds[n] = level
                 self.places[n] = path
         if clash is not None:
             other = f"{self.kinds[clash]} at {self.places[clash]}"

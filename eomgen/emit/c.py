@@ -74,6 +74,8 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
         "parent": program.parent,
+        "balls": program.balls,
+        "coordinate_of": program.coordinate_of,
         "kernels": [
             {
                 "name": k.name,

@@ -23,6 +23,9 @@ def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
     files: dict[str, None] = {"terms": None} if program.composes_terms else {}
+    if program.drivers:
+        space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
+        files.update(dict.fromkeys(space if program.balls else ("space_plain",)))
     for driver in program.drivers:
         if not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
@@ -54,23 +57,26 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     if not program.drivers:
         return [], blocks
     n, m, f = program.sizes.n_v, program.sizes.n_c, program.sizes.n_dof
+    n_q, h = program.sizes.n_q, program.sizes.n_h
     names = program.block_names
-    residual = 2 * n * n + 3 * m * n if "residual_jacobian" in names else 0
+    residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
     lengths = [
-        ("X", 5 * n + m),  # q, v, a, multipliers, dq, dv
+        ("X", 2 * n_q + 3 * n + m),  # q, v, a, multipliers, dq, dv
         ("SCALES", n + m),
         ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
+        ("RATES", n_q),
     ]
     if program.composes_terms:
         lengths.append(("FULL", n * n))
     if program.has_loops:
         lengths += [
-            ("POSITION", m + m * n),  # C, C_q
+            ("POSITION", h + m * n),  # C, C_q
             ("RATE", m),
             ("J", m * n),
             ("G", m * m),
+            ("GH", m * m if h < m else 0),  # of the holonomic rows alone
             ("E", m),
             ("STEP", n),
             ("ROWS", m * (n + 1 + m)),

@@ -17,13 +17,13 @@ def describe_layouts(program: Program) -> list[tuple[str, list[str]]]:
         ("p, the parameters", _entries(metadata, "p", program.parameters, metadata.get("p_values"))),
         ("u, the inputs", _entries(metadata, "u", program.inputs, metadata.get("u_values"))),
         ("y, the outputs", _entries(metadata, "y", metadata.get("y_names", ()))),
-        ("q_i, the independent coordinates", _entries(metadata, "q_i", [q[i] for i in program.preferred])),
+        ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in program.preferred])),
         ("C, the constraint rows", _entries(metadata, "C", metadata.get("constraint_labels", ()))),
         ("bodies of poses", _entries(metadata, "poses", metadata.get("body_names", ()))),
         ("coordinates of cut joints", _entries(metadata, "loop", metadata.get("loop_names", ()))),
     ]
-    independent_is_all = program.sizes.n_dof == program.sizes.n_q
-    return [(title, rows) for title, rows in sections if rows and not (independent_is_all and title[0] == "q")]
+    independent_is_all = program.sizes.n_dof == program.sizes.n_v
+    return [(title, rows) for title, rows in sections if rows and not (independent_is_all and title[0] == "v")]
 
 
 def _entries(

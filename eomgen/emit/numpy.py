@@ -20,6 +20,7 @@ def emit_numpy(program: Program) -> SourceSet:
     text = json.dumps(program.metadata, allow_nan=False)
     twins = program.twins
     context = {
+        "n_q": program.sizes.n_q,
         "n_v": program.sizes.n_v,
         "composes_terms": program.composes_terms,
         "twins": twins,

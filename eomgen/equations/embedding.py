@@ -105,7 +105,7 @@ def _lift(link: Link, wrench: Twist) -> Twist:
 def _sweep(kinematics: Kinematics, inertias: list[SpatialInertia], a: tuple[Expr, ...]) -> tuple[Expr, ...]:
     """Newton-Euler: spatial accelerations outwards, wrenches inwards, projected on the joints."""
     graph, links = kinematics.graph, kinematics.links
-    along = dict(zip(kinematics.q, kinematics.v, strict=True))
+    along = kinematics.flow
     base: Twist = (vec.zero(graph), vec.neg(kinematics.mechanism.gravity))  # gravity as an acceleration of ground
     accelerations: list[Twist] = []
     wrenches: list[Twist] = []
@@ -155,11 +155,11 @@ def _applied_wrenches(kinematics: Kinematics) -> list[Twist]:
 def _coordinate_forces(kinematics: Kinematics) -> list[Expr]:
     """Force elements along coordinates, those of cut joints through their y_q."""
     graph, loop = kinematics.graph, kinematics.loop_coordinates
-    total = [graph.zero] * len(kinematics.q)
+    total = [graph.zero] * len(kinematics.v)
     for terms in kinematics.forces:
         for load in terms.coordinate_loads:
             if load.coordinate in kinematics.names:
-                j = kinematics.names.index(load.coordinate)
+                j = kinematics.freedoms.index(load.coordinate)
                 total[j] = total[j] + load.value
             else:
                 row = loop.jacobian[loop.names.index(load.coordinate)]
@@ -169,7 +169,7 @@ def _coordinate_forces(kinematics: Kinematics) -> list[Expr]:
 
 def _composite_mass_matrix(kinematics: Kinematics, inertias: list[SpatialInertia]) -> tuple[tuple[Expr, ...], ...]:
     """M_ij = s_i . I^c_max(i,j) s_j along each branch, composite inertias summed inwards."""
-    graph, links, n = kinematics.graph, kinematics.links, len(kinematics.q)
+    graph, links, n = kinematics.graph, kinematics.links, len(kinematics.v)
     composite = list(inertias)
     rows = [[graph.zero] * n for _ in range(n)]
     for k in reversed(range(len(links))):

@@ -2,7 +2,9 @@
 
 d/dt (dT/dv) - dT/dq + dV/dq = Q (Shabana, Computational Dynamics, sec. 4.4 ff.).  T and V come from the velocity
 recursion and are linear in the number of bodies; one reverse gradient and one forward derivative keep the equations
-linear too.  A bare Lagrangian goes the same way.
+linear too.  A bare Lagrangian goes the same way.  Where q' = N v, for Euler parameters, the equations are those of
+Boltzmann and Hamel with the structure constants of rotations, w being angular velocities in turned axes:
+d/dt (dT/dv) + w x dT/dw - N^T (dT/dq - dV/dq) = Q_v (Meirovitch, Methods of Analytical Dynamics, 1970, sec. 4.13).
 """
 
 from __future__ import annotations
@@ -24,12 +26,17 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     q, v = list(kinematics.q), list(kinematics.v)
     kinetic, potential = _energies(kinematics)
     momentum = gradient(kinetic, v)
-    drift = jvp(momentum, dict(zip(q, v, strict=True)) | {kinematics.t: graph.one})
+    drift = jvp(momentum, kinematics.flow | {kinematics.t: graph.one})
     total = kinematics.total_derivative(momentum)
     slope = gradient(kinetic - potential, q)
+    if kinematics.balls:
+        slope = vjp(list(kinematics.rates), slope, v)
+    for _, j in kinematics.balls:
+        w, p = (vec.vector(graph, x[j : j + 3]) for x in (v, momentum))
+        slope[j : j + 3] = vec.sub(vec.vector(graph, slope[j : j + 3]), vec.cross(w, p))
     applied = _generalized_forces(kinematics)
     entries = jacobian(momentum, v)
-    n = len(q)
+    n = len(v)
     return TreeEquations(
         method="lagrange",
         mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
@@ -67,7 +74,7 @@ def _energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
 
 def _generalized_forces(kinematics: Kinematics) -> list[Expr]:
     """Q of everything without a potential, by virtual power: Q = sum F . d(velocity)/dv."""
-    graph, n = kinematics.graph, len(kinematics.q)
+    graph, n = kinematics.graph, len(kinematics.v)
     velocities: list[Expr] = []
     weights: list[Expr] = []
     direct = [graph.zero] * n
@@ -82,7 +89,7 @@ def _generalized_forces(kinematics: Kinematics) -> list[Expr]:
             weights += load.torque
         for along in terms.coordinate_loads:
             if along.coordinate in kinematics.names:
-                j = kinematics.names.index(along.coordinate)
+                j = kinematics.freedoms.index(along.coordinate)
                 direct[j] = direct[j] + along.value
             else:
                 velocities.append(loop.rates[loop.names.index(along.coordinate)])
@@ -103,6 +110,6 @@ def _bare_forces(kinematics: Kinematics) -> list[Expr]:
     """Given generalized forces less the gradient of Rayleigh's dissipation function."""
     bare, graph = kinematics.mechanism.lagrangian, kinematics.graph
     if bare is None:
-        return [graph.zero] * len(kinematics.q)
+        return [graph.zero] * len(kinematics.v)
     drag = gradient(bare.dissipation, list(kinematics.v))
     return [f - d for f, d in zip(bare.forces, drag, strict=True)]

@@ -27,8 +27,8 @@ def reduce_to_independent(
     values : mapping
         Numbers of the parameters, inputs and t, by which pivots are judged.
     """
-    graph, n = kinematics.graph, len(kinematics.q)
-    free = [kinematics.names.index(name) for name in mobility.independent]
+    graph, n = kinematics.graph, len(kinematics.v)
+    free = [kinematics.freedoms.index(name) for name in mobility.independent]
     bound = [j for j in range(n) if j not in free]
     if not bound:
         return equations.mass_matrix, tuple(-h for h in equations.bias)
@@ -62,7 +62,7 @@ def _eliminate(
     """Gauss-Jordan on the independent rows of [C_q | gamma] for the dependent columns, column -> its solved row."""
     c = kinematics.constraints
     at = dict(values) | dict(zip(kinematics.names, mobility.q_reference, strict=True))
-    at |= {name + "_dot": 0.0 for name in kinematics.names}
+    at |= dict.fromkeys(kinematics.velocity_names, 0.0)
     rows = [[*c.jacobian[i], c.gamma[i]] for i in mobility.independent_rows]
     numbers = [[float(x) for x in evaluate(row, at)] for row in rows]
     left = list(range(len(rows)))

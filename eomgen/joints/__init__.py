@@ -1,8 +1,9 @@
 """Joints: one short class a type; :data:`JOINTS` is the literal table of all of them."""
 
-from .base import Closure, Coordinate, Joint
-from .many_degrees import Cylindrical, Free, Planar, Spherical, Weld
+from .base import Ball, Closure, Coordinate, Joint, Velocity
+from .many_degrees import Cylindrical, Planar, Weld
 from .one_degree import Prismatic, Revolute
+from .turning import Free, Spherical
 
 JOINTS: dict[str, type[Joint]] = {
     joint.type_name: joint for joint in (Revolute, Prismatic, Cylindrical, Spherical, Planar, Free, Weld)
@@ -10,6 +11,7 @@ JOINTS: dict[str, type[Joint]] = {
 
 __all__ = [
     "JOINTS",
+    "Ball",
     "Closure",
     "Coordinate",
     "Cylindrical",
@@ -19,5 +21,6 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Spherical",
+    "Velocity",
     "Weld",
 ]

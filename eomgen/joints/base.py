@@ -16,10 +16,32 @@ from ..graph.vectors import Mat3, Vec3
 
 
 class Coordinate(NamedTuple):
-    """One coordinate of a joint type: its name is the joint's name plus ``suffix``; ``kind`` is 'angle' or 'length'."""
+    """One coordinate of a joint type: its name is the joint's name plus ``suffix``.
+
+    ``kind`` is 'angle', 'length' or 'parameter' (one of four Euler parameters).
+    """
 
     suffix: str
     kind: str
+
+
+class Velocity(NamedTuple):
+    """One generalized velocity of a joint type.
+
+    ``of`` is the number of the coordinate whose rate it is, and bears its name with ``_dot``; a velocity that is the
+    rate of no coordinate is named by the joint's name plus ``suffix``.
+    """
+
+    suffix: str
+    kind: str
+    of: int | None = None
+
+
+class Ball(NamedTuple):
+    """Euler parameters e0 .. e3 and the angular velocity that goes with them: numbers of their first entries."""
+
+    coordinate: int
+    velocity: int
 
 
 class Closure(NamedTuple):
@@ -40,12 +62,26 @@ class Joint(ABC):
     has_axis : whether ``axis=`` is accepted
     options : names of further keywords of this type (fields of the dataclass)
     coordinates : the coordinates, in order
+    balls : where four of the coordinates are Euler parameters
     """
 
     type_name: ClassVar[str]
     has_axis: ClassVar[bool] = True
     options: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
+    balls: ClassVar[tuple[Ball, ...]] = ()
+
+    @property
+    def velocities(self) -> tuple[Velocity, ...]:
+        """The generalized velocities, in order: the rates of the coordinates, but for Euler parameters."""
+        turning = {ball.coordinate: ball for ball in self.balls}
+        found: list[Velocity] = []
+        for k, coordinate in enumerate(self.coordinates):
+            if k in turning:
+                found += [Velocity(f"_w{axis}", "angle") for axis in "xyz"]
+            elif coordinate.kind != "parameter":
+                found.append(Velocity(f"{coordinate.suffix}_dot", coordinate.kind, k))
+        return tuple(found)
 
     @abstractmethod
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -53,7 +89,7 @@ class Joint(ABC):
 
     @abstractmethod
     def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        """One (angular, linear) column per coordinate: the relative twist is the sum of column times rate."""
+        """One (angular, linear) column per velocity: the relative twist is the sum of column times velocity."""
 
     @abstractmethod
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:

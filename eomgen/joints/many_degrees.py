@@ -1,4 +1,4 @@
-"""Joints of several degrees of freedom, and the weld: cylindrical, planar, spherical, free."""
+"""Joints of several degrees of freedom, and the weld: cylindrical, planar; :mod:`.turning` has spherical and free."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..graph.core import Expr, Graph, atan2
 from ..graph.vectors import Mat3, Vec3
 from .base import Closure, Coordinate, Joint
 from .closures import along, parallel_axes, same_orientation
-from .rotations import about, euler, euler_angles, euler_rates, unit
+from .rotations import about, unit
 
 
 @dataclass(frozen=True)
@@ -64,60 +64,6 @@ class Planar(Joint):
 
     def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
         return [position[0], position[1], atan2(rotation[1][0], rotation[0][0])]
-
-
-@dataclass(frozen=True)
-class Spherical(Joint):
-    """Turns about a point, in Euler angles (intrinsic, x-y'-z'' unless ``sequence`` says).  Allows 3, removes 3.
-
-    Euler angles are singular where the middle angle brings the first and last axes in line.
-    """
-
-    type_name: ClassVar[str] = "spherical"
-    has_axis: ClassVar[bool] = False
-    options: ClassVar[tuple[str, ...]] = ("sequence",)
-    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
-    sequence: str = "xyz"
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return euler(graph, self.sequence, q), vec.zero(graph)
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        return [(g, vec.zero(graph)) for g in euler_rates(graph, self.sequence, q)]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return along(position, "xyz")
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return euler_angles(graph, self.sequence, rotation)
-
-
-@dataclass(frozen=True)
-class Free(Joint):
-    """Six degrees of freedom: position of S in P axes, then Euler angles.  Removes none."""
-
-    type_name: ClassVar[str] = "free"
-    has_axis: ClassVar[bool] = False
-    options: ClassVar[tuple[str, ...]] = ("sequence",)
-    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(
-        [Coordinate(f"_{k}", "length") for k in "xyz"] + [Coordinate(f"_{k}", "angle") for k in (1, 2, 3)]
-    )
-    sequence: str = "xyz"
-
-    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
-        return euler(graph, self.sequence, q[3:]), (q[0], q[1], q[2])
-
-    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
-        turn = euler(graph, self.sequence, q[3:])
-        o = vec.zero(graph)
-        rates = euler_rates(graph, self.sequence, q[3:])
-        return [(o, row) for row in turn] + [(g, o) for g in rates]
-
-    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
-        return []
-
-    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
-        return [*position, *euler_angles(graph, self.sequence, rotation)]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Joints: elementary rotations and Euler-angle sequences as expressions (Shabana, Computational Dynamics, ch. 7)."""
+"""Joints: rotations, Euler angles and Euler parameters as expressions (Shabana, Computational Dynamics, ch. 7)."""
 
 from __future__ import annotations
 
@@ -67,3 +67,56 @@ def euler_angles(graph: Graph, sequence: str, rotation: Mat3) -> list[Expr]:
 
 def _clamp(graph: Graph, x: Expr) -> Expr:
     return graph.apply("max", graph.apply("min", x, 1.0), -1.0)
+
+
+def parameter_rotation(graph: Graph, e: Sequence[Expr]) -> Mat3:
+    """Rotation of Euler parameters e0 (scalar) .. e3 of any length but zero: R = 1 + 2 (e0 e~ + e~ e~) / |e|^2."""
+    e0, e1, e2, e3 = e
+    s = 2.0 / (e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
+    s1, s2, s3 = s * e1, s * e2, s * e3
+    w1, w2, w3 = s1 * e0, s2 * e0, s3 * e0
+    xx, yy, zz, xy, xz, yz = s1 * e1, s2 * e2, s3 * e3, s1 * e2, s1 * e3, s2 * e3
+    i = graph.one
+    return (
+        (i - (yy + zz), xy - w3, xz + w2),
+        (xy + w3, i - (xx + zz), yz - w1),
+        (xz - w2, yz + w1, i - (xx + yy)),
+    )
+
+
+def parameter_rates(e: Sequence[Expr], w: Sequence[Expr]) -> list[Expr]:
+    """e' = E-bar^T w / 2 with w in the turned axes (Shabana, ch. 7: omega-bar = 2 E-bar theta'); keeps |e|."""
+    e0, e1, e2, e3 = e
+    h1, h2, h3 = (0.5 * x for x in w)
+    return [
+        -(e1 * h1 + e2 * h2 + e3 * h3),
+        e0 * h1 - e3 * h2 + e2 * h3,
+        e3 * h1 + e0 * h2 - e1 * h3,
+        e1 * h2 - e2 * h1 + e0 * h3,
+    ]
+
+
+def parameters_of(graph: Graph, rotation: Mat3) -> list[Expr]:
+    """Unit Euler parameters of a rotation matrix with e0 >= 0, from its largest one (Shepperd, 1978, J. Guidance 1)."""
+    r = rotation
+    skew = (r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1])
+    trace = r[0][0] + r[1][1] + r[2][2]
+    squares = [1.0 + trace, *(1.0 + 2.0 * r[k][k] - trace for k in range(3))]  # 4 e_k^2
+    ways = []
+    for k, square in enumerate(squares):
+        root = graph.apply("sqrt", graph.apply("max", square, 0.5))  # the largest is at least 1
+        half = 0.5 / root
+        if k == 0:
+            way = [0.5 * root, *(half * x for x in skew)]
+        else:
+            way = [half * skew[k - 1], *(half * (r[k - 1][j] + r[j][k - 1]) for j in range(3))]
+            way[k] = 0.5 * root
+            sign = graph.apply("select", graph.apply("lt", way[0], 0.0), -1.0, 1.0)
+            way = [sign * x for x in way]
+        ways.append(way)
+    result, best = ways[0], squares[0]
+    for way, square in zip(ways[1:], squares[1:], strict=True):
+        larger = graph.apply("lt", best, square)
+        result = [graph.apply("select", larger, x, y) for x, y in zip(way, result, strict=True)]
+        best = graph.apply("max", best, square)
+    return result

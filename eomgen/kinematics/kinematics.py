@@ -4,25 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
 
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring, Turn
-from ..frames import GROUND
+from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.differentiate import jacobian, jvp
+from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
+from ..joints import Ball
 from .couplings import couple
 from .loops import Constraints, close_loop, differentiate_constraints, lagrangian_rows
 from .motion import Motion
+from .state import State, acceleration_name, lay_out
 from .topology import Topology, find_topology
 from .tree import Link, Poses, Twist, build_links, link_twists
 
 
 @dataclass(frozen=True)
 class LoopCoordinates:
-    """Coordinates y of cut joints as functions of the tree: values, rates, accelerations and dy/dq (n_k rows)."""
+    """Coordinates y of cut joints as functions of the tree: values, rates, accelerations and dy'/dv (n_k rows)."""
 
     names: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
@@ -46,18 +49,23 @@ class ForceTerms:
 class Kinematics:
     """The tree, its motion, loop constraints and resolved forces, in (t, q, v, a), inputs and parameters.
 
-    ``q``, ``v``, ``a`` are the coordinates of the spanning tree, their rates and accelerations, in the order of
-    ``names``; q' = v.  ``parent[j]`` is the coordinate next to coordinate j towards ground, -1 for none.
+    ``q`` are the coordinates of the spanning tree in the order of ``names``; ``v`` and ``a`` its generalized velocities
+    and their rates, in the order of ``velocity_names``.  ``rates`` is q' = N(q) v, which is v itself but for Euler
+    parameters.  ``parent[j]`` is the velocity next to velocity j towards ground, -1 for none.
     """
 
     mechanism: Mechanism
     topology: Topology
     names: tuple[str, ...]
-    kinds: tuple[str, ...]
+    kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
+    velocity_names: tuple[str, ...]
+    velocity_kinds: tuple[str, ...]
+    balls: tuple[Ball, ...]  #: where Euler parameters stand in q, and their angular velocity in v
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
     t: Expr
+    rates: tuple[Expr, ...]
     parent: tuple[int, ...]
     links: tuple[Link, ...]
     poses: Poses
@@ -85,9 +93,20 @@ class Kinematics:
         """Names of the inputs, in the order of u."""
         return tuple(u.name for u in self.mechanism.inputs)
 
+    @property
+    def flow(self) -> dict[Expr, Expr]:
+        """The rates of the coordinates, q' = N(q) v, as the direction of a derivative."""
+        return dict(zip(self.q, self.rates, strict=True))
+
+    @cached_property
+    def freedoms(self) -> tuple[str, ...]:
+        """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
+        bases = set(self.names)
+        return tuple(n[:-4] if n.endswith("_dot") and n[:-4] in bases else n for n in self.velocity_names)
+
     def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """d/dt along q' = v, v' = a, t' = 1."""
-        along = dict(zip(self.q, self.v, strict=True)) | dict(zip(self.v, self.a, strict=True))
+        """d/dt along q' = N v, v' = a, t' = 1."""
+        along = self.flow | dict(zip(self.v, self.a, strict=True))
         return jvp(list(expressions), along | {self.t: self.graph.one})
 
     def resolve(self, expressions: Sequence[Expr]) -> list[Expr]:
@@ -100,9 +119,13 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     """Form the kinematics of a mechanism; ``independent`` names coordinates whose joints stay in the tree."""
     graph = mechanism.graph
     topology = find_topology(mechanism, set(independent) or set(mechanism.independent))
-    names, kinds, parent = _tree_coordinates(mechanism, topology)
-    q, v, a = (tuple(graph.symbol(n + s) for n in names) for s in ("", "_dot", "_ddot"))
+    layout = lay_out(mechanism, topology)
+    names, kinds = layout.names, layout.kinds
+    q, v = (tuple(map(graph.symbol, listed)) for listed in (names, layout.velocity_names))
+    a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
     t = graph.symbol("t")
+    rates = layout.rates(graph, q, v)
+    state = State(q, v, a, t, rates)
     links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
@@ -121,23 +144,28 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_names += spec.coordinates
         loop_kinds += [c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
-    loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), (q, v, a))
-    coordinates = {n: (q[j], v[j], a[j]) for j, n in enumerate(names)}
+    loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
+    second = jvp(list(rates), state.along) if layout.balls else a
+    coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
-    motion = Motion(poses, twists, (q, v, a, t), coordinates)
+    motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
-    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, (q, v, t))
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
         topology=topology,
         names=names,
         kinds=kinds,
+        velocity_names=layout.velocity_names,
+        velocity_kinds=layout.velocity_kinds,
+        balls=layout.balls,
         q=q,
         v=v,
         a=a,
         t=t,
-        parent=parent,
+        rates=rates,
+        parent=layout.parent,
         links=links,
         poses=poses,
         twists=twists,
@@ -151,39 +179,25 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     )
 
 
-def _tree_coordinates(
-    mechanism: Mechanism, topology: Topology
-) -> tuple[tuple[str, ...], tuple[str, ...], tuple[int, ...]]:
-    """Names, kinds and branch-induced parents (Featherstone, RBDA, sec. 6.4) of the tree's coordinates."""
-    if mechanism.lagrangian is not None:
-        names = mechanism.lagrangian.coordinates
-        return names, ("angle",) * len(names), tuple(range(-1, len(names) - 1))
-    names_list: list[str] = []
-    kinds: list[str] = []
-    parent: list[int] = []
-    last = {GROUND: -1}  # the coordinate next to a body towards ground
-    for branch in topology.branches:
-        spec = mechanism.joints[branch.joint]
-        above = last[branch.parent]
-        for name, coordinate in zip(spec.coordinates, spec.joint.coordinates, strict=True):
-            parent.append(above)
-            above = len(names_list)
-            names_list.append(name)
-            kinds.append(coordinate.kind)
-        last[branch.body] = above
-    return tuple(names_list), tuple(kinds), tuple(parent)
+def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker, Marker, int]]:
+    """Angular velocities that cut joints in Euler parameters would have as velocities."""
+    found = {}
+    for spec in (mechanism.joints[k] for k in topology.cut):
+        for ball in spec.joint.balls:
+            for axis, name in enumerate(spec.velocities[ball.velocity : ball.velocity + 3]):
+                found[name] = (spec.predecessor, spec.successor, axis)
+    return found
 
 
 def _loop_coordinates(
     graph: Graph,
     measured: tuple[list[str], list[str], list[Expr]],
-    state: tuple[tuple[Expr, ...], tuple[Expr, ...], tuple[Expr, ...]],
+    state: State,
 ) -> LoopCoordinates:
     names, kinds, values = measured
-    q, v, a = state
-    along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True))
+    along = {symbol: rate for symbol, rate in state.along.items() if symbol != state.t}
     rates = jvp(values, along)
-    entries = jacobian(values, list(q))
+    entries = state.slopes(values, rates)
     zero = graph.zero
     return LoopCoordinates(
         names=tuple(names),
@@ -191,7 +205,7 @@ def _loop_coordinates(
         values=tuple(values),
         rates=tuple(rates),
         accelerations=tuple(jvp(rates, along)),
-        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(q))) for i in range(len(values))),
+        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(values))),
     )
 
 

@@ -10,6 +10,8 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
+from ..graph.substitute import substitute, symbols_of
+from .state import State
 from .tree import Poses
 from .turns import sum_of_turns
 
@@ -18,12 +20,14 @@ from .turns import sum_of_turns
 class Constraints:
     """C(q, t) = 0 and its derivatives (Shabana, ch. 3): C' = C_q v + C_t, C'' = C_q a + gamma (Q_d = -gamma).
 
-    Rows that vanish identically are left out and listed in ``vanishing``; redundant ones stay.
+    C_q stands for the derivative of C' by v, dC/dq N where q' = N v.  Nonholonomic rows A(q, t) v + b(q, t) = 0
+    come after the holonomic ones and have no value C: for them C_q is A and C_t is b.  Rows that vanish identically
+    are left out and listed in ``vanishing``; redundant ones stay.
     """
 
     labels: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()  #: 'length' or 'angle' per row
-    values: tuple[Expr, ...] = ()
+    values: tuple[Expr, ...] = ()  #: of the holonomic rows
     jacobian: tuple[tuple[Expr, ...], ...] = ()  #: dense rows, mostly the zero node
     time_derivative: tuple[Expr, ...] = ()  #: C_t
     velocity: tuple[Expr, ...] = ()  #: C_q v + C_t
@@ -33,15 +37,23 @@ class Constraints:
     vanishing: tuple[str, ...] = ()
     declared: int = 0  #: rows before the vanishing ones were left out
 
+    @property
+    def nonholonomic(self) -> int:
+        """Number of rows at velocity level."""
+        return len(self.labels) - len(self.values)
+
 
 @dataclass(frozen=True)
 class Row:
-    """One equation before its derivatives are formed."""
+    """One equation ``expression = 0`` before its derivatives are formed.
+
+    ``level`` is 'position' for C(q, t), 'velocity' for a nonholonomic A(q, t) v + b(q, t), linear in v.
+    """
 
     label: str
     expression: Expr
     kind: str
-    level: str = "position"  #: 'velocity' for a nonholonomic one, held at velocity level only
+    level: str = "position"
 
 
 class ClosedLoop(NamedTuple):
@@ -85,29 +97,29 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph,
-    rows: Sequence[Row],
-    aligned: Sequence[tuple[str, Expr]],
-    motion: tuple[Sequence[Expr], Sequence[Expr], Expr],
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State
 ) -> Constraints:
     """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
-    q, v, t = motion
     kept = [r for r in rows if not r.expression.is_zero]
-    values = [r.expression for r in kept]
+    kept.sort(key=lambda r: r.level != "position")
+    values = [r.expression for r in kept if r.level == "position"]
+    nonholonomic = [r.expression for r in kept if r.level != "position"]
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
-    along = dict(zip(q, v, strict=True)) | {t: graph.one}
+    along = dict(zip(state.q, state.rates, strict=True)) | {state.t: graph.one}
     velocity = jvp(values, along)
-    rest = along | dict.fromkeys(v, graph.zero)
-    entries = jacobian(values, list(q))
+    entries = state.slopes(values, velocity)
+    m = len(values)
+    entries |= {(m + i, j): e for (i, j), e in jacobian(nonholonomic, list(state.v)).items()}
+    at_rest = dict.fromkeys(state.v, graph.zero)
     zero = graph.zero
     return Constraints(
         labels=tuple(r.label for r in kept),
         kinds=tuple(r.kind for r in kept),
         values=tuple(values),
-        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(q))) for i in range(len(kept))),
-        time_derivative=tuple(jvp(values, {t: graph.one})),
-        velocity=tuple(velocity),
-        gamma=tuple(jvp(velocity, rest)),
+        jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
+        time_derivative=(*jvp(values, {state.t: graph.one}), *substitute(nonholonomic, at_rest)),
+        velocity=(*velocity, *nonholonomic),
+        gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
         aligned=tuple(e for _, e in open_conditions),
         aligned_joints=tuple(joint for joint, _ in open_conditions),
         vanishing=tuple(r.label for r in rows if r.expression.is_zero),
@@ -119,4 +131,8 @@ def lagrangian_rows(mechanism: Mechanism) -> list[Row]:
     """The constraint equations that accompany a bare Lagrangian."""
     if mechanism.lagrangian is None:
         return []
-    return [Row(f"constraint_{k + 1}", e, "angle") for k, e in enumerate(mechanism.lagrangian.constraints)]
+    rates = {n + "_dot" for n in mechanism.lagrangian.coordinates}
+    return [
+        Row(f"constraint_{k + 1}", e, "angle", "position" if symbols_of([e]).isdisjoint(rates) else "velocity")
+        for k, e in enumerate(mechanism.lagrangian.constraints)
+    ]

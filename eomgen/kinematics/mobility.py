@@ -22,6 +22,8 @@ from ..numeric import (
     rank,
 )
 from ..numeric.closure import Equations, System, close
+from ..numeric.scales import Space
+from ..numeric.space import settle
 from .kinematics import Kinematics
 
 Array = NDArray[np.float64]
@@ -39,9 +41,11 @@ class Mobility:
     rank : int
         Largest rank of the constraint Jacobian found at ``configurations`` assembled configurations.
     n_dof : int
-        Degrees of freedom, n_v - rank.
+        Degrees of freedom, n_v - rank: of the velocities, nonholonomic rows included.
+    n_positions : int
+        Degrees of freedom of the configuration, n_v less the rank of the holonomic rows.
     independent, dependent : tuple of str
-        The partition of the coordinates.
+        The partition of the velocities, each called by the coordinate whose rate it is, if there is one.
     independent_rows : tuple of int
         Constraint rows that carry the rank at the reference; the others are ``redundant`` there.
     conditioning : float
@@ -65,6 +69,7 @@ class Mobility:
     residual: float = 0.0  #: largest scaled residual of the loops at the reference
     restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
+    n_positions: int = 0
 
 
 class ConstraintFunctions:
@@ -74,16 +79,19 @@ class ConstraintFunctions:
         self.kinematics = kinematics
         self.values = dict(values) | {"t": 0.0}
         c, loop = kinematics.constraints, kinematics.loop_coordinates
-        self.n, self.m, self.k = len(kinematics.q), len(c.values), len(loop.names)
+        self.n, self.m, self.k = len(kinematics.v), len(c.labels), len(loop.names)
+        self.h = len(c.values)
+        space = Space.of(self.n, kinematics.balls)
+        self.neutral = np.zeros(self.n) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
         self._hints = self._compile([value for _, value in kinematics.hints])
-        (length,) = self._compile([kinematics.length_scale])(np.zeros(self.n))
+        (length,) = self._compile([kinematics.length_scale])(self.neutral)
         self.length_scale = float(length)
-        self.scales = Scales.of_kinds(kinematics.kinds, c.kinds, self.length_scale)
+        self.scales = Scales.of_kinds(kinematics.velocity_kinds, c.kinds, self.length_scale, space)
 
     def _compile(self, outputs: list[Expr]):  # type: ignore[no-untyped-def]
         evaluator = compile_evaluator(outputs, self._names)
@@ -96,9 +104,9 @@ class ConstraintFunctions:
         return call
 
     def position(self, q: Array) -> tuple[Array, Array]:
-        """C (m,) and C_q (m, n)."""
+        """C (h,) of the holonomic rows and C_q (m, n) of all."""
         flat = self._position(q)
-        return flat[: self.m], flat[self.m :].reshape(self.m, self.n)
+        return flat[: self.h], flat[self.h :].reshape(self.m, self.n)
 
     def loop(self, q: Array) -> tuple[Array, Array]:
         """Coordinates y (k,) of cut joints and y_q (k, n)."""
@@ -113,13 +121,18 @@ class ConstraintFunctions:
         """J (m, n)."""
         return self.scales.jacobian(self.position(q)[1])
 
+    def settle(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Named values with all four Euler parameters of a rotation where some are given."""
+        k, loop = self.kinematics, self.kinematics.loop_coordinates
+        return settle((*k.names, *loop.names), (*k.kinds, *loop.kinds), values)
+
     def _equations(self, wanted: Mapping[str, float]) -> Equations | None:
         """Values for coordinates of cut joints as equations."""
         loop = self.kinematics.loop_coordinates
         picked = [j for j, n in enumerate(loop.names) if n in wanted]
         if not picked:
             return None
-        scale = {"length": self.length_scale, "angle": 1.0}
+        scale = {"length": self.length_scale, "angle": 1.0, "parameter": 1.0}
 
         def measure(q: Array) -> tuple[Array, Array]:
             y, y_q = self.loop(q)
@@ -136,11 +149,14 @@ class ConstraintFunctions:
     def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
         """Assemble with the given values exact, near the guess."""
         k = self.kinematics
-        start = np.array([given.get(n, guess.get(n, 0.0)) for n in k.names], dtype=float)
+        given, guess = self.settle(given), self.settle(guess)
+        neutral = dict(zip(k.names, self.neutral, strict=True))
+        start = np.array([given.get(n, guess.get(n, neutral[n])) for n in k.names], dtype=float)
         held = [j for j, n in enumerate(k.names) if n in given]
         rough = self._equations(guess)
         if rough is not None:  # come near the guessed coordinates of cut joints first
-            free = np.array([0.0 if n in given else 1.0 for n in k.names])
+            free = np.ones(self.n)
+            free[self.scales.velocities(held)] = 0.0
             start = close(System(self.position, self.scales, free, rough), start)[0]
         for (name, _), value in zip(k.hints, self._hints(start), strict=True):
             if name not in given and name not in guess:
@@ -195,7 +211,8 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
         return replace(_judge_assumed(functions, wanted), assumed=True)
     given = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
-    positions = {n: x for n, x in given.items() if not n.endswith("_dot")}
+    known = {*kinematics.names, *kinematics.loop_coordinates.names}
+    positions = {n: x for n, x in given.items() if n in known}
     found = functions.close(positions, guess)
     judged = _partition(functions, [found.q, *_probe(functions, found.q)], wanted)
     return replace(judged, residual=found.residual, restarts=found.restarts)
@@ -203,9 +220,14 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
-    known = (*kinematics.names, *kinematics.loop_coordinates.names)
+    known = (*kinematics.freedoms, *kinematics.loop_coordinates.names)
     for name in wanted:
+        if name in kinematics.freedoms:
+            continue
         if name in kinematics.names:
+            message = f"{name!r} is an Euler parameter, which cannot vary on its own"
+            remedy = f"choose the angular velocity instead, of {', '.join(kinematics.freedoms)}"
+            problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:
             message = f"{name!r} belongs to the joint that closes its loop, as the other joints were chosen too"
@@ -226,7 +248,7 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
 
 def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
     """Without parameter values: made-up ones, assembled if that works, else judged off the manifold."""
-    zero = np.zeros(functions.n)
+    zero = functions.neutral
     if not functions.m:
         return _partition(functions, [zero], wanted)
     for k in range(5):  # some sizes close a loop and some do not
@@ -234,28 +256,29 @@ def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mob
         trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
         attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
         try:
-            q = attempt.close({}, {n: 0.3 + 0.1 * j for j, n in enumerate(functions.kinematics.names)}).q
+            bent = functions.scales.move(functions.neutral, 0.3 + 0.1 * np.arange(float(functions.n)))
+            q = attempt.close({}, dict(zip(functions.kinematics.names, bent, strict=True))).q
         except AssemblyError:
             continue
         return _partition(attempt, [q, *_probe(attempt, q)], wanted)
     generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, functions.n))
-    return _partition(functions, list(generic), wanted)
+    return _partition(functions, [functions.scales.move(zero, step) for step in generic.astype(float)], wanted)
 
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     """More assembled configurations, reached along the null space from q."""
     found = []
     random = np.random.default_rng(1)
-    if not functions.m:
-        return [q + functions.scales.q * random.uniform(0.2, 0.9, functions.n) for _ in range(PROBES)]
+    if not functions.h:
+        return [functions.scales.move(q, random.uniform(0.2, 0.9, functions.n)) for _ in range(PROBES)]
     for k in range(PROBES):
-        J = functions.scaled_jacobian(q)
+        J = functions.scaled_jacobian(q)[: functions.h]
         basis = np.linalg.svd(J)[2][rank(J).rank :]
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
         if length == 0.0:
             break
-        start = q + (0.1 + 0.1 * k) / length * step * functions.scales.q
+        start = functions.scales.move(q, (0.1 + 0.1 * k) / length * step)
         try:
             closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
         except AssemblyError:
@@ -266,7 +289,7 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
 
 def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], wanted: Sequence[str]) -> Mobility:
     kinematics = functions.kinematics
-    names, labels = kinematics.names, kinematics.constraints.labels
+    names, labels = kinematics.freedoms, kinematics.constraints.labels
     n = len(names)
     q = configurations[0]
     jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
@@ -301,11 +324,12 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
+        n_positions=n - max(rank(J[: functions.h]).rank for J in jacobians),
     )
 
 
 def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
-    names = kinematics.names
+    names = kinematics.freedoms
     n_dof = len(names) - r
     picked = [names.index(name) for name in wanted]
     if len(picked) == n_dof:

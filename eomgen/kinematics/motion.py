@@ -10,6 +10,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
+from .state import State
 from .tree import Poses, Twist
 from .turns import sum_of_turns
 
@@ -23,22 +24,24 @@ class Motion:
     ----------
     coordinates : mapping
         ``name -> (value, rate, acceleration)`` of every joint coordinate, tree and cut.
+    turning : mapping, optional
+        ``name -> (predecessor, successor, axis)`` of the angular velocities that are velocities of cut joints.
     """
 
     def __init__(
         self,
         poses: Poses,
         twists: Sequence[Twist],
-        state: tuple[Sequence[Expr], Sequence[Expr], Sequence[Expr], Expr],
+        state: State,
         coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
+        turning: Mapping[str, tuple[Marker, Marker, int]] | None = None,
     ) -> None:
         self.graph = poses.graph
         self.poses = poses
         self.twists = twists
         self.coordinates = coordinates
-        q, v, a, t = state
-        self.q, self.v = q, v
-        self._along = dict(zip(q, v, strict=True)) | dict(zip(v, a, strict=True)) | {t: self.graph.one}
+        self.state = state
+        self.turning = turning or {}
 
     def relative(self, start: Marker, end: Marker) -> Frame:
         """Placement of marker ``end`` in the axes of marker ``start``."""
@@ -73,7 +76,7 @@ class Motion:
 
     def acceleration(self, marker: Marker) -> Vec3:
         """Acceleration of the marker's origin, ground axes (m/s^2)."""
-        x, y, z = jvp(list(self.velocity(marker)), self._along)
+        x, y, z = jvp(list(self.velocity(marker)), self.state.along)
         return (x, y, z)
 
     def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
@@ -84,12 +87,12 @@ class Motion:
         base = self.poses.common(start, end)
         outer = self.poses.marker(start, base).rotation
         rotation = vec.product(vec.transpose(outer), self.poses.marker(end, base).rotation)
-        found = sum_of_turns(self.graph, rotation, self.q)
+        found = sum_of_turns(self.graph, rotation, self.state.q)
         if found is not None:
             angle, terms = found
             rate = self.graph.zero
             for j, factor in terms:
-                rate = rate + factor * self.v[j]
+                rate = rate + factor * self.state.rates[j]
             return angle, rate, True
         axis = vec.transpose(self.rotation(start))[2]
         relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
@@ -113,6 +116,12 @@ class Motion:
                 symbol = self.graph.symbol(name + suffix)
                 if name + suffix in used and symbol != value:
                     mapping[symbol] = value
+        for name, (start, end, axis) in self.turning.items():
+            if name in used or f"{name}_dot" in used:
+                relative = vec.sub(self.angular_velocity(end), self.angular_velocity(start))
+                value = vec.transpose_times(self.rotation(end), relative)[axis]
+                mapping[self.graph.symbol(name)] = value
+                mapping[self.graph.symbol(f"{name}_dot")] = jvp([value], self.state.along)[0]
         look = (self.position, self.velocity, self.acceleration)
         for name, quantity in mechanism.quantities.items():
             if name in used:

@@ -22,7 +22,9 @@ class MechanismReport:
     gruebler_kutzbach_planar : int or None
         The same with 3 - f, where the mechanism moves in a plane.
     constraints : int
-        Constraint rows that do not vanish identically, of ``constraints_declared``.
+        Rows that do not vanish identically, of ``constraints_declared``; ``nonholonomic`` of them at velocity level.
+    degrees_of_freedom, configuration_freedoms : int
+        Independent velocities; independent coordinates, which nonholonomic constraints do not restrict.
     redundant : list of str
         Rows that follow from the others at the reference configuration.
     """
@@ -37,10 +39,12 @@ class MechanismReport:
     independent: list[str]
     dependent: list[str]
     constraints: int
+    nonholonomic: int
     constraints_declared: int
     rank: int
     ranks: list[int]
     degrees_of_freedom: int
+    configuration_freedoms: int
     gruebler_kutzbach: int | None
     gruebler_kutzbach_planar: int | None
     redundant: list[str]
@@ -70,7 +74,8 @@ class MechanismReport:
         if self.constraints_declared:
             vanishing = self.constraints_declared - self.constraints
             note = f" ({vanishing} more hold identically)" if vanishing else ""
-            say("constraints", f"{self.constraints}{note}")
+            kept = f", {self.nonholonomic} of them nonholonomic" if self.nonholonomic else ""
+            say("constraints", f"{self.constraints}{kept}{note}")
             say("rank", f"{self.rank}" + (f"; redundant: {_list(self.redundant)}" if self.redundant else ""))
         if len(set(self.ranks)) > 1:
             say("", f"the rank differs between configurations: {sorted(set(self.ranks))}")
@@ -80,6 +85,8 @@ class MechanismReport:
         if self.gruebler_kutzbach_planar is not None:
             counts.append(f"{self.gruebler_kutzbach_planar} in the plane")
         say("degrees of freedom", f"{self.degrees_of_freedom}" + (f" ({', '.join(counts)})" if counts else ""))
+        if self.nonholonomic:
+            say("of the configuration", str(self.configuration_freedoms))
         say("independent", _list(self.independent) or "none")
         if self.dependent:
             say("dependent", f"{_list(self.dependent)} (conditioning {self.conditioning:.2g})")
@@ -108,7 +115,7 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     names = ["ground", *(b.name for b in m.bodies)]
     spatial = planar = None
     if m.lagrangian is None:
-        freedoms = [len(j.coordinates) for j in m.joints]
+        freedoms = [len(j.velocities) for j in m.joints]
         spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
         if _moves_in_a_plane(kinematics):
             planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
@@ -134,11 +141,13 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
         loop_coordinates=list(kinematics.loop_coordinates.names),
         independent=list(mobility.independent),
         dependent=list(mobility.dependent),
-        constraints=len(c.values),
+        constraints=len(c.labels),
+        nonholonomic=c.nonholonomic,
         constraints_declared=c.declared,
         rank=mobility.rank,
         ranks=list(mobility.ranks),
         degrees_of_freedom=mobility.n_dof,
+        configuration_freedoms=mobility.n_positions,
         gruebler_kutzbach=spatial,
         gruebler_kutzbach_planar=planar,
         redundant=list(mobility.redundant),

@@ -1,8 +1,8 @@
 """Stage kinematics: Mechanism -> Topology, the spanning tree and the joints that close loops.
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
-coordinates the user did not name before one they named; among equals the one that leaves the shortest chains; then
-the last declared.
+coordinates the user did not name (and whose angular velocity they did not give) before one they named; among equals
+the one that leaves the shortest chains; then the last declared.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class Topology:
     cut: tuple[int, ...]
 
 
-def _rank(spec: JointSpec, independent: Collection[str]) -> int:
-    if any(name in independent for name in spec.coordinates):
+def _rank(spec: JointSpec, independent: Collection[str], initial: Collection[str]) -> int:
+    if any(name in independent for name in (*spec.coordinates, *spec.velocities)):
         return 0
-    return 1 if spec.named or not spec.coordinates else 2
+    return 1 if spec.named or not spec.coordinates or any(name in initial for name in spec.velocities) else 2
 
 
 class _Forest:
@@ -116,7 +116,9 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     """
     joints, n = mechanism.joints, len(mechanism.bodies)
     forest = _Forest(n)
-    rank = [_rank(spec, independent) for spec in joints]
+    rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
+    given = rates.intersection(mechanism.initial)
+    rank = [_rank(spec, independent, given) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
     tree = {k for k in order if forest.join(*_ends(joints[k]))}
     branches = _walk(n, joints, tree)

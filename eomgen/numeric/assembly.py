@@ -73,12 +73,12 @@ def assemble(
         With the rows that stay open, what was held, and whether leaving the given values free helps.
     """
     guess = np.asarray(guess, dtype=float)
-    held = np.asarray(held, dtype=np.intp)
-    free = np.ones(len(guess))
+    held = scales.velocities(held)
+    free = np.ones(len(scales.q))
     free[held] = 0.0
     system = System(position, scales, free, equations)
     best, least, flipped = guess, np.inf, False
-    for attempt, start in enumerate(starts(guess, free * scales.q, restarts)):
+    for attempt, start in enumerate(starts(guess, free, scales, restarts)):
         with np.errstate(all="ignore"):
             q, residual = close(system, start)
         if not closed(residual):
@@ -87,19 +87,19 @@ def assemble(
         elif alignment is not None and not (np.asarray(alignment(q)) > 0.0).all():
             flipped = True
         else:
-            return Assembly(q, residual, attempt, largest((q - guess) / scales.q))
+            return Assembly(q, residual, attempt, largest(scales.distance(q, guess)))
     failure = _Failure(system, guess, held, best, flipped, names, labels, restarts)
     raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])
 
 
-def starts(guess: Array, reach: Array, restarts: int) -> Iterator[Array]:
+def starts(guess: Array, free: Array, scales: Scales, restarts: int) -> Iterator[Array]:
     """The guess, then `restarts` places around it, ever farther away; the same ones every time."""
     yield guess
     for k in range(restarts):
         radius = RADII[min(k * len(RADII) // restarts, len(RADII) - 1)]
         # Halton sequence; the shifted index keeps later coordinates from repeating earlier ones
-        unit = [_halton(k + 1 + 7 * (i // len(PRIMES)), PRIMES[i % len(PRIMES)]) for i in range(len(guess))]
-        yield guess + radius * reach * (2.0 * np.array(unit) - 1.0)
+        unit = [_halton(k + 1 + 7 * (i // len(PRIMES)), PRIMES[i % len(PRIMES)]) for i in range(len(free))]
+        yield scales.move(guess, radius * free * (2.0 * np.array(unit) - 1.0))
 
 
 def _halton(index: int, base: int) -> float:
@@ -136,8 +136,8 @@ class _Failure(NamedTuple):
                 f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
                 "check the dimensions, or give a better guess"
             )
-        free = System(self.system.position, self.system.scales, np.ones_like(self.guess))
-        for start in starts(self.best, free.scales.q, self.restarts // 2):
+        free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
+        for start in starts(self.best, free.free, free.scales, self.restarts // 2):
             with np.errstate(all="ignore"):
                 q, residual = close(free, start)
             if closed(residual):
@@ -148,7 +148,7 @@ class _Failure(NamedTuple):
                 f"({self.restarts + 1} starts tried): {gaps}; check the dimensions, or give a better guess"
             )
         near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
-        dof = len(q) - rank(free.evaluate(q)[1]).rank
+        dof = len(free.free) - rank(free.evaluate(q)[1]).rank
         if len(given) > dof:
             return (
                 f"the given values {', '.join(given)} are inconsistent: {len(given)} values for {dof} "
@@ -162,7 +162,7 @@ class _Failure(NamedTuple):
 
     def _given(self, q: Array, y: Array) -> list[str]:
         names = self.names or [f"q[{i}]" for i in range(len(q))]
-        coordinates = [f"{names[i]} = {q[i]:.6g}" for i in self.held]
+        coordinates = [f"{names[i]} = {q[i]:.6g}" for i in self.system.scales.coordinates(self.held)]
         functions = self.system.equations.names if self.system.equations else ()
         return coordinates + [f"{name} = {value:.6g}" for name, value in zip(functions, y, strict=True)]
 

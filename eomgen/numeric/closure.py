@@ -37,13 +37,13 @@ class System(NamedTuple):
 
     position: Position
     scales: Scales
-    free: Array  #: (n,) 1.0 for a coordinate that may move, 0.0 for a held one
+    free: Array  #: (n,) 1.0 for a velocity of a coordinate that may move, 0.0 for a held one
     equations: Equations | None = None
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Scaled residual e (m + k,) and its scaled Jacobian (m + k, n), zero in the columns of held coordinates."""
         C, C_q = self.position(q)
-        e, J = self.scales.residual(C), self.scales.jacobian(C_q)
+        e, J = self.scales.residual(C), self.scales.jacobian(C_q[: len(C)])
         if self.equations is not None:
             y, y_q = self.equations.evaluate(q)
             s = self.equations.scales
@@ -77,7 +77,7 @@ def close(system: System, q: Array, steps: int = STEPS) -> tuple[Array, float]:
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest
-        trial = q + system.scales.q * dz
+        trial = system.scales.move(q, dz)
         e_trial, J_trial = system.evaluate(trial)
         gained = float(e @ e - e_trial @ e_trial)
         if not gained > 0.0:  # NaN included

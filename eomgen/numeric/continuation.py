@@ -35,7 +35,7 @@ def follow(
     start : (n,) array
         A closed position.
     held : (k,) array of int
-        Coordinates that are led.
+        Coordinates that are led; all four Euler parameters of a rotation or none.
     values : (k,) array
         Their values at the end, reached exactly.
     equations : Equations, optional
@@ -50,23 +50,25 @@ def follow(
     AssemblyError
         The way is blocked (a dead centre of a led coordinate), or longer than 200 rad or length scales.
     """
-    q = np.array(start)
-    way = values - q[held]
+    q, target = np.array(start), np.array(start)
+    target[held] = values
+    moving = scales.velocities(held)
+    free = np.ones_like(scales.q)
+    free[moving] = 0.0
+    way = (1.0 - free) * scales.distance(target, start)
     gap = equations.difference(equations.evaluate(q)[0]) if equations else np.empty(0)
-    length = max(largest(way / scales.q[held]), largest(gap / equations.scales) if equations else 0.0)
+    length = max(largest(way), largest(gap / equations.scales) if equations else 0.0)
     if not length <= LONGEST:
         raise AssemblyError(f"the way from the reference position is too long ({length:.3g})")
-    free = np.ones_like(q)
-    free[held] = 0.0
     done, step = 0.0, min(1.0, STEP / length) if length else 1.0
     usual = step
     while done < 1.0:
         reached = min(1.0, done + step)
         trial = np.array(q)
-        trial[held] = values if reached == 1.0 else start[held] + reached * way
+        trial[held] = values if reached == 1.0 else scales.move(start, reached * way)[held]
         part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
         trial, residual = close(System(position, scales, free, part), trial, steps=15)
-        if closed(residual) and largest((trial - q) / scales.q) <= JUMP:
+        if closed(residual) and largest(scales.distance(trial, q)) <= JUMP:
             q, done = trial, reached
             step = min(2.0 * step, usual)
         else:

@@ -29,7 +29,7 @@ def solve_dependent(
     rank : int
         Number of dependent coordinates.
     independent : sequence of int
-        Columns held.
+        Columns held; the velocities of plain coordinates.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def solve_dependent(
         longest = largest(dz)
         if longest > DAMPING:
             dz *= DAMPING / longest
-        q = q - scales.q * dz
+        q = scales.move(q, -dz)
         before = size
     if size <= ACCEPTED:
         return q, C_q, split
@@ -107,7 +107,7 @@ def kinematics(
     independent = np.asarray(independent, dtype=np.intp)
     s = scales.q
     q = np.array(guess, dtype=float)
-    q[independent] = q_i
+    q[scales.coordinates(independent)] = q_i
     if not rank:
         v, a = np.empty_like(q), np.empty_like(q)
         v[independent], a[independent] = v_i, a_i

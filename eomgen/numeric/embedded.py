@@ -99,20 +99,22 @@ def rhs(
     rank: int,
     independent: Sequence[int] | Indices,
 ) -> Array:
-    """x' = [v, a] (2 n,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
+    """x' = [q', a] (n_x,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
     q, v = project(position, rate, q, v, scales)
     here = terms(q, v)
-    return np.concatenate([v, accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))])
+    return np.concatenate(
+        [scales.rates(q, v), accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))]
+    )
 
 
 class Residuals(NamedTuple):
     """Derivatives of r1 = M a + h + C_q^T l, r2 = C_q a + gamma, r3 = C_q v + C_t at fixed a, l."""
 
-    r1_q: Array  #: (n, n)
+    r1_q: Array  #: (n, n_q)
     r1_v: Array  #: (n, n)
-    r2_q: Array  #: (m, n)
+    r2_q: Array  #: (m, n_q)
     r2_v: Array  #: (m, n)
-    r3_q: Array  #: (m, n)
+    r3_q: Array  #: (m, n_q)
 
 
 def jacobian(
@@ -126,7 +128,7 @@ def jacobian(
     rank: int,
     independent: Sequence[int] | Indices,
 ) -> Array:
-    """Derivative (2 n, 2 n) of :func:`rhs` by [q; v], projection included.
+    """Derivative (n_x, n_x) of :func:`rhs` by [q; v], projection included.
 
     Parameters
     ----------
@@ -135,7 +137,7 @@ def jacobian(
     q, v : (n,) arrays
         A state on the manifold, where the result is exact; others are projected first.
     """
-    n, s = len(q), scales.q
+    n, n_q, s = len(v), len(q), scales.q
     q, v = project(position, rate, q, v, scales)
     here = terms(q, v)
     system = embed(here.M, here.C_q, scales, rank, independent)
@@ -145,16 +147,26 @@ def jacobian(
     # dependent rows of C_q^T l = -(M a + h); redundant rows carry nothing
     multipliers[split.rows] = split.multipliers(-s * (here.M @ a + here.h)) / scales.c[split.rows]
     r = residuals(q, v, a, multipliers)
-    dq, dv = np.eye(n, 2 * n), np.eye(n, 2 * n, n)
+    dq, dv = np.eye(n_q, n_q + n), np.eye(n, n_q + n, n_q)
     if len(here.gamma):
-        P = tangent_projector(here.C_q, scales)
-        dq = np.hstack([P, np.zeros((n, n))])
-        dv = np.hstack([-minimum_norm(here.C_q, r.r3_q @ P, scales), P])
+        turn = _project_directions(q, position(q), scales)
+        dq = np.hstack([turn, np.zeros((n_q, n))])
+        dv = np.hstack([-minimum_norm(here.C_q, r.r3_q @ turn, scales), tangent_projector(here.C_q, scales)])
     a_p = split.particular(-(r.r2_q @ dq + r.r2_v @ dv) / scales.c[:, None])
     da = s[:, None] * (a_p - system.solve(s[:, None] * (r.r1_q @ dq + r.r1_v @ dv) + system.M @ a_p))
     if not np.isfinite(da).all():
         raise NonFiniteError("the Jacobian is not finite")
-    return np.vstack([dv, da])
+    return np.vstack([dv if scales.space is None else scales.space.change(q, dq, v[:, None], dv), da])
+
+
+def _project_directions(q: Array, here: tuple[Array, Array], scales: Scales) -> Array:
+    """Derivative (n_q, n_q) of the projected q by q at a closed position; lengths of Euler parameters are kept."""
+    P = tangent_projector(here[1][: len(here[0])], scales)
+    if scales.space is None:
+        return P
+    unit = np.eye(len(q))
+    moved = scales.space.rates(q, P @ scales.space.velocities(q, unit))
+    return np.asarray(moved + scales.space.stretch(q, unit))
 
 
 def embedded_mass(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence[int] | Indices) -> Array:

@@ -73,12 +73,12 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
             raise NonFiniteError("the constraints are not finite")
         if step == STEPS:
             break
-        J = scales.jacobian(C_q)
+        J = scales.jacobian(C_q[: len(e)])
         dz = J.T @ gram_solve(J, e, max(TIKHONOV, size))
         longest = largest(dz)
         if longest > DAMPING:
             dz *= DAMPING / longest
-        q = q - scales.q * dz
+        q = scales.move(q, -dz)
         before = size
     if size <= ACCEPTED:
         return q, C_q
@@ -127,7 +127,7 @@ def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
     the result, and leave four digits of it.
     """
     J = scales.jacobian(C_q)
-    z = y / scales.c[:, None]
+    z = y / scales.c[: len(y), None]
     x = J.T @ gram_solve(J, z)
     x += J.T @ gram_solve(J, z - J @ x)  # second step, as in correct_velocity
     return np.asarray(scales.q[:, None] * x)
@@ -138,4 +138,6 @@ def tangent_projector(C_q: Array, scales: Scales) -> Array:
 
     The derivative, at a point of the manifold, of the projected q by q and of the projected v by v.
     """
+    if not len(C_q):
+        return np.eye(len(scales.q))
     return np.asarray(np.eye(len(scales.q)) - minimum_norm(C_q, C_q, scales))

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
-Indices: TypeAlias = NDArray[np.intp]
-#: q (n,) -> C (m,), C_q (m, n)
+from .space import Array, Indices, Space
+
+__all__ = ["Array", "Indices", "Position", "Rate", "Scales", "Space"]
+
+#: q (n_q,) -> C (h,) of the holonomic rows, C_q (m, n) of all rows, the holonomic ones first
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 #: q (n,) -> C_t (m,)
 Rate: TypeAlias = Callable[[Array], Array]
@@ -19,25 +20,62 @@ Rate: TypeAlias = Callable[[Array], Array]
 class Scales(NamedTuple):
     """Typical sizes: the length scale L of the mechanism for lengths, 1 for angles.
 
-    A scaled coordinate is ``q / scales.q``, a scaled residual ``C / scales.c``, the scaled Jacobian
-    ``C_q * scales.q / scales.c[:, None]``.
+    A scaled velocity is ``v / scales.q``, a scaled residual ``C / scales.c``, the scaled Jacobian
+    ``C_q * scales.q / scales.c[:, None]``.  Steps and distances of coordinates are measured by the velocities that
+    make them, in unit time: the same thing where q' = v, an angle of rotation for Euler parameters.
     """
 
-    q: Array  #: (n,) of the coordinates
-    c: Array  #: (m,) of the constraint rows
+    q: Array  #: (n,) of the velocities, times a second
+    c: Array  #: (m,) of the constraint rows, holonomic ones first
+    space: Space | None = None  #: where q' = N(q) v, how coordinates move with velocities
 
     @classmethod
-    def of_kinds(cls, coordinates: Sequence[str], rows: Sequence[str], length: float) -> Scales:
+    def of_kinds(
+        cls, velocities: Sequence[str], rows: Sequence[str], length: float, space: Space | None = None
+    ) -> Scales:
         """Scales from kinds, each ``"angle"`` or ``"length"``, and the length scale in metres."""
         return cls(
-            np.array([length if kind == "length" else 1.0 for kind in coordinates]),
+            np.array([length if kind == "length" else 1.0 for kind in velocities]),
             np.array([length if kind == "length" else 1.0 for kind in rows]),
+            space,
         )
 
     def jacobian(self, C_q: Array) -> Array:
-        """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n)."""
-        return C_q * self.q / self.c[:, None]
+        """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first."""
+        return C_q * self.q / self.c[: len(C_q), None]
 
     def residual(self, C: Array) -> Array:
-        """The scaled residual e = C / s_c, (m,)."""
-        return C / self.c
+        """The scaled residual e = C / s_c, (m,), of all rows or the first."""
+        return C / self.c[: len(C)]
+
+    def move(self, q: Array, dz: Array) -> Array:
+        """The coordinates (n_q,) a scaled step (n,) away."""
+        return q + self.q * dz if self.space is None else self.space.move(q, self.q * dz)
+
+    def distance(self, a: Array, b: Array) -> Array:
+        """The scaled step (n,) from b to a."""
+        return np.asarray((a - b if self.space is None else self.space.difference(a, b)) / self.q)
+
+    def rates(self, q: Array, v: Array) -> Array:
+        """q' = N(q) v."""
+        return v if self.space is None else self.space.rates(q, v)
+
+    def coordinates(self, velocities: Sequence[int] | Indices) -> Indices:
+        """The coordinates that stand still when these velocities do."""
+        chosen = np.asarray(velocities, dtype=np.intp)
+        if self.space is None:
+            return chosen
+        space = self.space
+        found = [int(space.plain_q[np.searchsorted(space.plain_v, k)]) for k in chosen if k in space.plain_v]
+        found += [k for i, j in space.balls if j in chosen for k in range(i, i + 4)]
+        return np.array(found, dtype=np.intp)
+
+    def velocities(self, coordinates: Sequence[int] | Indices) -> Indices:
+        """The velocities that move these coordinates; all three for one Euler parameter."""
+        chosen = np.asarray(coordinates, dtype=np.intp)
+        if self.space is None:
+            return chosen
+        space = self.space
+        found = [int(space.plain_v[np.searchsorted(space.plain_q, k)]) for k in chosen if k in space.plain_q]
+        found += [k for i, j in space.balls if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
+        return np.array(found, dtype=np.intp)

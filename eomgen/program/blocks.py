@@ -50,7 +50,7 @@ class BlockMaker:
         """Whether the Jacobian of the residuals is too large to be written out."""
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
-        return 2 * self.sizes.n_v * nodes > self.limits.jacobian_nodes
+        return self.sizes.n_x * nodes > self.limits.jacobian_nodes
 
     # -- shared expressions ---------------------------------------------------------------------------------------
     @cached_property
@@ -85,6 +85,15 @@ class BlockMaker:
             r2.append(r)
         return r2
 
+    def _normalised(self) -> list[Expr]:
+        """q with Euler parameters of length 1."""
+        q = self._symbols(self.terms.q)
+        for i, _ in self.terms.balls:
+            e = q[i : i + 4]
+            length = self.terms.graph.apply("sqrt", e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
+            q[i : i + 4] = [x / length for x in e]
+        return q
+
     # -- blocks ---------------------------------------------------------------------------------------------------
     def port(self, name: str) -> Port:
         """The symbols behind the name of a port."""
@@ -94,7 +103,7 @@ class BlockMaker:
             "q": terms.q,
             "v": terms.v,
             "a": terms.a,
-            "q_i": tuple(terms.q[i] for i in independent),
+            "q_i": tuple(terms.q[terms.coordinate_of[i]] for i in independent),
             "v_i": tuple(terms.v[i] for i in independent),
             "a_i": tuple(terms.a[i] for i in independent),
             "q_guess": tuple(f"guess({q})" for q in terms.q),
@@ -126,7 +135,7 @@ class BlockMaker:
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
-            "project": lambda: self._symbols((*terms.q, *terms.v)),
+            "project": lambda: [*self._normalised(), *self._symbols(terms.v)],
             "embedded_mass_matrix": lambda: [terms.mass_matrix[i][k] for i in terms.preferred for k in terms.preferred],
             "kinematics": lambda: self._symbols((*terms.q, *terms.v, *terms.a)),
         }
@@ -137,7 +146,7 @@ class BlockMaker:
             outputs = trees[name]()
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
-            outputs = [*self._symbols(terms.v), *accelerations]
+            outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
         elif name == "outputs" and self.unrolled:
@@ -195,10 +204,12 @@ class BlockMaker:
 
     def _residual_jacobian(self) -> list[Expr]:
         terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero
+        n_q = self.sizes.n_q
         residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
         entries = jacobian(residuals, self._symbols((*terms.q, *terms.v)))
         result = []
-        for first, size, columns in ((0, n, (0, n)), (n, m, (0, n)), (n + m, m, (0,))):
-            for start in columns:
-                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(n)]
+        for first, size, columns in ((0, n, "qv"), (n, m, "qv"), (n + m, m, "q")):
+            for column in columns:
+                start, width = (0, n_q) if column == "q" else (n_q, n)
+                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
         return result

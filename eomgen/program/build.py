@@ -60,7 +60,7 @@ def build_program(
     limits = limits or Limits()
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
-    wanted = _select(kernels)
+    wanted = [k for k in _select(kernels) if k.name != "kinematics" or terms.has_minimal_form]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}
@@ -108,6 +108,8 @@ def build_program(
         parameter_only=parameter_only,
         preferred=terms.preferred,
         parent=terms.parent,
+        balls=terms.balls,
+        coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
     )
@@ -122,6 +124,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_p=len(terms.p),
         n_y=len(terms.outputs),
         n_c=terms.n_c,
+        n_h=len(terms.constraints),
         n_dof=terms.n_dof,
         n_bodies=len(terms.poses) // 16,
         n_k=terms.n_k,

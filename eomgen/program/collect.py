@@ -13,6 +13,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
+from ..kinematics.state import acceleration_name
 from .terms import SystemTerms
 
 
@@ -26,9 +27,9 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         graph=kinematics.graph,
         t="t",
         q=names,
-        v=tuple(n + "_dot" for n in names),
-        a=tuple(n + "_ddot" for n in names),
-        multipliers=tuple(f"lambda[{i}]" for i in range(len(c.values))),
+        v=kinematics.velocity_names,
+        a=tuple(map(acceleration_name, kinematics.velocity_names)),
+        multipliers=tuple(f"lambda[{i}]" for i in range(len(c.labels))),
         u=kinematics.input_names,
         p=kinematics.parameter_names,
         mass_matrix=equations.mass_matrix,
@@ -46,11 +47,13 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         loop_coordinates=(*loop.values, *loop.rates, *loop.accelerations),
         loop_coordinate_jacobian=loop.jacobian,
         alignment=c.aligned,
-        coordinate_scales=tuple(scale[kind] for kind in kinematics.kinds),
+        coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
         constraint_scales=tuple(scale[kind] for kind in c.kinds),
         n_dof=mobility.n_dof,
-        preferred=tuple(names.index(n) for n in mobility.independent),
+        preferred=tuple(kinematics.freedoms.index(n) for n in mobility.independent),
         parent=kinematics.parent,
+        balls=kinematics.balls,
+        rates=kinematics.rates if kinematics.balls else (),
     )
 
 
@@ -82,11 +85,14 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     """What a module knows of itself without any expression; sizes and kernels are added by the program."""
     m, c, loop = kinematics.mechanism, kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
-    velocities = [n + "_dot" for n in names]
+    velocities = list(kinematics.velocity_names)
     units: dict[str, str] = {}
     for name, kind in (*zip(names, kinematics.kinds, strict=True), *zip(loop.names, loop.kinds, strict=True)):
-        unit = {"angle": "rad", "length": "m"}[kind]
+        unit = {"angle": "rad", "length": "m", "parameter": "1"}[kind]
         units |= {name: unit, f"{name}_dot": f"{unit}/s", f"{name}_ddot": f"{unit}/s^2"}
+    for _, j in kinematics.balls:
+        for name in velocities[j : j + 3]:
+            units |= {name: "rad/s", acceleration_name(name): "rad/s^2"}
     if m.lagrangian is not None:
         units = {}
     docs: dict[str, str] = {}
@@ -109,10 +115,13 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "y_names": [o.name for o in m.outputs],
         "body_names": [b.name for b in m.bodies],
         "joint_names": [j.name for j in m.joints],
+        "euler_angles": _euler_angles(kinematics),
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),
         "loop_kinds": list(loop.kinds),
         "coordinate_kinds": list(kinematics.kinds),
+        "velocity_kinds": list(kinematics.velocity_kinds),
+        "balls": [list(ball) for ball in kinematics.balls],
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),
@@ -120,9 +129,9 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "u_values": [u.value for u in m.inputs],
         "units": units,
         "docs": docs,
-        "independent": [names.index(n) for n in mobility.independent],
+        "independent": [kinematics.freedoms.index(n) for n in mobility.independent],
         "independent_rows": list(rows),
-        "redundant_rows": [i for i in range(len(c.values)) if i not in rows],
+        "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
         "initial": _numbers(kinematics, "initial"),
         "guess": _numbers(kinematics, "guess"),
@@ -134,6 +143,18 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "atol": m.simulation.atol,
         },
     }
+
+
+def _euler_angles(kinematics: Kinematics) -> list[list[Any]]:
+    """Tree joints in Euler angles: name, middle angle's place in q, and where it is singular: cos or sin = 0."""
+    found: list[list[Any]] = []
+    for branch in kinematics.topology.branches:
+        spec = kinematics.mechanism.joints[branch.joint]
+        sequence = getattr(spec.joint, "sequence", None)
+        if sequence is not None and not spec.joint.balls:
+            vanishing = "sin" if sequence[0] == sequence[2] else "cos"
+            found.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
+    return found
 
 
 def _numbers(kinematics: Kinematics, which: str) -> dict[str, float]:

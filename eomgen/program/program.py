@@ -124,6 +124,8 @@ class Program:
     preferred: tuple[int, ...]
     parent: tuple[int, ...]
     counts: Mapping[str, Operations]
+    balls: tuple[tuple[int, int], ...] = ()
+    coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)
 
     @property

@@ -14,13 +14,14 @@ Row = tuple[Expr, ...]
 class SystemTerms:
     """A mechanism's equations as expressions of one graph, with the names of their symbols.
 
-    n is the number of velocities (and of coordinates: q' = v), m the number of constraint rows, redundant ones
-    included.  Quantities at acceleration level use the symbols `a`, multipliers do not appear in any expression.
+    n is the number of velocities, m the number of constraint rows, redundant ones included.  There are as many
+    coordinates, with q' = v, but for Euler parameters, where q' = N(q) v.  Quantities at acceleration level use the
+    symbols `a`, multipliers do not appear in any expression.
     """
 
     graph: Graph
     t: str  #: symbol of time
-    q: tuple[str, ...]  #: n coordinates
+    q: tuple[str, ...]  #: n coordinates, and one more for each ball
     v: tuple[str, ...]  #: n velocities
     a: tuple[str, ...]  #: n accelerations
     multipliers: tuple[str, ...]  #: m names for the multipliers, one per row
@@ -33,9 +34,9 @@ class SystemTerms:
     kinetic: Expr  #: T of (q, v)
     potential: Expr  #: V of q
 
-    constraints: Row  #: (m,) C of q and t
-    constraint_jacobian: tuple[Row, ...]  #: (m, n) C_q
-    constraint_rate: Row  #: (m,) C_t, the partial derivative by t
+    constraints: Row  #: (m_h,) C of q and t, the holonomic rows, which come first
+    constraint_jacobian: tuple[Row, ...]  #: (m, n) C_q: dC/dq N, and A of the nonholonomic rows A v + b = 0
+    constraint_rate: Row  #: (m,) C_t, the partial derivative by t; b of the nonholonomic rows
     velocity_constraints: Row  #: (m,) C_q v + C_t
     gamma: Row  #: (m,) of (q, v): C'' = C_q a + gamma
 
@@ -48,8 +49,10 @@ class SystemTerms:
     coordinate_scales: Row  #: (n,) typical size of each coordinate, of parameters only
     constraint_scales: Row  #: (m,) typical size of each row's residual, of parameters only
     n_dof: int  #: degrees of freedom; n - n_dof is the rank of C_q
-    preferred: tuple[int, ...]  #: n_dof indices into v: independent coordinates, in the order of q_i
+    preferred: tuple[int, ...]  #: n_dof indices into v: independent velocities, in the order of v_i
     parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
+    balls: tuple[tuple[int, int], ...] = ()  #: where Euler parameters start in q, and their angular velocity in v
+    rates: Row = ()  #: q' where there are balls
 
     @property
     def n_v(self) -> int:
@@ -58,8 +61,21 @@ class SystemTerms:
 
     @property
     def n_c(self) -> int:
-        """Number of constraint rows, redundant ones included."""
-        return len(self.constraints)
+        """Number of constraint rows, redundant and nonholonomic ones included."""
+        return len(self.constraint_jacobian)
+
+    @property
+    def coordinate_of(self) -> tuple[int, ...]:
+        """Per velocity the coordinate whose rate it is, -1 for angular velocities of balls."""
+        turning = {k for _, j in self.balls for k in range(j, j + 3)}
+        parameters = {k for i, _ in self.balls for k in range(i, i + 4)}
+        plain = iter([k for k in range(len(self.q)) if k not in parameters])
+        return tuple(-1 if k in turning else next(plain) for k in range(self.n_v))
+
+    @property
+    def has_minimal_form(self) -> bool:
+        """Whether positions follow from those of the independent velocities."""
+        return self.n_c == len(self.constraints) and all(self.coordinate_of[k] >= 0 for k in self.preferred)
 
     @property
     def n_k(self) -> int:
@@ -76,7 +92,7 @@ class SystemTerms:
         """
         n, m = self.n_v, self.n_c
         sizes = {
-            "q": (len(self.q), n),
+            "q": (len(self.q), n + len(self.balls)),
             "a": (len(self.a), n),
             "multipliers": (len(self.multipliers), m),
             "mass_matrix": (len(self.mass_matrix), n),

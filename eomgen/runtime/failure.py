@@ -10,6 +10,7 @@ from ..errors import STATUS, EvaluationError
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
+LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
@@ -57,6 +58,8 @@ class Fail:
                 f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not",
                 "check the state given",
             )
+        elif status in (1, 2) and names and (trouble := rotation_trouble(self.layout, x)):
+            blame, remedy = f": {trouble[0]}", trouble[1]
         elif self.culprit is not None and names:
             found = self.culprit(status, t, x)
             blame = f": {found}" if found else ""
@@ -66,6 +69,19 @@ class Fail:
     def _names(self, kernel: str) -> Sequence[str]:
         kind = KERNELS[kernel][0] if kernel in KERNELS else ""
         return {"x": self.layout.x, "q": self.layout.q, "motion": self.layout.x + self.layout.a}.get(kind, ())
+
+
+def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
+    """What is wrong with how a rotation is described at a state, and the remedy; None if nothing is."""
+    for i, _ in layout.balls:
+        if not np.abs(x[i : i + 4]).max() > 1e-150:
+            four = f"{layout.q[i]} .. {layout.q[i + 3]}"
+            return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
+    for joint, k, vanishing in layout.metadata.get("euler_angles", ()):
+        if abs(np.cos(x[k]) if vanishing == "cos" else np.sin(x[k])) < LOCKED:
+            what = f"the Euler angles of joint {joint!r} are singular here ({layout.q[k]} = {np.degrees(x[k]):.6g} deg)"
+            return what, f"give joint {joint!r} rotation: euler_parameters, or another sequence"
+    return None
 
 
 def place(names: Sequence[str], x: Array) -> str:

@@ -21,6 +21,7 @@ from ..numeric.continuation import follow
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
+from ..numeric.space import settle
 from .kernels import Kernels
 from .names import UnknownNameError, unknown
 
@@ -64,17 +65,19 @@ class Initial:
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
+            if name in layout.parameter_rates:
+                wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
+                raise UnknownNameError(f"{name!r} follows from the angular velocity; give that instead, of {wanted}")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates)
-        return Given(
-            {n: x for n, x in values.items() if n in self.coordinates},
-            {n: x for n, x in values.items() if n in rates},
-        )
+        positions = {n: x for n, x in values.items() if n in self.coordinates}
+        positions = settle(self.coordinates, layout.coordinate_kinds + layout.loop_kinds, positions)
+        return Given(positions, {n: x for n, x in values.items() if n in rates})
 
     # functions of q
 
     def position(self, q: Array) -> tuple[Array, Array]:
-        """C (n_c,), C_q (n_c, n), all rows."""
+        """C (n_h,) of the holonomic rows, C_q (n_c, n) of all."""
         return self._C(q, t=self.t), self._C_q(q, t=self.t)
 
     def rate(self, q: Array) -> Array:
@@ -148,7 +151,7 @@ class Initial:
         """Position with the given values exact, and the declared ones where they leave room."""
         layout = self.layout
         declared = self.sort(layout.initial).positions
-        if not layout.n_c:
+        if not layout.n_h:
             return self._with(self._with(layout.q_reference, declared), given)
         if not given:
             return self.close(layout.q_reference, declared).q
@@ -173,16 +176,16 @@ class Initial:
     def from_guess(self, guess: Mapping[str, float]) -> Array:
         """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
         layout = self.layout
-        if not layout.n_c:
+        if not layout.n_h:
             return self.assembled(guess)
-        favoured = [layout.q[i] for i in layout.independent]
+        favoured = [layout.freedoms[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
             try:
                 return self.assembled(guess)
             except AssemblyError:
                 pass
-        declared = {**layout.guess, **self.sort(layout.initial).positions}
+        declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
         start = self._with(self._with(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
@@ -195,11 +198,11 @@ class Initial:
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
         """Every position found that holds the given values; `first` comes first."""
         layout = self.layout
-        free = np.ones(layout.n_q)
-        free[[layout.q.index(name) for name in given if name in layout.q]] = 0.0
+        free = np.ones(layout.n_v)
+        free[self.scales.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
         system = System(self.position, self.scales, free, self._equations(given))
         found = [first]
-        for start in starts(first, free * self.scales.q, tries):
+        for start in starts(first, free, self.scales, tries):
             with np.errstate(all="ignore"):
                 q, residual = close(system, start)
             if closed(residual) and self.aligned(q) and all(self._apart(q, other) for other in found):
@@ -207,12 +210,12 @@ class Initial:
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:
-        kinds = self.layout.metadata["coordinate_kinds"]
+        kinds = self.layout.velocity_kinds
         gap = [
-            abs((x - y + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x - y)
-            for x, y, kind in zip(a, b, kinds, strict=True)
+            abs((x + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x)
+            for x, kind in zip(self.scales.distance(a, b), kinds, strict=True)
         ]
-        return largest(np.array(gap) / self.scales.q) > SAME
+        return largest(np.array(gap)) > SAME
 
     def side(self, q: Array) -> float:
         """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
@@ -229,7 +232,7 @@ class Initial:
         if given is None:
             return self._solve_rates(q, declared).v
         rest = {name: value for name, value in declared.items() if name not in given}
-        return self._solve_rates(q, {**given, **self.compatible(q, given, rest)}).v
+        return self._solve_rates(q, {**given, **self.compatible(q, given, rest, positions=False)}).v
 
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
         layout = self.layout
@@ -262,9 +265,18 @@ class Initial:
 
     # which values can be held together
 
-    def compatible(self, q: Array, given: Iterable[str], rest: Mapping[str, float]) -> dict[str, float]:
-        """Those of `rest`, in order, that are independent of the constraints, of `given` and of each other at q."""
-        rows = list(self.scales.jacobian(self._C_q(q, t=self.t))) + [self._row(q, name) for name in given]
+    def compatible(
+        self, q: Array, given: Iterable[str], rest: Mapping[str, float], positions: bool = True
+    ) -> dict[str, float]:
+        """Those of `rest`, in order, that are independent of the constraints, of `given` and of each other at q.
+
+        Nonholonomic constraints count for rates only, where `positions` is False.
+        """
+        layout = self.layout
+        C_q = self._C_q(q, t=self.t)
+        if positions:
+            C_q = C_q[: self.layout.n_h]
+        rows = [*self.scales.jacobian(C_q), *(row for name in given for row in self._row(q, name))]
         basis: Array = np.empty((0, self.layout.n_v))
         if rows:
             stacked = np.array(rows)
@@ -272,24 +284,34 @@ class Initial:
             basis = np.linalg.svd(stacked)[2][:count]
         kept = {}
         for name, value in rest.items():
-            row = self._row(q, name)
-            length = np.linalg.norm(row)
-            left = row - basis.T @ (basis @ row)
-            left -= basis.T @ (basis @ left)
-            size = np.linalg.norm(left)
-            if length > 0.0 and size > INDEPENDENT * length:
-                basis = np.vstack([basis, left / size])
+            added = basis
+            for row in self._row(q, name):
+                length = np.linalg.norm(row)
+                left = row - added.T @ (added @ row)
+                left -= added.T @ (added @ left)
+                size = np.linalg.norm(left)
+                if not (length > 0.0 and size > INDEPENDENT * length):
+                    break
+                added = np.vstack([added, left / size])
+            else:
+                basis = added
                 kept[name] = value
-        return kept
+        whole = [layout.q[i : i + 4] for i, _ in layout.balls]  # Euler parameters are held together or not at all
+        torn = {name for four in whole if not all(name in kept for name in four) for name in four}
+        return {name: value for name, value in kept.items() if name not in torn}
 
-    def _row(self, q: Array, name: str) -> Array:
-        """The scaled gradient of a coordinate or rate."""
-        layout = self.layout
-        for names in (layout.q, layout.v):
-            if name in names:
-                return np.asarray(np.eye(layout.n_v)[names.index(name)])
+    def _row(self, q: Array, name: str) -> list[Array]:
+        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
+        layout, unit = self.layout, np.eye(self.layout.n_v)
+        if name in layout.v:
+            return [unit[layout.v.index(name)]]
+        if name in layout.q:
+            index = layout.q.index(name)
+            if any(i < index < i + 4 for i, _ in layout.balls):
+                return []
+            return [unit[k] for k in self.scales.velocities([index])]
         index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)
-        return np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])
+        return [np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])]
 
     def _with(self, q: Array, values: Mapping[str, float]) -> Array:
         result = np.array(q)

@@ -37,7 +37,7 @@ class Kernels:
         self.layout = layout
         self.context = core.context(p, u, UsageError)
         self.fail = Fail(layout, self._culprit)
-        self.constraints = Rows(self.state("constraints"), layout.rows)
+        self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
 
     def timed(self, name: str, nan: bool = False) -> Timed:
@@ -51,7 +51,7 @@ class Kernels:
         if name not in self.core.names:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            if layout.rank == 0 and name == "project":
+            if layout.rank == 0 and name == "project" and layout.space is None:
                 return Identity(layout.n_x)
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
@@ -77,17 +77,18 @@ class Kernels:
                 return ""
             values, vectors = np.linalg.eigh(M)
             weights = np.abs(vectors[:, 0])
-            names = [layout.q[i] for i, w in zip(layout.independent, weights, strict=True) if w > 0.1 * weights.max()]
+            moved = zip(layout.independent, weights, strict=True)
+            names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
             moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
             return f"moving {moving} meets no inertia (smallest eigenvalue {values[0]:.2g})"
         if status == 3:
             e = self.state("constraints", nan=True)(q, t=t)
             if not np.isfinite(e).all() or not e.size:
                 return ""
-            worst = int(np.abs(e / layout.scales.c).argmax())
+            worst = int(np.abs(layout.scales.residual(e)).argmax())
             return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
         if status == 4:
-            return f"independent are {', '.join(layout.q[i] for i in layout.independent)}"
+            return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
         return ""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Array, Scales, Space
 from .names import check_names
 
 ABI = 1  #: layout of the metadata this file reads
@@ -46,23 +46,55 @@ class Layout:
         self.n_q, self.n_v, self.n_x = len(self.q), len(self.v), len(self.q) + len(self.v)
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)
+        self.n_h: int = data.get("n_h", self.n_c)
+        self.balls: tuple[tuple[int, int], ...] = tuple((int(i), int(j)) for i, j in data.get("balls", ()))
+        self.space = Space.of(self.n_v, self.balls)
+        self.freedoms = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
+        #: rates of Euler parameters, which are in q' but not in v
+        self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.balls for name in self.q[i : i + 4])
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
+        kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
+        self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
+        self.velocity_kinds = tuple(kinds)
         self.length: float = float(data.get("length_scale") or 1.0)
-        self.scales = Scales.of_kinds(data["coordinate_kinds"], data.get("constraint_kinds", ()), self.length)
+        self.scales = Scales.of_kinds(kinds, data.get("constraint_kinds", ()), self.length, self.space)
+        #: coordinates of the independent velocities, where each is the rate of one
+        self.independent_q = self.scales.coordinates(self.independent)
         self.units: dict[str, str] = data.get("units", {})
-        kinds: Sequence[str] = data.get("loop_kinds") or [
+        loop_kinds: Sequence[str] = data.get("loop_kinds") or [
             "length" if self.units.get(name) == "m" else "angle" for name in self.loops
         ]
-        self.loop_angles = np.array([kind != "length" for kind in kinds], dtype=bool)
-        self.loop_scales = np.where(self.loop_angles, 1.0, self.length)
+        self.loop_kinds = tuple(loop_kinds)
+        self.loop_angles = np.array([kind == "angle" for kind in loop_kinds], dtype=bool)
+        self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in loop_kinds])
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
         reference = data.get("q_reference")
-        self.q_reference = np.zeros(self.n_q) if reference is None else np.array(reference, dtype=float)
+        neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
+        self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+
+    def require_minimal_form(self) -> None:
+        """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.
+
+        Raises
+        ------
+        UsageError
+        """
+        turning = [self.v[i] for i in self.independent if self.freedoms[i] == self.v[i]]
+        if self.n_h < self.n_c:
+            reason = "nonholonomic constraints restrict velocities and not positions"
+        elif turning:
+            reason = f"the independent {', '.join(turning)} are rates of no coordinate (rotation: euler_parameters)"
+        else:
+            return
+        remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
+        if turning:
+            remedy += "; or choose other independent coordinates, or rotation: euler_angles"
+        raise UsageError(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
@@ -131,7 +163,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "bias": ("x", ("n_v",)),
     "inverse_dynamics": ("motion", ("n_v",)),
     "energy": ("x", (2,)),
-    "constraints": ("q", ("n_c",)),
+    "constraints": ("q", ("n_h",)),
     "constraint_jacobian": ("q", ("n_c", "n_v")),
     "velocity_constraints": ("x", ("n_c",)),
     "project": ("x", ("n_x",)),

@@ -41,12 +41,12 @@ class Minimal:
         self._module = module
         self._layout = layout
         self._path = Path(module.kernels)
-        self.q_names = tuple(layout.q[i] for i in layout.independent)
+        self.q_names = tuple(layout.q[i] for i in layout.independent_q)
         self.v_names = tuple(layout.v[i] for i in layout.independent)
         self.x_names = self.q_names + self.v_names
         self.n_x = len(self.x_names)
         self._q: Array | None = None
-        self._recent: list[tuple[float, Array]] = []  # time and x' of the last calls
+        self._recent: list[tuple[float, Array]] = []  # time, velocities and accelerations of the last calls
 
     def __repr__(self) -> str:
         return f"<minimal form of {self._layout.name}: x = [{', '.join(self.x_names)}]>"
@@ -74,7 +74,7 @@ class Minimal:
         """The independent part (n_x,) or (n_x, k) of full states (2 n,) or (2 n, k)."""
         full = np.asarray(x, dtype=float)
         chosen = self._layout.independent
-        return np.concatenate([full[chosen], full[self._layout.n_q + chosen]])
+        return np.concatenate([full[self._layout.independent_q], full[self._layout.n_q + chosen]])
 
     def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Full states from minimal ones.
@@ -133,8 +133,9 @@ class Minimal:
         before = self._q
         full = self._solve(t, state)
         x_dot = self._module.rhs(t, full, u=u)
-        self._check_crossing(t, x_dot, state, before)
-        self._recent = [*self._recent[-REMEMBERED:], (t, x_dot)]
+        motion = np.concatenate([full[self._layout.n_q :], x_dot[self._layout.n_q :]])
+        self._check_crossing(t, motion, state, before)
+        self._recent = [*self._recent[-REMEMBERED:], (t, motion)]
         return self.reduce(x_dot)
 
     def _solve(self, t: float, x: Array) -> Array:
@@ -143,7 +144,7 @@ class Minimal:
             self.reset()
         assert self._q is not None
         q_i, v_i = x[:k], x[k:]
-        way = np.abs((q_i - self._q[self._layout.independent]) / self._path.scales_i)
+        way = np.abs((q_i - self._q[self._layout.independent_q]) / self._path.scales_i)
         near = self._q
         if way.size and not way.max() <= STEP:
             if not np.isfinite(way).all():
@@ -153,7 +154,7 @@ class Minimal:
         self._q = full[:n].copy()
         return full
 
-    def _check_crossing(self, t: float, x_dot: Array, x: Array, before: Array | None) -> None:
+    def _check_crossing(self, t: float, motion: Array, x: Array, before: Array | None) -> None:
         """Refuse a reflection at a dead centre of the independent coordinates.
 
         Near it they look the same on both sides, so an integrator can step across and come back on the old branch: the
@@ -163,8 +164,8 @@ class Minimal:
         if not layout.rank or before is None:
             return
         scales = layout.scales.q
-        v, a = np.abs(x_dot.reshape(2, -1) / scales).max(axis=1)
-        own = np.abs(x_dot[layout.independent] / scales[layout.independent]).max()
+        v, a = np.abs(motion.reshape(2, -1) / scales).max(axis=1)
+        own = np.abs(motion[layout.independent] / scales[layout.independent]).max()
         if v <= AMPLIFIED * own:
             return
         for time, other in self._recent:
@@ -173,8 +174,8 @@ class Minimal:
             own_other = np.abs(other[layout.independent] / scales[layout.independent]).max()
             if v_other <= AMPLIFIED * own_other or gap == 0.0 or min(v, v_other) * gap > 1.0:
                 continue
-            change = (x_dot - other)[: layout.n_q] / scales
-            turned = (x_dot[: layout.n_q] / scales) @ (other[: layout.n_q] / scales) < 0.0
+            change = (motion - other)[: layout.n_v] / scales
+            turned = (motion[: layout.n_v] / scales) @ (other[: layout.n_v] / scales) < 0.0
             if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
                 self._q = before
                 raise PartitionError(

@@ -225,7 +225,7 @@ class Module:
         given = initial.sort(values)
         if given.rates:
             raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
-        return initial.from_guess(values) if values else initial.assembled({})
+        return initial.from_guess(given.positions) if values else initial.assembled({})
 
     def branches(
         self,
@@ -316,21 +316,24 @@ class Module:
         ------
         ProjectionError, PartitionError
             The position is out of reach, or the way to it leads through a dead centre.
+        UsageError
+            The model has no minimal form: nonholonomic constraints, or an independent angular velocity.
         """
+        self.layout.require_minimal_form()
         if p is not None or u is not None:
             return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
         from .paths import motions
 
         path, reference = self._path
         start = None if guess is None else np.asarray(guess, dtype=float)
-        q, v, a = motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
-        return q, v, a
+        return motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
 
     @cached_property
     def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``; see :class:`~.minimal.Minimal`."""
+        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
         from .minimal import Minimal
 
+        self.layout.require_minimal_form()
         return Minimal(self)
 
     # integration

@@ -87,16 +87,16 @@ class Drivers:
         kept = self._scales  # read once: another thread may replace it
         if kept is None or kept[0] is not c:
             values = np.asarray(self.blocks["scales"](0.0, np.empty(0), np.empty(0), c), dtype=float)
-            self._scales = kept = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :]))
+            self._scales = kept = (c, Scales(values[: self.layout.n_v], values[self.layout.n_v :], self.layout.space))
         return kept[1]
 
     def position(self, t: float, u: Array, c: Array, q: Array) -> tuple[Array, Array]:
-        """C (m,), C_q (m, n)."""
-        m, n = self.layout.n_c, self.layout.n_v
+        """C (h,) of the holonomic rows, C_q (m, n) of all."""
+        h, m, n = self.layout.n_h, self.layout.n_c, self.layout.n_v
         if not m:
             return np.empty(0), np.empty((0, n))
         flat = np.asarray(self.blocks["position"](t, q, u, c), dtype=float)
-        return flat[:m], flat[m:].reshape(m, n)
+        return flat[:h], flat[h:].reshape(m, n)
 
     def rate(self, t: float, u: Array, c: Array, q: Array) -> Array:
         """C_t (m,)."""
@@ -109,17 +109,18 @@ class Drivers:
 
     def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:
         """The derivatives of the residuals."""
-        n, m = self.layout.n_v, self.layout.n_c
+        n, m, n_q = self.layout.n_v, self.layout.n_c, self.layout.n_q
         x = np.concatenate([q, v, a, l])
+        shapes = ((n, n_q), (n, n), (m, n_q), (m, n), (m, n_q))
         if "residual_jacobian" in self.blocks:
             flat = np.asarray(self.blocks["residual_jacobian"](t, x, u, c), dtype=float)
-            parts = np.split(flat, np.cumsum([n * n, n * n, m * n, m * n]))
-            return embedded.Residuals(*(part.reshape(k, n) for part, k in zip(parts, (n, n, m, m, m), strict=True)))
-        directions = np.eye(2 * n)
-        x = np.vstack([np.repeat(x[:, None], 2 * n, axis=1), directions])
+            parts = np.split(flat, np.cumsum([k * width for k, width in shapes[:-1]]))
+            return embedded.Residuals(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
+        directions = np.eye(n_q + n)
+        x = np.vstack([np.repeat(x[:, None], n_q + n, axis=1), directions])
         flat = np.asarray(self.blocks["residual_tangent"](t, x, u, c), dtype=float)
         r1, r2, r3 = np.split(flat, [n, n + m])
-        return embedded.Residuals(r1[:, :n], r1[:, n:], r2[:, :n], r2[:, n:], r3[:, :n])
+        return embedded.Residuals(r1[:, :n_q], r1[:, n_q:], r2[:, :n_q], r2[:, n_q:], r3[:, :n_q])
 
     def _bound(self, t: float, u: Array, c: Array) -> tuple[Any, Any, Any]:
         return (partial(f, t, u, c) for f in (self.terms, self.position, self.rate))  # type: ignore[return-value]
@@ -165,9 +166,10 @@ class Drivers:
         return np.asarray(self.position(t, u, c, q)[1] @ v + self.rate(t, u, c, q))
 
     def _project(self, t: float, x: Array, u: Array, c: Array) -> Array:
-        n = self.layout.n_q
+        n, space = self.layout.n_q, self.layout.space
         _, position, rate = self._bound(t, u, c)
-        return np.concatenate(projection.project(position, rate, x[:n], x[n:], self.scales(c)))
+        q, v = projection.project(position, rate, x[:n], x[n:], self.scales(c))
+        return np.concatenate([q if space is None else space.normalised(q), v])
 
     def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         x = self._project(t, x, u, c)

@@ -49,18 +49,18 @@ class Path:
         if not self.layout.rank:
             return self.newton(q_i, v_i, a_i, near, t)
         result = self.kernel(np.concatenate([q_i, v_i, a_i, near]), t=t)
-        if np.abs((result[: self.layout.n_q] - near) / self.layout.scales.q).max() <= JUMP:  # False for NaN
+        if np.abs(self.layout.scales.distance(result[: self.layout.n_q], near)).max() <= JUMP:  # False for NaN
             return result
         return self.newton(q_i, v_i, a_i, self.advance(near, q_i, t), t)
 
     def advance(self, q: Array, target: Array, t: float, halvings: int = HALVINGS) -> Array:
         """From a closed q to independent values not farther than one step, in parts where that is too far."""
         reached = self.kernel(np.concatenate([target, self._still, q]), t=t)[: self.layout.n_q]
-        if np.abs((reached - q) / self.layout.scales.q).max() <= JUMP:  # False for NaN
+        if np.abs(self.layout.scales.distance(reached, q)).max() <= JUMP:  # False for NaN
             return reached
         if not halvings:
             raise self._blocked(target, reached)
-        middle = 0.5 * (q[self.layout.independent] + target)
+        middle = 0.5 * (q[self.layout.independent_q] + target)
         half = self.advance(q, middle, t, halvings - 1)
         return self.advance(half, target, t, halvings - 1)
 
@@ -68,7 +68,7 @@ class Path:
         """From a closed q along the straight line to independent values."""
         if not self.layout.rank:
             return start
-        origin = start[self.layout.independent]
+        origin = start[self.layout.independent_q]
         way = target - origin
         steps = int(np.ceil(np.abs(way / self.scales_i).max() / STEP)) if way.size else 0
         q = start
@@ -88,7 +88,7 @@ class Path:
         if self.layout.n_dof != 1 or not self.layout.rank:
             return [self.walk(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
         known: dict[int, list[Array]] = {1: [start], -1: [start]}
-        origin, step = start[self.layout.independent[0]], STEP * self.scales_i[0]
+        origin, step = start[self.layout.independent_q[0]], STEP * self.scales_i[0]
         result = []
         for target in targets.T:
             sign = 1 if target[0] >= origin else -1
@@ -103,7 +103,7 @@ class Path:
         return result
 
     def _place(self, target: Array) -> str:
-        return place([self.layout.q[i] for i in self.layout.independent], target).removeprefix(", ")
+        return place([self.layout.freedoms[i] for i in self.layout.independent], target).removeprefix(", ")
 
     def _blocked(self, target: Array, found: Array) -> EvaluationError:
         """Why the step to independent values failed."""
@@ -124,7 +124,7 @@ def motions(
     given: Sequence[ArrayLike | None],
     guess: Array | None,
     t: Array,
-) -> Array:
+) -> tuple[Array, Array, Array]:
     """Positions, velocities and accelerations of the whole tree, each column for itself.
 
     Parameters
@@ -140,10 +140,10 @@ def motions(
 
     Returns
     -------
-    (3, n) or (3, n, k) array
+    q, v, a : (n,) or (n, k) arrays
     """
     layout = path.layout
-    n, size = layout.n_v, layout.n_dof
+    n_q, n, size = layout.n_q, layout.n_v, layout.n_dof
     arrays = [None if part is None else np.asarray(part, dtype=float) for part in given]
     columns = max((part.shape[1:] for part in arrays if part is not None), key=len)
     parts = []
@@ -165,7 +165,9 @@ def motions(
     else:  # driven constraints have another reference at each time
         near = [path.walk(reference(float(time)), q[:, j], float(time)) for j, time in enumerate(times)]
     solve = path.motion if guess is None else path.newton
-    result = np.empty((3, n, q.shape[1]))
+    result = np.empty((n_q + 2 * n, q.shape[1]))
     for j in range(q.shape[1]):
-        result[..., j] = solve(q[:, j], v[:, j], a[:, j], near[j], float(times[j])).reshape(3, n)
-    return result if columns else result[..., 0]
+        result[:, j] = solve(q[:, j], v[:, j], a[:, j], near[j], float(times[j]))
+    if not columns:
+        result = result[:, 0]
+    return result[:n_q], result[n_q : n_q + n], result[n_q + n :]

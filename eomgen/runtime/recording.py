@@ -37,7 +37,8 @@ class Columns:
         loops = layout.loops + layout.loop_rates + layout.loop_accelerations
         self._groups: list[tuple[tuple[str, ...], Callable[[], Array]]] = [
             (layout.x, lambda: self.x),
-            (layout.a, self._accelerations),
+            (layout.a, lambda: self.slopes[layout.n_q :]),
+            (layout.parameter_rates, self._parameter_rates),
             (loops, self._loops),
             (layout.y, self._outputs),
             (layout.u, lambda: self.u),
@@ -57,8 +58,14 @@ class Columns:
     def _varying(self) -> Array | None:
         return self.u if self.u.size else None
 
-    def _accelerations(self) -> Array:
-        return self.module.rhs(self.t, self.x, u=self._varying())[self.module.n_q :]
+    @cached_property
+    def slopes(self) -> Array:
+        """x' (n_x, n_t)."""
+        return self.module.rhs(self.t, self.x, u=self._varying())
+
+    def _parameter_rates(self) -> Array:
+        rows = [k for i, _ in self.module.layout.balls for k in range(i, i + 4)]
+        return self.slopes[rows]
 
     def _outputs(self) -> Array:
         return self.module.outputs(self.t, self.x, u=self._varying())
@@ -72,6 +79,12 @@ class Columns:
         y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
         angles = layout.loop_angles
         y[0, angles] = np.unwrap(y[0, angles], axis=-1)
+        parameters = [k for k, kind in enumerate(layout.loop_kinds) if kind == "parameter"]
+        for k in range(0, len(parameters), 4):  # e and -e are one rotation: the nearer one goes on
+            four = parameters[k : k + 4]
+            e = y[0, four]
+            turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
+            y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_k, -1)
 
     @cached_property
@@ -129,12 +142,17 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
 def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
     """Projected states (n_x, k), and how far the raw ones were off."""
     n = module.n_q
-    if not module.n_rows or not t.size:
+    if not t.size or not (module.n_rows or module.layout.space):
         return Residuals(), np.array(raw)
     x = module.project(raw, t=t)
+    if not module.n_rows:
+        return Residuals(), x
     position = module.constraints.every
     velocity = module.kernels.state("velocity_constraints")
     correction = np.abs(x - raw)
+    for i, _ in module.layout.balls:  # their length means nothing
+        e = raw[i : i + 4]
+        correction[i : i + 4] = np.abs(x[i : i + 4] - e / np.sqrt((e * e).sum(axis=0)))
     return Residuals(
         raw_position=largest(position(raw[:n], t=t)),
         raw_velocity=largest(velocity(raw, t=t)),

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
+from .failure import rotation_trouble
 from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .progress import Progress, wanted
@@ -186,9 +187,12 @@ class _Run:
         """The last failure of a kernel as an exception."""
         return None if self.last is None else self.module.kernels.fail.exception(*self.last)
 
-    def ended(self, t: float, end: float, method: str, words: str) -> SimulationError:
-        """The error for a run that stopped at time t."""
+    def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
+        """The error for a run that stopped at time t, at state x if that is known."""
         cause = self.cause()
+        trouble = None if x is None else rotation_trouble(self.module.layout, x)
+        if trouble is not None:
+            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
         if cause is None:
             return SimulationError(
                 f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "
@@ -205,7 +209,8 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
     if solution.status < 0:
         reached = float(solution.t[-1]) if solution.t.size else start
-        raise run.ended(reached, end, method, solution.message) from run.cause()
+        last = solution.x[:, -1] if solution.t.size else None
+        raise run.ended(reached, end, method, solution.message, last) from run.cause()
 
 
 def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:

@@ -1,7 +1,7 @@
-/* G = L L^T in place, lower triangle of the M x M matrix; status 3 where G is not positive definite. */
-static int cholesky(double *restrict g)
+/* G = L L^T in place, lower triangle of the first `rows` rows of the M x M matrix; status 3 where G is not positive definite. */
+static int cholesky(int rows, double *restrict g)
 {
-    for (int j = 0; j < M; j++) {
+    for (int j = 0; j < rows; j++) {
         double d = g[j * M + j];
         for (int k = 0; k < j; k++) {
             d -= g[j * M + k] * g[j * M + k];
@@ -11,7 +11,7 @@ static int cholesky(double *restrict g)
         }
         d = sqrt(d);
         g[j * M + j] = d;
-        for (int i = j + 1; i < M; i++) {
+        for (int i = j + 1; i < rows; i++) {
             double s = g[i * M + j];
             for (int k = 0; k < j; k++) {
                 s -= g[i * M + k] * g[j * M + k];
@@ -23,29 +23,29 @@ static int cholesky(double *restrict g)
 }
 
 /* b = G^-1 b */
-static void cholesky_solve(const double *restrict g, double *restrict b)
+static void cholesky_solve(int rows, const double *restrict g, double *restrict b)
 {
-    for (int i = 0; i < M; i++) {
+    for (int i = 0; i < rows; i++) {
         double s = b[i];
         for (int k = 0; k < i; k++) {
             s -= g[i * M + k] * b[k];
         }
         b[i] = s / g[i * M + i];
     }
-    for (int i = M - 1; i >= 0; i--) {
+    for (int i = rows - 1; i >= 0; i--) {
         double s = b[i];
-        for (int k = i + 1; k < M; k++) {
+        for (int k = i + 1; k < rows; k++) {
             s -= g[k * M + i] * b[k];
         }
         b[i] = s / g[i * M + i];
     }
 }
 
-/* G = J J^T + relative max(diag) I, factored. */
-static int factor_gram(const double *restrict J, double relative, double *restrict G)
+/* G = J J^T + relative max(diag) I of the first rows of J, factored. */
+static int factor_gram(int rows, const double *restrict J, double relative, double *restrict G)
 {
     double largest = 0.0;
-    for (int i = 0; i < M; i++) {
+    for (int i = 0; i < rows; i++) {
         for (int j = 0; j <= i; j++) {
             double sum = 0.0;
             for (int k = 0; k < N; k++) {
@@ -55,8 +55,8 @@ static int factor_gram(const double *restrict J, double relative, double *restri
         }
         largest = G[i * M + i] > largest ? G[i * M + i] : largest;
     }
-    for (int i = 0; i < M; i++) {
+    for (int i = 0; i < rows; i++) {
         G[i * M + i] += relative * largest;
     }
-    return cholesky(G);
+    return cholesky(rows, G);
 }

@@ -2,12 +2,15 @@
 static int close_loops(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                        double *restrict w)
 {
-    double *const q = w + AT_X, *const v = w + AT_X + N, *const r = w + AT_RATE, *const s = w + AT_SCALES;
+    double *const q = w + AT_X, *const v = w + AT_V, *const r = w + AT_RATE, *const s = w + AT_SCALES;
     (void)scales_block(t, x, u, c, s, w);
-    for (int k = 0; k < 2 * N; k++) {
+    for (int k = 0; k < NQ + N; k++) {
         q[k] = x[k];
     }
-    const int status = close_position(t, q, u, c, w);
+    int status = close_position(t, q, u, c, w);
+    if (status == 0 && MH < M) { /* nonholonomic rows join here */
+        status = factor_gram(M, w + AT_J, 1e-12, w + AT_G);
+    }
     if (status != 0) {
         return status;
     }
@@ -18,7 +21,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
     for (int k = 0; k < N; k++) {
         v[k] /= s[k];
     }
-    correct_linear(r, v, w);
+    correct_linear(M, w + AT_G, r, v, w);
     for (int k = 0; k < N; k++) {
         v[k] *= s[k];
     }

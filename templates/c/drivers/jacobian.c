@@ -1,26 +1,34 @@
-/* The change of the projected state for the unit change of x[column]: dq and dv in w + AT_X + 3 N + M. */
+/* The change of the projected state for the unit change of x[column]: dq and dv in w + AT_DQ and w + AT_DV. */
 static void project_direction(double t, int column, const double *restrict u, const double *restrict c,
                               double *restrict w)
 {
-    const double *const s = w + AT_SCALES;
-    double *const dq = w + AT_X + 3 * N + M, *const dv = dq + N, *const r = w + AT_RATE, *const r3 = w + AT_ALONG + N + M;
-    for (int k = 0; k < 2 * N; k++) {
-        dq[k] = k == column ? 1.0 / s[k % N] : 0.0;
+    const double *const s = w + AT_SCALES, *const q = w + AT_X;
+    double *const dq = w + AT_DQ, *const dv = w + AT_DV, *const r = w + AT_RATE, *const r3 = w + AT_ALONG + N + M;
+    for (int k = 0; k < NQ + N; k++) {
+        dq[k] = k == column ? 1.0 : 0.0;
     }
     for (int i = 0; i < M; i++) {
         r[i] = 0.0;
     }
-    if (column < N) {
-        correct_linear(r, dq, w);
+    if (column < NQ) {
+        find_velocities(q, dq, dv);
         for (int k = 0; k < N; k++) {
-            dq[k] *= s[k];
+            dv[k] /= s[k];
         }
+        correct_linear(MH, w + (MH < M ? AT_GH : AT_G), r, dv, w);
+        for (int k = 0; k < N; k++) {
+            dv[k] *= s[k];
+        }
+        spread(q, dv, dq);
         rate_along(t, u, c, w);
         for (int i = 0; i < M; i++) {
             r[i] = r3[i] / s[N + i];
         }
     }
-    correct_linear(r, dv, w);
+    for (int k = 0; k < N; k++) {
+        dv[k] = NQ + k == column ? 1.0 / s[k] : 0.0;
+    }
+    correct_linear(M, w + AT_G, r, dv, w);
     for (int k = 0; k < N; k++) {
         dv[k] *= s[k];
     }
@@ -31,18 +39,21 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
 {
     partition parts;
     const int width = N + 1 + M;
-    const double *const s = w + AT_SCALES, *const rows = w + AT_ROWS, *const dv = w + AT_X + 4 * N + M;
-    double *const r1 = w + AT_ALONG, *const r2 = r1 + N, *const da = w + AT_STEP;
+    const double *const s = w + AT_SCALES, *const rows = w + AT_ROWS, *const dq = w + AT_DQ, *const dv = w + AT_DV;
+    double *const r1 = w + AT_ALONG, *const r2 = r1 + N, *const da = w + AT_STEP, *const rates = w + AT_RATES;
     int status = close_loops(t, x, u, c, w);
     if (status == 0) {
-        status = accelerate(t, u, c, width, &parts, w + AT_X + 2 * N, w);
+        status = accelerate(t, u, c, width, &parts, w + AT_ACC, w);
+    }
+    if (status == 0 && MH < M) {
+        status = factor_gram(MH, w + AT_J, 1e-12, w + AT_GH);
     }
     if (status != 0) {
         return status;
     }
-    find_multipliers(width, &parts, w + AT_X + 3 * N, w);
+    find_multipliers(width, &parts, w + AT_L, w);
     prepare_residuals(t, u, c, w);
-    for (int column = 0; column < 2 * N; column++) {
+    for (int column = 0; column < NQ + N; column++) {
         project_direction(t, column, u, c, w);
         residuals_along(t, u, c, w);
         for (int k = 0; k < N; k++) {
@@ -54,9 +65,12 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
             }
         }
         solve_embedded(r1, da, w);
+        change_rates(w + AT_X, dq, dv, rates);
+        for (int k = 0; k < NQ; k++) {
+            out[k * (NQ + N) + column] = rates[k];
+        }
         for (int k = 0; k < N; k++) {
-            out[k * 2 * N + column] = dv[k];
-            out[(N + k) * 2 * N + column] = s[k] * da[k];
+            out[(NQ + k) * (NQ + N) + column] = s[k] * da[k];
         }
     }
     return 0;

@@ -9,7 +9,7 @@ static int close_dependent(double t, double *restrict q, const double *restrict 
     for (int count = 0; count <= 50; count++) {
         (void)position_block(t, q, u, c, w + AT_POSITION, w);
         const double size = largest_residual(C, s);
-        form_scaled(C + M, s, w + AT_J);
+        form_scaled(C + MH, s, w + AT_J);
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }
@@ -28,9 +28,14 @@ static int close_dependent(double t, double *restrict q, const double *restrict 
             step[j] = rows[parts.row[j] * (N + 1) + N];
         }
         const double part = damping(step, R);
-        for (int j = 0; j < R; j++) {
-            q[parts.dependent[j]] += s[parts.dependent[j]] * part * step[j];
+        double *const d = w + AT_A;
+        for (int k = 0; k < N; k++) {
+            d[k] = 0.0;
         }
+        for (int j = 0; j < R; j++) {
+            d[parts.dependent[j]] = s[parts.dependent[j]] * part * step[j];
+        }
+        move(q, d);
         before = size;
     }
     return EOMGEN_PROJECTION_FAILED;

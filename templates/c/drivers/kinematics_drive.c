@@ -4,13 +4,13 @@ static int kinematics_driver(double t, const double *restrict x, const double *r
 {
     partition parts;
     const int width = N + 1 + M;
-    double *const q = out, *const v = out + N, *const a = out + 2 * N;
+    double *const q = out, *const v = out + NQ, *const a = out + NQ + N;
     (void)scales_block(t, x, u, c, w + AT_SCALES, w);
-    for (int k = 0; k < N; k++) {
+    for (int k = 0; k < NQ; k++) {
         q[k] = x[3 * F + k];
     }
     for (int k = 0; k < F; k++) {
-        q[ORDER[k]] = x[k];
+        q[COORDINATE[ORDER[k]]] = x[k];
     }
     int status = close_dependent(t, q, u, c, w);
     if (status != 0) {
@@ -24,7 +24,8 @@ static int kinematics_driver(double t, const double *restrict x, const double *r
     }
     form_transformation(width, &parts, w);
     complete(x + F, w + AT_RATE, &parts, v, w);
-    for (int k = 0; k < 2 * N; k++) {
+    normalise(q);
+    for (int k = 0; k < NQ + N; k++) {
         w[AT_X + k] = out[k];
     }
     (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);

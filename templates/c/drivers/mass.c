@@ -6,8 +6,8 @@ static int embedded_mass_matrix_driver(double t, const double *restrict x, const
     double *const mass = w + AT_MASS;
     (void)scales_block(t, x, u, c, w + AT_SCALES, w);
     (void)position_block(t, x, u, c, w + AT_POSITION, w);
-    form_scaled(C + M, s, w + AT_J);
-    form_rows(w + AT_J, C, N + 1, w);
+    form_scaled(C + MH, s, w + AT_J);
+    form_rows(w + AT_J, w + AT_SCALES + N, N + 1, w);
     const int status = split(N + 1, 1, &parts, w);
     if (status != 0) {
         return status;

@@ -4,7 +4,7 @@ static int outputs_driver(double t, const double *restrict x, const double *rest
     partition parts;
     int status = close_loops(t, x, u, c, w);
     if (status == 0) {
-        status = accelerate(t, u, c, N + 1, &parts, w + AT_X + 2 * N, w);
+        status = accelerate(t, u, c, N + 1, &parts, w + AT_ACC, w);
     }
     return status != 0 ? status : accelerated_outputs_block(t, w + AT_X, u, c, out, w);
 }

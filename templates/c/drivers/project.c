@@ -1,17 +1,19 @@
-/* x -= J^T G^-1 (J x + r), twice so that the term 1e-12 leaves no trace: the nearest x with J x + r = 0. */
-static void correct_linear(const double *restrict r, double *restrict x, double *restrict w)
+/* x -= J^T G^-1 (J x + r), twice so that the term 1e-12 leaves no trace: the nearest x with J x + r = 0, in the first
+   rows of J. */
+static void correct_linear(int rows, const double *restrict G, const double *restrict r, double *restrict x,
+                           double *restrict w)
 {
     const double *const J = w + AT_J;
     double *const e = w + AT_E;
     for (int pass = 0; pass < 2; pass++) {
-        for (int i = 0; i < M; i++) {
+        for (int i = 0; i < rows; i++) {
             e[i] = r[i];
             for (int k = 0; k < N; k++) {
                 e[i] += J[i * N + k] * x[k];
             }
         }
-        cholesky_solve(w + AT_G, e);
-        for (int i = 0; i < M; i++) {
+        cholesky_solve(rows, G, e);
+        for (int i = 0; i < rows; i++) {
             for (int k = 0; k < N; k++) {
                 x[k] -= J[i * N + k] * e[i];
             }
@@ -32,29 +34,30 @@ static int close_position(double t, double *restrict q, const double *restrict u
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }
-        form_scaled(C + M, s, w + AT_J);
+        form_scaled(C + MH, s, w + AT_J);
         /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
-        const int status = factor_gram(J, fmax(1e-12, size), w + AT_G);
+        const int status = factor_gram(MH, J, fmax(1e-12, size), w + AT_G);
         if (status != 0 || has_settled(step, size, before)) {
             return status;
         }
         if (step == 25) {
             return size <= 1e-10 ? 0 : EOMGEN_PROJECTION_FAILED;
         }
-        for (int i = 0; i < M; i++) {
+        for (int i = 0; i < MH; i++) {
             e[i] = C[i] / s[N + i];
         }
-        cholesky_solve(w + AT_G, e);
+        cholesky_solve(MH, w + AT_G, e);
         for (int k = 0; k < N; k++) {
             dz[k] = 0.0;
-            for (int i = 0; i < M; i++) {
+            for (int i = 0; i < MH; i++) {
                 dz[k] += J[i * N + k] * e[i];
             }
         }
         const double part = damping(dz, N);
         for (int k = 0; k < N; k++) {
-            q[k] -= s[k] * part * dz[k];
+            dz[k] *= -s[k] * part;
         }
+        move(q, dz);
         before = size;
     }
     return EOMGEN_PROJECTION_FAILED;

@@ -2,7 +2,8 @@ static int project_driver(double t, const double *restrict x, const double *rest
                          double *restrict out, double *restrict w)
 {
     const int status = close_loops(t, x, u, c, w);
-    for (int k = 0; k < 2 * N; k++) {
+    normalise(w + AT_X);
+    for (int k = 0; k < NQ + N; k++) {
         out[k] = w[AT_X + k];
     }
     return status;

@@ -4,10 +4,8 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
     partition parts;
     int status = close_loops(t, x, u, c, w);
     if (status == 0) {
-        status = accelerate(t, u, c, N + 1, &parts, out + N, w);
+        status = accelerate(t, u, c, N + 1, &parts, out + NQ, w);
     }
-    for (int k = 0; k < N; k++) {
-        out[k] = w[AT_X + N + k];
-    }
+    form_rates(w + AT_X, w + AT_V, out);
     return status;
 }

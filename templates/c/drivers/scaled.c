@@ -12,7 +12,7 @@ EOMGEN_SHARED void form_scaled(const double *restrict C_q, const double *restric
 EOMGEN_SHARED double largest_residual(const double *restrict C, const double *restrict s)
 {
     double largest = 0.0;
-    for (int i = 0; i < M; i++) {
+    for (int i = 0; i < MH; i++) {
         const double size = fabs(C[i] / s[N + i]);
         if (!(size <= largest)) {
             largest = size;

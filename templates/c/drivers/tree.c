@@ -44,12 +44,14 @@ static void tree_solve(const double *restrict H, double *restrict b)
 static int tree_accelerate(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                            double *restrict w)
 {
-    double *const a = w + AT_X + 2 * N;
+    double *const a = w + AT_ACC;
     const double *const bias = w + AT_TERMS + N * (N + 1) / 2;
     (void)scales_block(t, x, u, c, w + AT_SCALES, w);
     (void)terms_block(t, x, u, c, w + AT_TERMS, w);
+    for (int k = 0; k < NQ + N; k++) {
+        w[AT_X + k] = x[k];
+    }
     for (int k = 0; k < N; k++) {
-        w[AT_X + k] = x[k], w[AT_X + N + k] = x[N + k];
         a[k] = -bias[k];
     }
     const int status = tree_factor(w + AT_TERMS, w + AT_SCALES);

@@ -2,8 +2,9 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
                      double *restrict out, double *restrict w)
 {
     const int status = tree_accelerate(t, x, u, c, w);
-    for (int k = 0; k < 2 * N; k++) {
-        out[k] = w[AT_X + N + k];
+    form_rates(x, x + NQ, out);
+    for (int k = 0; k < N; k++) {
+        out[NQ + k] = w[AT_ACC + k];
     }
     return status;
 }

@@ -1,0 +1,103 @@
+"""Joints that turn about all axes: spherical and free, in Euler angles or Euler parameters (Shabana, ch. 7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+from .base import Ball, Closure, Coordinate, Joint
+from .closures import along
+from .rotations import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
+
+ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
+PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
+PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
+
+
+@dataclass(frozen=True)
+class Turning(Joint):
+    """What spherical and free joints share: how they describe a rotation.
+
+    ``rotation`` is ``euler_angles`` (intrinsic, x-y'-z'' unless ``sequence`` says otherwise; singular where the middle
+    angle brings the first and last axes in line) or ``euler_parameters`` (e0 the scalar part; never singular), whose
+    velocities are the components of the angular velocity of S relative to P in S axes.
+    """
+
+    has_axis: ClassVar[bool] = False
+    options: ClassVar[tuple[str, ...]] = ("sequence", "rotation")
+    place: ClassVar[tuple[Coordinate, ...]] = ()
+    sequence: str = "xyz"
+    rotation: str = "euler_angles"
+
+    def __post_init__(self) -> None:
+        if self.in_parameters:
+            n = len(self.place)
+            object.__setattr__(self, "coordinates", (*self.place, *PARAMETERS))
+            object.__setattr__(self, "balls", (Ball(n, n),))
+
+    @property
+    def in_parameters(self) -> bool:
+        """Whether the rotation is described by Euler parameters."""
+        return self.rotation == "euler_parameters"
+
+    def turn(self, graph: Graph, q: Sequence[Expr]) -> Mat3:
+        """The rotation of S in P; q without the place."""
+        return parameter_rotation(graph, q) if self.in_parameters else euler(graph, self.sequence, q)
+
+    def turns(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        """Columns of the angular velocity; constant for Euler parameters."""
+        if self.in_parameters:
+            return [(unit(graph, k), vec.zero(graph)) for k in range(3)]
+        return [(g, vec.zero(graph)) for g in euler_rates(graph, self.sequence, q)]
+
+    def turned(self, graph: Graph, rotation: Mat3) -> list[Expr]:
+        """The coordinates of a rotation."""
+        if self.in_parameters:
+            return parameters_of(graph, rotation)
+        return euler_angles(graph, self.sequence, rotation)
+
+
+@dataclass(frozen=True)
+class Spherical(Turning):
+    """Turns about a point.  Allows 3, removes 3."""
+
+    type_name: ClassVar[str] = "spherical"
+    coordinates: ClassVar[tuple[Coordinate, ...]] = ANGLES
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q), vec.zero(graph)
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return self.turns(graph, q)
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return along(position, "xyz")
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return self.turned(graph, rotation)
+
+
+@dataclass(frozen=True)
+class Free(Turning):
+    """Six degrees of freedom: position of S in P axes, then its rotation.  Removes none."""
+
+    type_name: ClassVar[str] = "free"
+    place: ClassVar[tuple[Coordinate, ...]] = PLACE
+    coordinates: ClassVar[tuple[Coordinate, ...]] = PLACE + ANGLES
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return self.turn(graph, q[3:]), (q[0], q[1], q[2])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        o = vec.zero(graph)
+        return [(o, row) for row in self.turn(graph, q[3:])] + self.turns(graph, q[3:])
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return []
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return [*position, *self.turned(graph, rotation)]

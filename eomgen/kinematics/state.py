@@ -1,0 +1,110 @@
+"""Stage kinematics: Topology -> the layout of q and v, and q' = N(q) v."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from ..describe.mechanism import Mechanism
+from ..frames import GROUND
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jacobian
+from ..joints import Ball
+from ..joints.rotations import parameter_rates
+from .topology import Topology
+
+
+def acceleration_name(velocity: str) -> str:
+    """``theta_dot`` -> ``theta_ddot``; ``ball_wx`` -> ``ball_wx_dot``."""
+    return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
+
+
+@dataclass(frozen=True)
+class StateLayout:
+    """Names and kinds of the tree's coordinates and velocities.
+
+    ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``balls`` says where Euler
+    parameters are, the other velocities being the rates of the other coordinates in the same order.
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    velocity_names: tuple[str, ...]
+    velocity_kinds: tuple[str, ...]
+    parent: tuple[int, ...]
+    balls: tuple[Ball, ...] = ()
+
+    def rates(self, graph: Graph, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[Expr, ...]:
+        """q' = N(q) v."""
+        if not self.balls:
+            return tuple(v)
+        turning = {k for ball in self.balls for k in range(ball.velocity, ball.velocity + 3)}
+        plain = iter([x for k, x in enumerate(v) if k not in turning])
+        starts = {ball.coordinate: ball.velocity for ball in self.balls}
+        result: list[Expr] = []
+        while len(result) < len(q):
+            i = len(result)
+            if i in starts:
+                result += parameter_rates(q[i : i + 4], v[starts[i] : starts[i] + 3])
+            else:
+                result.append(next(plain))
+        return tuple(result)
+
+
+@dataclass(frozen=True)
+class State:
+    """The symbols of the motion: coordinates, velocities, accelerations, time; and q' in terms of them."""
+
+    q: tuple[Expr, ...]
+    v: tuple[Expr, ...]
+    a: tuple[Expr, ...]
+    t: Expr
+    rates: tuple[Expr, ...]
+
+    @cached_property
+    def along(self) -> dict[Expr, Expr]:
+        """The direction of d/dt: q' = N v, v' = a, t' = 1."""
+        flow = dict(zip(self.q, self.rates, strict=True)) | dict(zip(self.v, self.a, strict=True))
+        return flow | {self.t: self.t.graph.one}
+
+    def slopes(self, values: Sequence[Expr], rates: Sequence[Expr]) -> dict[tuple[int, int], Expr]:
+        """Derivatives by v of the rates of functions of q: df/dq N."""
+        if self.rates == self.v:
+            return jacobian(list(values), list(self.q))
+        return jacobian(list(rates), list(self.v))
+
+
+def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
+    """The coordinates and velocities of the tree, in its order."""
+    if mechanism.lagrangian is not None:
+        names = mechanism.lagrangian.coordinates
+        kinds = ("angle",) * len(names)
+        return StateLayout(names, kinds, tuple(n + "_dot" for n in names), kinds, tuple(range(-1, len(names) - 1)))
+    names_list: list[str] = []
+    kinds_list: list[str] = []
+    velocity_names: list[str] = []
+    velocity_kinds: list[str] = []
+    parent: list[int] = []
+    balls: list[Ball] = []
+    last = {GROUND: -1}  # the velocity next to a body towards ground
+    for branch in topology.branches:
+        spec = mechanism.joints[branch.joint]
+        balls += [Ball(len(names_list) + i, len(velocity_names) + j) for i, j in spec.joint.balls]
+        names_list += spec.coordinates
+        kinds_list += [coordinate.kind for coordinate in spec.joint.coordinates]
+        above = last[branch.parent]
+        for name, velocity in zip(spec.velocities, spec.joint.velocities, strict=True):
+            parent.append(above)
+            above = len(velocity_names)
+            velocity_names.append(name)
+            velocity_kinds.append(velocity.kind)
+        last[branch.body] = above
+    return StateLayout(
+        tuple(names_list),
+        tuple(kinds_list),
+        tuple(velocity_names),
+        tuple(velocity_kinds),
+        tuple(parent),
+        tuple(balls),
+    )
