@@ -63,8 +63,12 @@ def random_mechanism(
     reverse: bool = False,
     forces: bool = True,
     loop: bool = False,
+    rotation: str = "euler_angles",
 ) -> Random:
-    """A tree of mixed joints; ``loop`` adds a joint that closes a loop wherever the tree's zero position puts it."""
+    """A tree of mixed joints; ``loop`` adds a joint that closes a loop wherever the tree's zero position puts it.
+
+    ``rotation`` is that of spherical and free joints.
+    """
     random = np.random.default_rng(seed)
     graph = Graph()
     parents: list[int] = []
@@ -86,7 +90,8 @@ def random_mechanism(
     gravity = np.array([0.3, -9.81, 0.0 if planar else 0.7])
     specs = []
     for k in range(bodies):
-        joint = JOINTS[kinds[k]]()
+        kind = JOINTS[kinds[k]]
+        joint = kind(rotation=rotation) if "rotation" in kind.options else kind()
         a = Marker(parents[k], frame(graph, outer[k]), f"o{k}")
         b = Marker(k, frame(graph, inner[k]), f"i{k}")
         turned = reverse and random.random() < 0.5
@@ -94,7 +99,7 @@ def random_mechanism(
         specs.append(JointSpec(f"q{k}", joint, *((b, a) if turned else (a, b)), names, False))
     elements: list[Force] = []
     if forces:
-        coordinates = [c for s in specs for c in s.coordinates]
+        coordinates = [c for s in specs for c in s.coordinates if s.coordinates and not s.joint.balls]
         here = Marker(bodies - 1, frame(graph, _placement(random, planar, "", False)), "here")
         there = Marker(GROUND, Frame(vectors.identity(graph), vectors.vector(graph, (3.0, 2.0, 0.0))), "there")
         line, along = Line(there, here), JointCoordinate(coordinates[0])

@@ -19,6 +19,7 @@ def describe_calls(program: Program) -> list[Call]:
     """Every call of a generated package or Module, with its sizes as numbers."""
     s = program.sizes
     rows = len(program.metadata.get("independent_rows", range(s.n_c)))
+    holonomic = len([i for i in program.metadata.get("independent_rows", range(s.n_c)) if i < s.n_h])
     independent = "q_i, v_i, a_i"
     calls = [
         Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
@@ -28,9 +29,10 @@ def describe_calls(program: Program) -> list[Call]:
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
         Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
         Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
-        Call("constraints(q)", _shape(rows), "independent loop residuals (m, rad)"),
-        Call("constraint_jacobian(q)", _shape(rows, s.n_v), "their derivatives with respect to q"),
-        Call('constraints(q, rows="all")', _shape(s.n_c), "all loop residuals, redundant ones included"),
+        Call("constraints(q)", _shape(holonomic), "independent loop residuals (m, rad)"),
+        Call("constraint_jacobian(q)", _shape(rows, s.n_v), "C_q of C_q v + C_t = 0, nonholonomic rows last"),
+        Call("velocity_constraints(x)", _shape(rows), "C_q v + C_t"),
+        Call('constraints(q, rows="all")', _shape(s.n_h), "all loop residuals, redundant ones included"),
         Call('constraint_jacobian(q, rows="all")', _shape(s.n_c, s.n_v), "likewise"),
         Call("project(x, t=0.0)", _shape(s.n_x), "the nearest state on the constraints"),
         Call("x0(**values)", _shape(s.n_x), "a state assembled from named values"),
@@ -48,6 +50,8 @@ def describe_calls(program: Program) -> list[Call]:
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
     ]
+    plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
+    calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]
     return [call for call in calls if s.n_c or "constraint" not in call.text]
 
 

@@ -12,18 +12,22 @@ def describe_layouts(program: Program) -> list[tuple[str, list[str]]]:
     """Titles with one line per entry, for headers and docstrings."""
     metadata = program.metadata
     q, v = program.coordinates, program.velocities
+    chosen = [program.coordinate_of[i] for i in program.preferred]
+    independent = ("q_i, the independent coordinates", _entries(metadata, "q_i", [q[i] for i in chosen]))
+    if -1 in chosen:
+        independent = ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in program.preferred]))
     sections = [
         ("x = [q; v], the state", _entries(metadata, "x", [*q, *v])),
         ("p, the parameters", _entries(metadata, "p", program.parameters, metadata.get("p_values"))),
         ("u, the inputs", _entries(metadata, "u", program.inputs, metadata.get("u_values"))),
         ("y, the outputs", _entries(metadata, "y", metadata.get("y_names", ()))),
-        ("v_i, the independent velocities", _entries(metadata, "v_i", [v[i] for i in program.preferred])),
+        independent,
         ("C, the constraint rows", _entries(metadata, "C", metadata.get("constraint_labels", ()))),
         ("bodies of poses", _entries(metadata, "poses", metadata.get("body_names", ()))),
         ("coordinates of cut joints", _entries(metadata, "loop", metadata.get("loop_names", ()))),
     ]
     independent_is_all = program.sizes.n_dof == program.sizes.n_v
-    return [(title, rows) for title, rows in sections if rows and not (independent_is_all and title[0] == "v")]
+    return [(title, rows) for title, rows in sections if rows and not (independent_is_all and title == independent[0])]
 
 
 def _entries(

@@ -21,7 +21,7 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs")),
     *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
     ("inverse_dynamics", "Motion"),
-    *((name, "Rows") for name in ("constraints", "constraint_jacobian")),
+    *((name, "Rows") for name in ("constraints", "constraint_jacobian", "velocity_constraints")),
     *((name, "tuple[str, ...]") for name in
       ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names")),
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),

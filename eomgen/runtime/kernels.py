@@ -39,6 +39,7 @@ class Kernels:
         self.fail = Fail(layout, self._culprit)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
+        self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
@@ -51,8 +52,8 @@ class Kernels:
         if name not in self.core.names:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            if layout.rank == 0 and name == "project" and layout.space is None:
-                return Identity(layout.n_x)
+            if layout.rank == 0 and name == "project":
+                return Identity(layout.n_x, [i for i, _ in layout.balls])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
         kernel: State = self._make(self.core.state, name, nan)
@@ -131,7 +132,7 @@ class Rows:
 
         Parameters
         ----------
-        q : (n_q,) or (n_q, k) array
+        q : (n_q,) or (n_q, k) array; x, (n_x,) or (n_x, k), for velocity_constraints
         p, u : arrays, optional
         out : array, optional
         t : float
@@ -173,10 +174,11 @@ class Constant:
 
 
 class Identity(Constant):
-    """The projection of a tree: nothing to do."""
+    """The projection of a tree: nothing to do but for the length of Euler parameters, which start at ``balls``."""
 
-    def __init__(self, n_in: int) -> None:
+    def __init__(self, n_in: int, balls: Sequence[int] = ()) -> None:
         super().__init__(np.zeros(n_in), n_in)
+        self.balls = balls
 
     def __call__(
         self,
@@ -187,8 +189,10 @@ class Identity(Constant):
         t: ArrayLike = 0.0,
     ) -> Array:
         """A copy of x."""
-        result = super().__call__(x, out=out)
-        return _write(result, np.asarray(x, dtype=float))
+        result = _write(super().__call__(x, out=out), np.asarray(x, dtype=float))
+        for i in self.balls:
+            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+        return result
 
 
 class Selected:

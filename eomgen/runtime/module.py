@@ -26,10 +26,10 @@ class Module:
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
-    ``x_names``.  Every state may be one (n,) or a batch (n, k) of k states as columns; results then carry the same last
-    axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound here by default, and ``out=None``
-    to write into; calls of positions alone take ``t=0.0`` too.  A call that fails raises an
-    :class:`~..errors.EvaluationError` with the time and the state.
+    ``x_names``; q' = v but for Euler parameters.  Every state may be one (n,) or a batch (n, k) of k states as columns;
+    results then carry the same last axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound
+    here by default, and ``out=None`` to write into; calls of positions alone take ``t=0.0`` too.  A call that fails
+    raises an :class:`~..errors.EvaluationError` with the time and the state.
 
     Parameters
     ----------
@@ -62,8 +62,9 @@ class Module:
         ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.
     energy : callable
         ``energy(x)`` -> (T, V) in J.
-    constraints, constraint_jacobian : callable
-        ``constraints(q)`` -> (n_c,) in m and rad, (n_c, n_v): independent rows; ``rows="all"`` for all of them.
+    constraints, constraint_jacobian, velocity_constraints : callable
+        ``constraints(q)`` -> C of the holonomic rows (m, rad), C_q (n_c, n_v), ``velocity_constraints(x)`` ->
+        C_q v + C_t: independent rows, the holonomic ones first; ``rows="all"`` for redundant ones too.
     project : callable
         ``project(x, t=0.0)`` -> the nearest x on the constraints.
     poses : callable
@@ -82,6 +83,7 @@ class Module:
     inverse_dynamics: Motion
     constraints: Rows
     constraint_jacobian: Rows
+    velocity_constraints: Rows
 
     def __init__(self, core: Core, p: Any = None, u: Any = None) -> None:
         self.core = core
@@ -108,13 +110,12 @@ class Module:
         self.n_c, self.n_rows = len(layout.rows), layout.n_c
         self.rhs, self.jacobian = kernels.timed("rhs"), kernels.timed("jacobian")
         self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
-        self.mass_matrix, self.embedded_mass_matrix = (
-            kernels.state("mass_matrix"),
-            kernels.state("embedded_mass_matrix"),
-        )
+        self.mass_matrix = kernels.state("mass_matrix")
+        self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")
         self.energy, self.project, self.poses = (kernels.state(name) for name in ("energy", "project", "poses"))
         self.inverse_dynamics = kernels.motion("inverse_dynamics")
         self.constraints, self.constraint_jacobian = kernels.constraints, kernels.constraint_jacobian
+        self.velocity_constraints = kernels.velocity_constraints
 
     @property
     def p(self) -> Array:
@@ -314,10 +315,9 @@ class Module:
 
         Raises
         ------
-        ProjectionError, PartitionError
-            The position is out of reach, or the way to it leads through a dead centre.
-        UsageError
-            The model has no minimal form: nonholonomic constraints, or an independent angular velocity.
+        ProjectionError, PartitionError, UsageError
+            The position is out of reach, or the way to it leads through a dead centre; or there is no minimal form
+            (nonholonomic constraints, an independent angular velocity).
         """
         self.layout.require_minimal_form()
         if p is not None or u is not None:
