@@ -193,13 +193,14 @@ def compile_equations(
         program = build(equations, target, kernels)
     if target == "numpy":
         from .compilation.numpy_module import load_numpy
+        from .emit.numpy_functions import twins
 
         if options:
             raise UsageError(f"target 'numpy' has no options, given: {', '.join(options)}")
         with _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
-            return Module(load_numpy(sources, equations.name))
+            return Module(load_numpy(sources, equations.name, twins(program)))
     from .compilation import Options, compile_sources, load_core
 
     allowed = Options.__dataclass_fields__

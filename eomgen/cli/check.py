@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from .failures import reports_failures
-from .options import json_option, load_model, model_argument
+from .options import json_option, load_model, model_argument, native_option
 from .screen import print_json
 
 
@@ -20,6 +20,7 @@ def _print_schema(context: click.Context) -> None:
 
 @click.command()
 @model_argument
+@native_option
 @json_option
 @click.option(
     "--schema",
@@ -30,14 +31,14 @@ def _print_schema(context: click.Context) -> None:
     help="Print the JSON Schema of model files, for editors, and stop.",
 )
 @reports_failures
-def check(model: Path, as_json: bool) -> None:
+def check(model: Path, allow_native: bool, as_json: bool) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """
     from .. import pipeline
 
-    report = pipeline.check(load_model(model))
+    report = pipeline.check(load_model(model, allow_native))
     if as_json:
         print_json(report.to_dict())
     else:

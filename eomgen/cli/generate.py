@@ -14,6 +14,7 @@ from .options import (
     load_model,
     method_option,
     model_argument,
+    native_option,
     target_option,
 )
 from .screen import print_json, stage
@@ -21,6 +22,7 @@ from .screen import print_json, stage
 
 @click.command()
 @model_argument
+@native_option
 @click.option(
     "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
 )
@@ -29,12 +31,14 @@ from .screen import print_json, stage
 @target_option("c", "cython", "numpy")
 @json_option
 @reports_failures
-def generate(model: Path, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool) -> None:
+def generate(
+    model: Path, allow_native: bool, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool
+) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
     from .. import pipeline
 
     with blaming_option(independent), stage("generate"):
-        folder = pipeline.generate(load_model(model), out, method, target, independent or None)
+        folder = pipeline.generate(load_model(model, allow_native), out, method, target, independent or None)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})

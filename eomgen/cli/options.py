@@ -52,6 +52,13 @@ independent_option = click.option(
 )
 
 
+native_option = click.option(
+    "--allow-native",
+    is_flag=True,
+    help="Compile and run the C (and Python) files that the model's native functions name; only for models you trust.",
+)
+
+
 @contextmanager
 def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
     """Turn a complaint about ``--independent`` into a UsageError: the model file is not at fault."""
@@ -65,8 +72,14 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
         raise
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path, allow_native: bool = False) -> Model:
     """The model of a file.
+
+    Parameters
+    ----------
+    path : Path
+    allow_native : bool, optional
+        Whether its native functions may be compiled and run.
 
     Raises
     ------
@@ -79,7 +92,7 @@ def load_model(path: Path) -> Model:
         raise UsageError(_missing(path))
     from ..describe import load
 
-    return load(path)
+    return load(path, allow_native=allow_native)
 
 
 def _missing(path: Path) -> str:

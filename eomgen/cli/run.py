@@ -18,6 +18,7 @@ from .options import (
     load_model,
     method_option,
     model_argument,
+    native_option,
     parse_settings,
     require_folder,
     target_option,
@@ -35,6 +36,7 @@ TABLES = (".npz", ".csv")
 
 @click.command()
 @model_argument
+@native_option
 @method_option
 @independent_option
 @target_option("cython", "numpy")
@@ -52,6 +54,7 @@ TABLES = (".npz", ".csv")
 @reports_failures
 def run(
     model: Path,
+    allow_native: bool,
     method: str,
     independent: tuple[str, ...],
     target: str,
@@ -77,7 +80,7 @@ def run(
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        described = load_model(model)
+        described = load_model(model, allow_native)
         _complete(described, chosen)
         equations = pipeline.derive(described, method, independent or None)
         parts |= equations.seconds

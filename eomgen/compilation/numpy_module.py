@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from ..errors import ToolchainError
 from .cache import Cache, cache_directory, compute_key
@@ -15,7 +16,7 @@ from .cache import Cache, cache_directory, compute_key
 SOURCE = "_core.py"
 
 
-def load_numpy(sources: Mapping[str, str], name: str) -> ModuleType:
+def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] | None = None) -> ModuleType:
     """Import the emitted NumPy functions of a model; no compiler is needed.
 
     Parameters
@@ -24,6 +25,8 @@ def load_numpy(sources: Mapping[str, str], name: str) -> ModuleType:
         From :func:`eomgen.emit.emit_numpy`.
     name : str
         Name of the model.
+    twins : mapping of str to callable, optional
+        What the text calls but does not define: the Python twins of native functions.
 
     Returns
     -------
@@ -34,14 +37,15 @@ def load_numpy(sources: Mapping[str, str], name: str) -> ModuleType:
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if module_name in sys.modules:
+    if module_name in sys.modules and not twins:
         return sys.modules[module_name]
     try:
-        module = _execute(module_name, _cached(key, name, text))
+        module = _execute(module_name, _cached(key, name, text), twins)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
-            module = _execute(module_name, _written(Path(private), text))
-    sys.modules[module_name] = module
+            module = _execute(module_name, _written(Path(private), text), twins)
+    if not twins:  # other twins make another module of the same text
+        sys.modules[module_name] = module
     return module
 
 
@@ -62,10 +66,11 @@ def _written(folder: Path, text: str) -> Path:
     return path
 
 
-def _execute(module_name: str, path: Path) -> ModuleType:
+def _execute(module_name: str, path: Path, twins: Mapping[str, Any] | None) -> ModuleType:
     spec = importlib.util.spec_from_file_location(module_name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    vars(module).update(twins or {})
     spec.loader.exec_module(module)
     return module

@@ -12,6 +12,7 @@ from ..graph.core import Expr, Graph
 from .build_constraints import build_constraints
 from .build_contacts import declare_contacts
 from .build_forces import build_forces
+from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .checks import check_bodies, check_connected, check_keys, check_names
@@ -54,6 +55,7 @@ def build(description: Description) -> Mechanism:
         faults.add("name", *fault)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
     contacts = declare_contacts(reader, sections["constraints"])
     lagrangian_values = declare_lagrangian(

@@ -16,18 +16,23 @@ from ..errors import Problem
 GROUND_NAME = "ground"
 
 #: Sections made of named entries, in the order of a model file.
-SECTIONS = ("parameters", "inputs", "bodies", "joints", "forces", "constraints", "outputs")
+SECTIONS = ("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "outputs")
 
 Values = dict[str, Any]
 
 
 @dataclass
 class Entry:
-    """One named thing of a section; ``path`` is its dotted place."""
+    """One named thing of a section; ``path`` is its dotted place.
+
+    ``trusted`` tells whether it may bring code of its own, ``folder`` where its relative file names start.
+    """
 
     name: Any
     values: Values
     path: str
+    trusted: bool = True
+    folder: str = ""
 
 
 @dataclass
@@ -60,6 +65,10 @@ class Description:
         entry = Entry(name, values, f"{section}.{name}")
         self.sections[section].append(entry)
         return entry
+
+    def place(self, path: str) -> tuple[str, int]:
+        """File and line of a dotted path; ``("", 0)`` if the model comes from no file."""
+        return place_of(path, self.lines)
 
 
 def place_of(path: str, lines: Mapping[str, tuple[str, int]]) -> tuple[str, int]:

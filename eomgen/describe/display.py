@@ -23,6 +23,8 @@ def _summary(entry: Entry) -> str:
         if key == "markers":
             names = list(value) if isinstance(value, Mapping) else [name for name, _ in value]
             parts.append("markers " + ", ".join(map(str, names)))
+        elif entry.path.startswith("functions.") and key in ("x", "y", "z"):
+            parts.append(f"{len(items(value) or ())} {key}")
         elif key in ("type", "value", "expression"):
             parts.append(text_of(value))
         elif key in ("between", "marker", "body", "joint"):

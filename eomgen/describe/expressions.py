@@ -1,9 +1,9 @@
 """Stage describe, expressions: text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
-:data:`~eomgen.describe.names.FUNCTIONS` and, where markers can be resolved (in outputs), ``x y z vx vy vz ax ay az`` of
-a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.  Length, depth, size, numbers and exponents
-are bounded, so hostile text costs no more than honest text.
+:data:`~eomgen.describe.names.FUNCTIONS`, functions that the graph declares and, where markers can be resolved (in
+outputs), ``x y z vx vy vz ax ay az`` of a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
+Length, depth, size, numbers and exponents are bounded, so hostile text costs no more than honest text.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ _REFUSED: dict[type[ast.AST], str] = {
 }
 
 
-def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None) -> Expr:
+def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
     """The graph expression of a text.
 
     Parameters
@@ -78,6 +78,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         Gives the expression of a name.
     locate : callable, optional
         Gives the expression of a marker's motion; without it such calls are refused.
+    any_function : bool, optional
+        Whether functions that the graph does not declare pass; what they stand for has no meaning then.
 
     Returns
     -------
@@ -111,7 +113,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
         raise ExpressionError("a statement, not an expression", start + 1, ALLOWED, text)
-    return _Walker(text, start, graph, resolve, locate).walk(body[0].value, 0)
+    return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
 
 
 def names_in(text: str) -> list[str]:
@@ -123,7 +125,7 @@ def names_in(text: str) -> list[str]:
         return graph.symbol(name)
 
     try:
-        parse(text, graph, resolve)
+        parse(text, graph, resolve, any_function=True)
     except ExpressionError:
         return []
     return list(found)
@@ -132,8 +134,10 @@ def names_in(text: str) -> list[str]:
 class _Walker:
     """Turns a syntax tree into nodes of the graph; every kind of node it does not know is refused."""
 
-    def __init__(self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None) -> None:
-        self.text, self.start, self.graph = text, start, graph
+    def __init__(
+        self, text: str, start: int, graph: Graph, resolve: Resolve, locate: Locate | None, any_function: bool
+    ) -> None:
+        self.text, self.start, self.graph, self.any_function = text, start, graph, any_function
         self.resolve, self.locate = resolve, locate
         self.size = 0
 
@@ -181,7 +185,7 @@ class _Walker:
     def name(self, node: ast.Name) -> Expr:
         if node.id == "pi":
             return self.graph.constant(math.pi)
-        if node.id in FUNCTIONS:
+        if node.id in FUNCTIONS or node.id in self.graph.functions:
             raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
         try:
             return self.resolve(node.id)
@@ -228,20 +232,44 @@ class _Walker:
             raise self.fault(node, f"{name}() takes no keywords")
         if name in QUANTITIES and name not in FUNCTIONS:
             return self.quantity(node, name)
-        if name not in FUNCTIONS:
-            remedy = nearest(name, [*FUNCTIONS, *(QUANTITIES if self.locate else ())], "functions")
-            raise self.fault(node, f"unknown function {name!r}", remedy)
-        least, most = FUNCTIONS[name]
+        declared = self.graph.functions.get(name)
+        if self.any_function and (name == "diff" or (name not in FUNCTIONS and declared is None)):
+            for argument in node.args:
+                self.walk(argument, depth + 1)
+            return self.graph.symbol("?")
+        if name not in FUNCTIONS and declared is None:
+            known = [*FUNCTIONS, *self.graph.functions, *(QUANTITIES if self.locate else ())]
+            raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))
+        least, most = FUNCTIONS[name] if declared is None else (declared.arity, declared.arity)
         if not least <= len(node.args) <= most:
             number = f"{least}" if least == most else f"{least} or more"
             plural = "" if number == "1" else "s"
             raise self.fault(node, f"{name}() takes {number} argument{plural}, not {len(node.args)}", "")
+        if name == "diff":
+            return self.derivative(node, depth)
         arguments = [self.walk(argument, depth + 1) for argument in node.args]
+        if declared is not None:
+            zeros = (0,) * declared.arity
+            return Expr(self.graph, self.graph.call(declared, zeros, [x.id for x in arguments]))
         if name in ("min", "max"):
             return self.fold(node, name, arguments)
         if name == "heaviside":  # 0, 1/2 at 0, 1
             return 0.5 * (1.0 + self.apply(node, "sign", *arguments))
         return self.apply(node, "select" if name == "where" else name, *arguments)
+
+    def derivative(self, node: ast.Call, depth: int) -> Expr:
+        """``diff(f(x, y), 1, 0)``: a derivative of a declared function, one order for each of its arguments."""
+        call, *rest = node.args
+        name = call.func.id if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) else ""
+        declared = self.graph.functions.get(name)
+        if declared is None:
+            known = ", ".join(self.graph.functions) or "none"
+            raise self.fault(node, "diff() takes a call of a declared function", f"declared functions: {known}")
+        value = self.walk(call, depth + 1)
+        orders = [x.value for x in rest if isinstance(x, ast.Constant) and type(x.value) is int and x.value <= 3]
+        if len(orders) != len(rest) or len(orders) != declared.arity:
+            raise self.fault(node, f"diff() takes {declared.arity} order(s) after the call", "allowed: 0, 1, 2, 3")
+        return Expr(self.graph, self.graph.call(declared, tuple(map(int, orders)), value.node[1:]))
 
     def quantity(self, node: ast.Call, name: str) -> Expr:
         if self.locate is None:

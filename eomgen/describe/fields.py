@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from ..joints import JOINTS
 from .mechanism import Simulation
+from .splines import KINDS as TABLES
 
 # What the expressions of a field may depend on; each level includes those before it.
 NUMBER = -1  #: numbers, pi
@@ -60,6 +61,10 @@ KINDS = {
     "wheels": "a mapping of sun, planet, ring to numbers or expressions",
     "forces": "a mapping of coordinates to expressions, or a list of one expression for each coordinate",
     "table": "a mapping",
+    "numbers": "a list of numbers",
+    "grid": "a list of lists of numbers, a row for each x",
+    "count": "a whole number greater than 0",
+    "functions": "a list of names of C functions, null for one that is not there",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -83,6 +88,25 @@ OUTPUT_FIELDS: Fields = {
     ),
     "unit": _UNIT,
     "doc": _DOC,
+}
+FUNCTION: dict[str, Fields] = {
+    "table": {
+        "x": Field("numbers", "points, strictly increasing", required=True),
+        "y": Field("numbers", "values at the points; with z, points along the second argument", required=True),
+        "z": Field("grid", "values on the grid of x and y, for a function of two arguments"),
+        "kind": Field("choice", "how to go through the points", default="cubic", choices=tuple(TABLES)),
+        "extrapolation": Field(
+            "choice", "beyond the points: slope or value of the end", default="linear", choices=("linear", "constant")
+        ),
+    },
+    "native": {
+        "source": Field("text", "C source file, relative to the model file; needs --allow-native", required=True),
+        "function": Field("name", "C function double f(double, ...) (the name of the entry unless given)"),
+        "arguments": Field("count", "number of arguments (that of derivatives unless given, or 1)"),
+        "derivatives": Field("functions", "C functions of the derivative along each argument"),
+        "second_derivatives": Field("functions", "C functions of the second derivatives, along 11, 12, .., 22, .."),
+        "python": Field("text", "Python file with functions of the same names, for evaluation without C"),
+    },
 }
 MARKER: Fields = {
     "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
@@ -184,6 +208,7 @@ MODEL: Fields = {
     "gravity": Field("vector", "acceleration of gravity in ground axes (m/s^2)", default=(0, 0, 0)),
     "parameters": Field("table", "constants that can change between runs"),
     "inputs": Field("table", "quantities given from outside over time"),
+    "functions": Field("table", "functions for use in expressions: tables, and C code"),
     "bodies": Field("table", "rigid bodies"),
     "joints": Field("table", "joints between bodies"),
     "forces": Field("table", "force elements"),
@@ -218,3 +243,9 @@ def joint_fields(type_name: str) -> Fields:
 def force_fields(type_name: str) -> Fields:
     """The keys of one type of force, ``type`` among them."""
     return {"type": Field("choice", "type of the force", required=True, choices=tuple(FORCE)), **FORCE[type_name]}
+
+
+def function_fields(type_name: str) -> Fields:
+    """The keys of one type of function, ``type`` among them."""
+    choices = tuple(FUNCTION)
+    return {"type": Field("choice", "type of the function", required=True, choices=choices), **FUNCTION[type_name]}

@@ -13,6 +13,7 @@ from .fields_constraints import CONSTRAINT
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_constraints import ConstraintMethods
 from .model_forces import ForceMethods
+from .model_functions import FunctionMethods
 from .model_joints import JointMethods
 from .sympy_face import name_of, symbol
 
@@ -25,7 +26,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(JointMethods, ForceMethods, ConstraintMethods):
+class Model(JointMethods, ForceMethods, ConstraintMethods, FunctionMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by

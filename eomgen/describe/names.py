@@ -28,6 +28,7 @@ FUNCTIONS: dict[str, tuple[int, int]] = {
     "max": (2, 64),
     "heaviside": (1, 1),
     "where": (3, 3),
+    "diff": (2, 17),
 }
 
 #: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).

@@ -9,6 +9,7 @@ from .fields import (
     AXES,
     BODY,
     FORCE,
+    FUNCTION,
     INERTIA,
     INPUT,
     LAGRANGIAN,
@@ -23,6 +24,7 @@ from .fields import (
     Field,
     Fields,
     force_fields,
+    function_fields,
     joint_fields,
 )
 from .fields_constraints import CONSTRAINT, ONE_OF_CONSTRAINT, WHEELS, constraint_fields
@@ -74,6 +76,10 @@ _KINDS: dict[str, Schema] = {
     "joint": _ref("name"),
     "names": _ref("names"),
     "number": {"type": ["number", "string"]},
+    "numbers": {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2},
+    "grid": {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}, "minItems": 2},
+    "count": {"type": "integer", "minimum": 1},
+    "functions": {"type": "array", "items": {"anyOf": [_ref("name"), {"type": "null"}]}},
     "positive": {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "string"}]},
     "expression": _ref("expression"),
     "expressions": {"type": "array", "items": _ref("expression")},
@@ -170,6 +176,9 @@ def model_schema() -> dict[str, Any]:
     sections: Schema = {
         "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
         "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
+        "functions": _section(
+            {"oneOf": [_typed(function_fields(name), name) for name in FUNCTION]}, MODEL["functions"].doc
+        ),
         "bodies": _section(_table(BODY), MODEL["bodies"].doc),
         "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
         "forces": _section({"oneOf": [_force(name) for name in FORCE]}, MODEL["forces"].doc),

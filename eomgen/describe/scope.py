@@ -18,6 +18,7 @@ from .names import QUANTITIES, fault_of_name, nearest
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
 LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
 LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
+LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
 _LEVEL_REMEDY = {
     NUMBER: "numbers and pi can",
@@ -76,8 +77,8 @@ class Namespace:
             self.faults.add(
                 path,
                 f"the name {clash!r} is taken by the {other}{own}",
-                "parameters, inputs, coordinates and outputs share one namespace, with the _dot and _ddot of "
-                "coordinates; rename one",
+                "parameters, inputs, functions, coordinates and outputs share one namespace, with the _dot and _ddot "
+                "of coordinates; rename one",
             )
             return False
         return True

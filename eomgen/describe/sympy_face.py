@@ -21,6 +21,13 @@ def symbol(name: str) -> Any:
     return sympy.Symbol(name)
 
 
+def function(name: str) -> Any:
+    """The SymPy function that stands for a declared function."""
+    import sympy
+
+    return sympy.Function(name)
+
+
 def is_sympy(value: object) -> bool:
     """Whether a value is a SymPy object; never imports SymPy."""
     sympy = sys.modules.get("sympy")
@@ -77,7 +84,7 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
     """
     from ..graph.sympy_lower import LoweringError, lower
 
-    def meaning(part: Any) -> Expr | None:
+    def meaning(part: Any) -> Expr | None:  # declared functions, also f(t), are calls and do not come here
         name = name_of(part)
         return resolve(name) if isinstance(name, str) else None
 

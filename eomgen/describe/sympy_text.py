@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from ..errors import ExpressionError, UsageError
 from ..graph.core import Expr, Graph
+from ..graph.functions import Function
 from .expressions import parse
 from .scope import RATES
 from .sympy_face import free_names, function_name, function_names
 
 
-def sympy_text(expression: Any) -> str:
+def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     """A SymPy expression as a text that the expressions of a model file know.
+
+    Parameters
+    ----------
+    expression : sympy.Expr
+    functions : collection of str, optional
+        Names of the functions that the model declares.
 
     Raises
     ------
     UsageError
         The expression has parts that such a text cannot say.
     """
+    import sympy
+    from sympy.core.function import AppliedUndef
     from sympy.printing.str import StrPrinter
 
     class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
@@ -66,13 +76,35 @@ def sympy_text(expression: Any) -> str:
             return str(text)
 
         def _print_AppliedUndef(self, e: Any) -> str:
-            return function_name(e) or str(e)
+            if e.func.__name__ not in functions:
+                return function_name(e) or str(e)
+            return f"{e.func.__name__}({', '.join(self._print(x) for x in e.args)})"
 
         def _print_Derivative(self, e: Any) -> str:
-            return function_name(e) or str(e)
+            if e.expr.func.__name__ not in functions:
+                return function_name(e) or str(e)
+            return self._slope(e, e.expr.args)
+
+        def _print_Subs(self, e: Any) -> str:
+            slope = e.expr
+            if not isinstance(slope, sympy.Derivative) or slope.expr.func.__name__ not in functions:
+                return str(e)
+            places = dict(zip(e.variables, e.point, strict=True))
+            return self._slope(slope, [x.xreplace(places) for x in slope.expr.args])
+
+        def _slope(self, e: Any, operands: Any) -> str:
+            wanted = dict(e.variable_count)
+            orders = [wanted.get(x, 0) for x in e.expr.args]
+            if sum(orders) != sum(wanted.values()) or any(set(wanted) & x.free_symbols - {x} for x in e.expr.args):
+                raise UsageError(f"{e} cannot be written as a text: write its chain rule out")
+            call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
+            return f"diff({', '.join([call, *map(str, orders)])})"
 
     text = str(Printer().doprint(expression))
     graph = Graph()
+    for call in expression.atoms(AppliedUndef) if isinstance(expression, sympy.Basic) else ():
+        if call.func.__name__ in functions:
+            graph.declare(Function(call.func.__name__, len(call.args), None))
     known = {*free_names([expression]), "t"} | {f + rate for f in function_names([expression]) for rate in RATES}
 
     def resolve(name: str) -> Expr:

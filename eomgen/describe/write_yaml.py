@@ -14,6 +14,8 @@ from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
 from .yaml_nodes import scalar
 
+Names = frozenset[Any]  # of declared functions
+
 _PLAIN = re.compile(r"[A-Za-z0-9_.(*+/-][A-Za-z0-9_.()*+/<>= -]*\Z")
 
 
@@ -36,20 +38,22 @@ def yaml_text(description: Description) -> str:
         An expression or value has no form in a model file.
     """
     lines: list[str] = []
+    functions = frozenset(entry.name for entry in description.sections["functions"])
     for key in MODEL:
         if key in SECTIONS:
             lines += _section(key, description)
         elif key in description.values:
             value = description.values[key]
             if key == "lagrangian" and value is not None:
-                lines += ["lagrangian:", *(f"  {k}: {_value(v)}" for k, v in value.items())]
+                lines += ["lagrangian:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
             elif not _is_default(key, value):
-                lines.append(f"{key}: {_value(value)}")
+                lines.append(f"{key}: {_value(value, functions)}")
     return "\n".join(lines) + "\n"
 
 
 def _section(section: str, description: Description) -> list[str]:
     entries = description.sections[section]
+    functions = frozenset(entry.name for entry in description.sections["functions"])
     if not entries:
         return []
     short = SHORT.get(section)
@@ -57,7 +61,7 @@ def _section(section: str, description: Description) -> list[str]:
     for entry in entries:
         values = {key: value for key, value in entry.values.items() if not _is_default(key, value)}
         only = short is not None and list(values) == [short]
-        lines.append(f"  {entry.name}: {_value(values[short] if only and short else values)}")
+        lines.append(f"  {entry.name}: {_value(values[short] if only and short else values, functions)}")
     return lines
 
 
@@ -71,7 +75,7 @@ def _is_default(key: str, value: Any) -> bool:
     return key == "axis" and isinstance(value, str) and value == "z"
 
 
-def _value(value: Any) -> str:
+def _value(value: Any, functions: Names) -> str:
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -79,27 +83,27 @@ def _value(value: Any) -> str:
     if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
         listed = items(value)
         if listed is not None:
-            return _value(listed)
+            return _value(listed, functions)
         if is_sympy(value):
-            return _sympy(value)
+            return _sympy(value, functions)
         raise UsageError(f"{value!r} cannot be written to a model file")
     if is_sympy(value):
-        return _sympy(value)
+        return _sympy(value, functions)
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, numbers.Real):
         return str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name_of(k)}: {_value(v)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{name_of(k)}: {_value(v, functions)}" for k, v in value.items()) + "}"
     if value and all(isinstance(x, tuple) and len(x) == 2 and isinstance(x[1], dict) for x in value):
-        return _value(dict(value))  # named markers
-    return "[" + ", ".join(_value(x) for x in value) + "]"
+        return _value(dict(value), functions)  # named markers
+    return "[" + ", ".join(_value(x, functions) for x in value) + "]"
 
 
-def _sympy(value: Any) -> str:
+def _sympy(value: Any, functions: Names) -> str:
     from .sympy_text import sympy_text
 
-    text = sympy_text(value)
+    text = sympy_text(value, functions)
     return text if isinstance(scalar(text), int | float) else _text(text)
 
 

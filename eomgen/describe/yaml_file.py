@@ -17,13 +17,16 @@ from .yaml_nodes import SIZE, Document
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
 
 
-def load(path: str | os.PathLike[str]) -> Model:
+def load(path: str | os.PathLike[str], *, allow_native: bool = False) -> Model:
     """A model from a file, by its suffix.
 
     Parameters
     ----------
     path : str or path
         A model file ``.yaml`` or ``.yml``.
+    allow_native : bool, optional
+        Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
+        names are not read.
 
     Returns
     -------
@@ -44,10 +47,10 @@ def load(path: str | os.PathLike[str]) -> Model:
         raise UsageError(
             f"{os.fspath(path)}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}"
         )
-    return load_yaml(path)
+    return load_yaml(path, allow_native=allow_native)
 
 
-def load_yaml(path: str | os.PathLike[str]) -> Model:
+def load_yaml(path: str | os.PathLike[str], *, allow_native: bool = False) -> Model:
     """A model from a YAML file.
 
     Names are looked up when the model is checked, as in Python; faults of the file itself that leave nothing to check
@@ -56,6 +59,8 @@ def load_yaml(path: str | os.PathLike[str]) -> Model:
     Parameters
     ----------
     path : str or path
+    allow_native : bool, optional
+        As for :func:`load`.
 
     Returns
     -------
@@ -78,7 +83,10 @@ def load_yaml(path: str | os.PathLike[str]) -> Model:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ModelError([Problem("file", "is not UTF-8 text", "save it as UTF-8", name, line)]) from None
-    return Model.from_description(describe_yaml(text, name))
+    description = describe_yaml(text, name)
+    for entry in description.sections["functions"]:
+        entry.trusted, entry.folder = allow_native, os.path.dirname(name)
+    return Model.from_description(description)
 
 
 def describe_yaml(text: str, file: str = "model.yaml") -> Description:
@@ -119,4 +127,4 @@ def _add_section(description: Description, faults: Faults, section: str, value: 
             else:
                 faults.add(f"{section}.{name}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}")
                 values = {}
-        description.add(section, name, values)
+        description.add(section, name, values).trusted = False

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from ..program import KERNELS, Block, Program
+from .c_functions import declarations, function_files, used_calls
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
 from .c_text import Printed, print_block, print_precompute, used_helpers
@@ -20,10 +21,12 @@ def emit_c(program: Program) -> SourceSet:
     -------
     SourceSet
         ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.  A large model has
-        further files ``<name>_part1.c``, ..., so that they can be compiled side by side.
+        further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
+        ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
     printed = _print(program)
     parts = distribute(program, printed)
+    calls = used_calls(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
     further = {
         f"{program.name}_part{k}.c": render("c/part.c.j2", {**context, "functions": functions})
@@ -33,6 +36,7 @@ def emit_c(program: Program) -> SourceSet:
         {
             f"{program.name}.c": render("c/model.c.j2", context),
             **further,
+            **function_files(program, calls),
             f"{program.name}.h": render("c/model.h.j2", context),
             "eomgen.h": read_template("c/eomgen.h"),
             "model.json": metadata_json(program),
@@ -67,7 +71,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "hoisted": len(program.hoisted),
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
-        "helpers": used_helpers(program, roots),
+        "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
         "blocks": printed if program.hoisted else printed[1:],
         "drivers": [read_template(f"c/drivers/{file}.c") for file in driver_files(program)],
         "areas": areas,

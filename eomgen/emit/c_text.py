@@ -11,6 +11,7 @@ from typing import NamedTuple
 from ..graph.core import Expr
 from ..graph.traverse import reachable
 from ..program import Block, Program
+from .c_functions import c_name
 from .straight import CONDITIONS, Piece, Pieces, cut, references
 
 PATTERNS: dict[str, str] = {
@@ -65,7 +66,7 @@ class _Printer:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str]) -> None:
-        self._nodes = program.graph.nodes
+        self._nodes, self._calls, self._program = program.graph.nodes, program.graph.calls, program.name
         self._fixed = references
         self._variables: dict[int, str] = {}
         self.used: set[str] = set()  #: arguments read or written since last emptied
@@ -103,6 +104,9 @@ class _Printer:
             return f"{self.condition(node[1], piece)} ? {self.operand(node[2])} : {self.operand(node[3])}"
         if kind in CONDITIONS:
             return CONDITION_PATTERNS[kind].format(*map(self.operand, node[1:])) + " ? 1.0 : 0.0"
+        if kind in self._calls:
+            function, orders = self._calls[kind]
+            return f"{c_name(self._program, function.name, orders)}({', '.join(map(self.operand, node[1:]))})"
         return PATTERNS[kind].format(*map(self.operand, node[1:]))
 
     def lines(self, piece: Piece) -> list[str]:

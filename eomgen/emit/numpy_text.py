@@ -40,7 +40,7 @@ CONDITION_PATTERNS: dict[str, str] = {
 
 class _Printer:
     def __init__(self, program: Program, references: dict[int, str]) -> None:
-        self._nodes = program.graph.nodes
+        self._nodes, self._calls = program.graph.nodes, program.graph.calls
         self._fixed = references
         self._variables: dict[int, str] = {}
 
@@ -66,6 +66,9 @@ class _Printer:
             return f"np.where({self.condition(node[1], piece)}, {self.operand(node[2])}, {self.operand(node[3])})"
         if node[0] in CONDITIONS:
             return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:])) + " * 1.0"
+        if node[0] in self._calls:
+            function, orders = self._calls[node[0]]
+            return f"call_{function.name}({', '.join([*map(self.operand, node[1:]), *map(str, orders)])})"
         return PATTERNS[node[0]].format(*map(self.operand, node[1:]))
 
     def lines(self, piece: Piece) -> list[str]:

@@ -68,7 +68,7 @@ def _cython(program: Program) -> dict[str, str]:
 
 
 def _numpy(program: Program) -> dict[str, str]:
-    return {**emit_numpy(program), **_python_files(_context(program)), **_runtime_files()}
+    return {**emit_numpy(program, bundled=True), **_python_files(_context(program)), **_runtime_files()}
 
 
 def _c_library(program: Program) -> dict[str, str]:

@@ -5,17 +5,20 @@ again, and constants, signs, zeros and ones are folded as nodes are made, so com
 derivation code cannot swell.  :class:`Expr` is a handle on one node with Python's operators.
 
 Operations: ``const sym | add sub mul div neg | pow sqrt exp log | sin cos tan asin acos atan sinh cosh tanh | atan2 |
-abs sign min max | lt le eq not and or | select``.  ``select(c, x, y)`` is x where c is true (non-zero) and y elsewhere.
-Comparisons give 1.0 or 0.0.
+abs sign min max | lt le eq not and or | select``, and calls of declared functions (:mod:`.functions`).  ``select(c, x,
+y)`` is x where c is true (non-zero) and y elsewhere.  Comparisons give 1.0 or 0.0.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Union
 
 from .operations import COMMUTATIVE, EVEN, FOLD, ODD
+
+if TYPE_CHECKING:
+    from .functions import Function
 
 Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
 Scalar = Union["Expr", float, int]
@@ -29,13 +32,17 @@ class Graph:
     nodes : list of tuple
         ``nodes[i]`` is the node with id ``i``; operands always have smaller ids than the node that uses them, so id
         order is a topological order.
+    functions, calls : dict
+        Functions that expressions may call, by name; what each operation that is a call means: (Function, orders).
     """
 
-    __slots__ = ("_ids", "nodes", "one", "zero")
+    __slots__ = ("_ids", "calls", "functions", "nodes", "one", "zero")
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self._ids: dict[Node, int] = {}
+        self.functions: dict[str, Function] = {}
+        self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)
 
@@ -86,6 +93,8 @@ class Graph:
             return self.div(*ids)
         if operation == "neg":
             return self.neg(*ids)
+        if operation in self.calls:
+            return self._node((operation, *ids))
         if operation not in FOLD:
             raise ValueError(f"unknown operation {operation!r}")
         nodes = self.nodes
@@ -111,6 +120,18 @@ class Graph:
             return self._node(("abs", head[1]))
         if operation in COMMUTATIVE and ids[0] > ids[1]:
             ids = (ids[1], ids[0])
+        return self._node((operation, *ids))
+
+    def declare(self, function: Function) -> None:
+        """Let expressions call a function."""
+        self.functions[function.name] = function
+
+    def call(self, function: Function, orders: tuple[int, ...], ids: Iterable[int]) -> int:
+        """The id of a call of a function, or of its derivative of these orders, on operand ids."""
+        if function.highest is not None and max(orders) > function.highest:
+            return self.zero.id
+        operation = function.operation(orders)
+        self.calls[operation] = (function, orders)
         return self._node((operation, *ids))
 
     def _fold(self, operation: str, ids: Iterable[int]) -> int | None:

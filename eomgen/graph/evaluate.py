@@ -33,6 +33,10 @@ def _sign(a: float) -> float:
     return float((a > 0) - (a < 0)) if not math.isnan(a) else a
 
 
+def _pack(*values: Any) -> tuple[Any, ...]:
+    return tuple(x for value in values for x in (value if isinstance(value, tuple) else (value,)))
+
+
 #: operation -> (on floats, on arrays)
 FUNCTIONS: dict[str, tuple[Callable[..., float], Callable[..., Any]]] = {
     "add": (operator.add, np.add),
@@ -104,22 +108,34 @@ class Evaluator:
             raise UsageError(f"no value for {', '.join(sorted(unknown))}")
         first = len(self.names) + len(self._constants)
         self._steps: list[tuple[str, int, int, int]] = []  # operation and operand slots, -1 where there is none
+        self._functions: dict[str, tuple[Callable[..., Any], Callable[..., Any]]]
+        self._functions = {**FUNCTIONS, "pack": (_pack, _pack)}
+        for operation, (function, orders) in (graph.calls if graph is not None else {}).items():
+            implementation = function.implementation(orders)
+            self._functions[operation] = (implementation, implementation)
         last: dict[int, int] = {}
-        for k, i in enumerate(rest):
-            node = nodes[i]
-            a, b, c = (*(slots[j] for j in node[1:]), -1, -1)[:3]
-            slots[i] = first + k
-            self._steps.append((node[0], a, b, c))
-            for s in (a, b, c):
-                last[s] = k
+        for i in rest:
+            operation, *args = nodes[i]
+            slots[i] = self._add_step(operation, [slots[j] for j in args], first, last)
         self._outputs = [slots[y.id] for y in outputs]
         keep = {*self._outputs, -1, *range(first)}
-        self._dead: list[tuple[int, ...]] = [()] * len(rest)  # slots not needed after each step
+        self._dead: list[tuple[int, ...]] = [()] * len(self._steps)  # slots not needed after each step
         for s, k in last.items():
             if s not in keep:
                 self._dead[k] = (*self._dead[k], s)
-        self._scalar = [(FUNCTIONS[op][0], a, b, c) for op, a, b, c in self._steps]
+        self._scalar = [(self._functions[op][0], a, b, c) for op, a, b, c in self._steps]
         self._used = used
+
+    def _add_step(self, operation: str, places: list[int], first: int, last: dict[int, int]) -> int:
+        """Append a step, after steps that pack the arguments of a call of more than three; returns its slot."""
+        if len(places) > 3:
+            while len(places) > 1:
+                places = [self._add_step("pack", places[:3], first, last), *places[3:]]
+        a, b, c = (*places, -1, -1)[:3]
+        self._steps.append((operation, a, b, c))
+        for s in places:
+            last[s] = len(self._steps) - 1
+        return first + len(self._steps) - 1
 
     def __call__(self, values: Mapping[str, Value] | Sequence[Value] | np.ndarray) -> list[Value]:
         """Evaluate.
@@ -172,14 +188,18 @@ class Evaluator:
                     append(function(data[a], data[b], data[c]))
             except (ValueError, ZeroDivisionError, OverflowError):  # NumPy knows the infinity or NaN it should be
                 with np.errstate(all="ignore"):
-                    append(float(FUNCTIONS[self._steps[k][0]][1](*(np.float64(data[s]) for s in (a, b, c) if s >= 0))))
+                    append(
+                        float(
+                            self._functions[self._steps[k][0]][1](*(np.float64(data[s]) for s in (a, b, c) if s >= 0))
+                        )
+                    )
         return [data[s] for s in self._outputs]
 
     def _on_arrays(self, data: list[Value]) -> list[Value]:
         append = data.append
         with np.errstate(all="ignore"):
             for (operation, a, b, c), dead in zip(self._steps, self._dead, strict=True):
-                function = FUNCTIONS[operation][1]
+                function = self._functions[operation][1]
                 if b < 0:
                     append(function(data[a]))
                 elif c < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from .core import Graph
+from .functions import call_partials
 
 #: Operations that take one of several branches; what a branch not taken does must not leak into the derivative.
 BRANCHING = frozenset({"select", "min", "max"})
@@ -46,6 +47,8 @@ def partials(g: Graph, i: int, active: Sequence[bool]) -> list[int]:
     """Partial derivatives of a smooth node with respect to its operands (zero where not active)."""
     node = g.nodes[i]
     operation, a = node[0], node[1]
+    if operation in g.calls:
+        return call_partials(g, node, active)
     zero = g.zero.id
     slope = SLOPES.get(operation)
     if slope is not None:

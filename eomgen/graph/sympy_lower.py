@@ -3,7 +3,7 @@
 All quantities are real.  What has a meaning: real numbers; ``+ * **``; sin cos tan sec csc cot asin acos atan atan2
 sinh cosh tanh sech csch coth exp log sqrt; Abs sign Min Max Heaviside re im conjugate; Piecewise ending with ``True``;
 ``< <= > >= Eq Ne And Or Not Xor ITE Implies Equivalent``; and whatever the caller resolves: symbols, functions of time
-``q(t)``, their derivatives, own functions.
+``q(t)``, their derivatives; and the functions that the graph declares, with their derivatives.
 """
 
 from __future__ import annotations
@@ -163,11 +163,41 @@ class _Walk:
             return (part.to_nnf(simplify=False),), lambda g, ids: ids[0]
         if part is sympy.I or part is sympy.zoo:
             raise _Fault("complex numbers have no meaning here")
+        called = self._called(part)
+        if called is not None:
+            return called
         found = self.resolve(part)
         if found is not None:
             meaning = self.graph.lift(found).id
             return (), lambda g, ids: meaning
         return self._rewritten(part)
+
+    def _called(self, part: Any) -> tuple[Sequence[Any], Build] | None:
+        """A call of a declared function, or a derivative of one as SymPy writes it; None for anything else."""
+        places: dict[Any, Any] = {}
+        whole = part
+        if isinstance(part, sympy.Subs) and isinstance(part.expr, sympy.Derivative):
+            places = dict(zip(part.variables, part.point, strict=True))
+            part = part.expr
+        wanted: tuple[Any, ...] = ()
+        if isinstance(part, sympy.Derivative):
+            part, wanted = part.expr, part.variable_count
+        if not isinstance(part, AppliedUndef) or part.func.__name__ not in self.graph.functions:
+            return None
+        function = self.graph.functions[part.func.__name__]
+        if len(part.args) != function.arity:
+            plural = "" if function.arity == 1 else "s"
+            raise _Fault(f"{function.name}() takes {function.arity} argument{plural}, not {len(part.args)}")
+        orders = [0] * function.arity
+        for variable, order in wanted:
+            along = [i for i, argument in enumerate(part.args) if argument == variable]
+            others = [a for a in part.args if a != variable and a.has(variable)]
+            if len(along) != 1 or others or not order.is_Integer:
+                other = whole.doit()  # SymPy's own chain rule brings it into the form above
+                return None if other == whole else ((other,), lambda g, ids: ids[0])
+            orders[along[0]] += int(order)
+        operands = [argument.xreplace(places) for argument in part.args]
+        return operands, lambda g, ids: g.call(function, tuple(orders), ids)
 
     def _rewritten(self, part: Any) -> tuple[Sequence[Any], Build]:
         if isinstance(part, (sympy.Symbol, AppliedUndef)):

@@ -167,7 +167,28 @@ def _raised(graph: Graph, i: int, made: Mapping[int, Any], symbols: Callable[[st
     if kind == "select":
         condition, yes, no = (made[k] for k in args)
         return sympy.Piecewise((_as_number(yes), _as_truth(condition)), (_as_number(no), True))
-    return _FUNCTIONS[kind](*(_as_number(made[k]) for k in args))
+    operands = [_as_number(made[k]) for k in args]
+    if kind in graph.calls:
+        function, orders = graph.calls[kind]
+        return _call(function.name, orders, operands)
+    return _FUNCTIONS[kind](*operands)
+
+
+def _call(name: str, orders: Sequence[int], operands: Sequence[Any]) -> Any:
+    """A call of a declared function, or its derivative where the arguments are the operands."""
+    function = sympy.Function(name)
+    if not any(orders):
+        return function(*operands)
+    places, moved = list(operands), dict[Any, Any]()
+    for k, x in enumerate(operands):
+        others = [*operands[:k], *operands[k + 1 :]]
+        if orders[k] and not (x.is_Symbol and not any(other.has(x) for other in others)):
+            places[k] = sympy.Dummy(f"xi_{k + 1}")
+            while x in moved.values():  # Subs takes variables at the same point for the same variable
+                x = sympy.Mul(sympy.Integer(1), x, evaluate=False)
+            moved[places[k]] = x
+    slope = sympy.Derivative(function(*places), *((places[k], n) for k, n in enumerate(orders) if n))
+    return sympy.Subs(slope, list(moved), list(moved.values())) if moved else slope
 
 
 def _is_truth(value: Any) -> bool:

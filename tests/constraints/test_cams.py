@@ -259,3 +259,53 @@ def test_a_face_does_not_touch_the_far_side() -> None:
     m.guess(s=0.05, touch_contact=-1.5)
     mod = m.compile(target="numpy")
     assert mod.x0(phi=0.1)[mod.x_names.index("s")] > 0.04
+
+
+def tabled(shape: str, **keys: Any) -> eg.Model:
+    """The cam of this file, its contour given by a table of points."""
+    m = cam_model(shape, "translating", "profile(theta)", **keys)
+    points = np.linspace(0, TAU, 241)
+    m.table("profile", points, contour(points), kind="periodic")
+    return m
+
+
+@pytest.mark.parametrize("shape", ["knife_edge", "roller", "flat_face"])
+def test_a_contour_by_points_through_a_periodic_spline(shape: str) -> None:
+    """A table of 241 points moves the follower as the expression does, to the order of the spline's error."""
+    exact, table = (m.compile(target="numpy") for m in (cam_model(shape, "translating"), tabled(shape)))
+    for phi in (0.3, 2.5, 4.0, 9.0, -3.0):
+        x, y = (mod.kinematics([phi], [3.0], [1.0]) for mod in (exact, table))
+        assert exact.q_names == table.q_names
+        at = exact.q_names.index("s")
+        for level, error in zip(range(3), (1e-9, 1e-6, 1e-4), strict=True):
+            assert y[level][at] == pytest.approx(x[level][at], abs=error)
+
+
+def test_a_lift_by_points_through_a_periodic_spline() -> None:
+    """The reference's cycloidal law through points of a whole turn: s, v, a at the points of the rise."""
+    m = eg.Model("points")
+    wheel, follower = m.body("wheel", mass=1, inertia={"zz": 0.02}), m.body("follower", mass=0.4)
+    m.revolute("A", m.ground, wheel, coordinate="phi")
+    m.prismatic("D", m.ground, follower, axis="y", coordinate="s")
+    h, beta = float(CYCLOIDAL["h"]), np.deg2rad(CYCLOIDAL["beta_deg"])
+    theta = np.linspace(0, TAU, 721)
+
+    def rise(x: Any) -> Any:
+        return h * (x / beta - np.sin(TAU * x / beta) / TAU)
+
+    lift = np.where(theta < beta, rise(theta), np.where(theta < TAU - beta, h, rise(TAU - theta)))
+    lift[-1] = lift[0]
+    m.table("law", theta, lift, kind="periodic")
+    m.cam("cam", "A", "D", lift="law(theta)")
+    m.independent("phi")
+    mod = m.compile()
+    at = mod.q_names.index("s")
+    for degrees, row in CYCLOIDAL["rows"].items():
+        q, v, a = mod.kinematics([np.deg2rad(float(degrees)) + TAU], [30.0], [0.0])
+        s, s_dot, s_ddot, _ = map(float, row)
+        assert q[at] == pytest.approx(s, abs=1e-10)
+        assert v[at] == pytest.approx(s_dot, abs=1e-6)
+        # the jerk jumps at both ends of the rise, where a cubic's curvature lags by a fraction of a step
+        assert a[at] == pytest.approx(s_ddot, abs=0.01 if 0 < float(degrees) < 120 else 0.3)
+    run = mod.simulate((0, 1), initial={"phi": 0.1, "phi_dot": 20.0})
+    assert np.ptp(run["s"]) == pytest.approx(h, rel=1e-3)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import eomgen
-from eomgen.describe.fields import FORCE, LAGRANGIAN, MODEL, SIMULATION
+from eomgen.describe.fields import FORCE, FUNCTION, LAGRANGIAN, MODEL, SIMULATION
 from eomgen.describe.names import FUNCTIONS, QUANTITIES
 from eomgen.joints import JOINTS
 
@@ -101,6 +101,12 @@ def test_the_model_file_page_knows_every_key() -> None:
     keys = {*MODEL, *LAGRANGIAN, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
     keys |= {key for fields in FORCE.values() for key in fields} | {o for j in JOINTS.values() for o in j.options}
     assert keys - words == set()
+
+
+def test_the_page_of_functions_knows_every_key() -> None:
+    words = set(re.findall(r"\w+", (ROOT / "docs" / "functions.md").read_text(encoding="utf-8")))
+    fields = {key: field for keys in FUNCTION.values() for key, field in keys.items()}
+    assert {*FUNCTION, *fields, *(word for field in fields.values() for word in field.choices)} - words == set()
 
 
 def test_the_readme_shows_the_slider_crank_that_ships() -> None:

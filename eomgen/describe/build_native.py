@@ -1,0 +1,156 @@
+"""Stage describe, native functions: an entry that names a C source file -> a function with that source and its twin.
+
+Nothing is read before permission: an entry of a model file is refused unless the file was loaded with
+``allow_native``, because compiling and calling it runs code of the file's author.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..graph.functions import Function, NativeCode
+from ..numeric.functions import Orders, Twin, up_to
+from .description import Entry, items
+from .names import fault_of_name
+from .reading import Reader
+
+ARGUMENTS = 16  #: of one function
+SIZE = 1_000_000  #: bytes of one source file
+
+
+@dataclass(frozen=True)
+class PythonTwin:
+    """Callables that stand for a C function, its first and its second derivatives, None where one is not given."""
+
+    value: Callable[..., Any]
+    derivatives: Sequence[Any] = ()
+    second_derivatives: Sequence[Any] = ()
+
+
+def build_native(reader: Reader, entry: Entry) -> Function | None:
+    """The function of an entry whose keys are checked; None if it is at fault, which is noted."""
+    faults, path, values = reader.faults, entry.path, entry.values
+    if not entry.trusted:
+        faults.add(
+            path,
+            "is native code, which a model file may bring only where that is allowed",
+            f"read {values['source']!r} and, if you trust it, use --allow-native (in Python load(path, "
+            "allow_native=True))",
+        )
+        return None
+    arity = _arity(reader, path, values)
+    names = _names(reader, entry, arity) if arity else None
+    source = _read(reader, f"{path}.source", values["source"], entry.folder)
+    if not arity or names is None or source is None:
+        return None
+    for _, name in names:
+        if not re.search(rf"\b{name}\b", source[1]):
+            faults.add(f"{path}.source", f"{source[0]} has no function {name!r}", "a C function double f(double, ...)")
+    twin, text = _twin(reader, entry, arity, names)
+    if faults.under(path):
+        return None
+    code = NativeCode(source[0], source[1], tuple(names), text)
+    return Function(entry.name, arity, twin, code, reader.description.place(path))
+
+
+def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:
+    listed = items(values.get("derivatives"))
+    given = values.get("arguments", len(listed) if listed else 1)
+    if isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= ARGUMENTS:
+        reader.faults.add(f"{path}.arguments", f"{given!r} arguments", f"allowed: 1 to {ARGUMENTS}")
+        return None
+    return given
+
+
+def _names(reader: Reader, entry: Entry, arity: int) -> list[tuple[Orders, str]] | None:
+    """Names of the C functions by order of derivative."""
+    path, values = entry.path, entry.values
+    wanted: list[tuple[str, Orders, Any]] = [(f"{path}.function", (0,) * arity, values.get("function", entry.name))]
+    for key, total in (("derivatives", 1), ("second_derivatives", 2)):
+        every = list(up_to(arity, total))
+        for k, name in enumerate(_listed(reader, f"{path}.{key}", values.get(key), len(every))):
+            if name is not None:
+                wanted.append((f"{path}.{key}[{k}]", every[k], name))
+    for place, _, name in wanted:
+        fault = fault_of_name(name, symbol=True)
+        if fault:
+            reader.faults.add(place, *fault)
+    if reader.faults.under(path):
+        return None
+    if len({name for _, _, name in wanted}) < len(wanted):
+        reader.faults.add(path, "names one C function twice", "each derivative is a function of its own")
+    return None if reader.faults.under(path) else [(orders, name) for _, orders, name in wanted]
+
+
+def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
+    if given is None:
+        return []
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, "functions")
+        return []
+    if len(listed) != length:
+        what = f"{length} of them, null where the source has none"
+        reader.faults.add(path, f"has {len(listed)} entries", f"for as many arguments there are {what}")
+        return []
+    return listed
+
+
+def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str] | None:
+    """Name and text of a file."""
+    if not isinstance(given, str | os.PathLike):
+        reader.wrong(path, given, "text")
+        return None
+    file = Path(folder) / given
+    try:
+        with open(file, "rb") as stream:
+            data = stream.read(SIZE + 1)
+        if len(data) > SIZE:
+            reader.faults.add(path, f"{file} is too large", f"at most {SIZE} bytes")
+            return None
+        return file.name, data.decode("utf-8-sig").replace("\r\n", "\n")
+    except OSError as error:
+        reader.faults.add(path, f"{file} cannot be read ({error.strerror})", "paths are relative to the model file")
+    except UnicodeDecodeError:
+        reader.faults.add(path, f"{file} is not UTF-8 text", "save it as UTF-8")
+    return None
+
+
+def _twin(reader: Reader, entry: Entry, arity: int, names: Sequence[tuple[Orders, str]]) -> tuple[Twin | None, str]:
+    """The Python twin and, if it is a file, its text."""
+    given, path = entry.values.get("python"), f"{entry.path}.python"
+    if given is None:
+        return None, ""
+    if isinstance(given, PythonTwin):
+        functions = {(0,) * arity: given.value}
+        for key, total in (("derivatives", 1), ("second_derivatives", 2)):
+            every = list(up_to(arity, total))
+            listed = _listed(reader, f"{entry.path}.python_{key}", getattr(given, key) or None, len(every))
+            functions |= {orders: f for orders, f in zip(every, listed, strict=False) if f is not None}
+        if not all(callable(f) for f in functions.values()):
+            reader.faults.add(path, "is not a function", "give callables, or the path of a Python file")
+            return None, ""
+        return Twin(functions), ""
+    source = _read(reader, path, given, entry.folder)
+    if source is None:
+        return None, ""
+    try:
+        spec = importlib.util.spec_from_file_location(f"_native_{entry.name}", Path(entry.folder) / given)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever the file of the user raises
+        reader.faults.add(path, f"{source[0]} cannot be imported: {type(error).__name__}: {error}")
+        return None, ""
+    missing = [name for _, name in names if not callable(getattr(module, name, None))]
+    if missing:
+        reader.faults.add(path, f"{source[0]} has no function {', '.join(missing)}", "it bears the names of the C ones")
+        return None, ""
+    return Twin({orders: getattr(module, name) for orders, name in names}), source[1]
