@@ -136,6 +136,9 @@ def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
     for option in kind.options:
         if option in entry.values:
             options[option] = _option(reader, f"{entry.path}.{option}", entry.values[option], fields[option])
+    if options.get("rotation") == "euler_parameters" and "sequence" in options:
+        remedy = "leave out sequence, or choose rotation: euler_angles"
+        reader.faults.add(f"{entry.path}.sequence", "Euler parameters have no sequence", remedy)
     return kind(**options)
 
 
