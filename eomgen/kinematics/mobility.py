@@ -337,5 +337,7 @@ def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: 
     if r == 0:
         return tuple(range(n_dof))
     named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
+    if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
+        named = set(names) - {name for name, _ in kinematics.hints}
     prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
     return tuple(int(j) for j in choose_independent(jacobians, r, prefer))

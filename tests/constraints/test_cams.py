@@ -253,6 +253,17 @@ def test_counts_of_cams() -> None:
         assert report.constraints == report.rank == rows
 
 
+def test_the_contact_point_is_not_what_one_integrates() -> None:
+    """Where no coordinate is named or chosen, a joint's own is independent, not the angle of the contact point."""
+    m = eg.Model("unnamed")
+    cam, follower = m.body("wheel", mass=1, inertia={"zz": 0.02}), m.body("follower", mass=0.4)
+    m.cam_contact("touch", cam, follower, "roller", contour="0.05 + 0.004*cos(3*theta)", radius=ROLLER)
+    m.prismatic("D", m.ground, follower, axis="y")
+    m.revolute("A", m.ground, cam)
+    m.guess(D=0.06)
+    assert m.check().independent == ["A"]
+
+
 def test_a_face_does_not_touch_the_far_side() -> None:
     """The equations also hold on the side the normal points into; assembly refuses that side."""
     m = cam_model("flat_face", "translating")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy
 from jsonschema import Draft202012Validator
+from models import build
 
 import eomgen as eg
 from eomgen.constraints import CONSTRAINTS
@@ -234,6 +235,16 @@ def test_a_lagrangian_may_be_coupled() -> None:
     mod = m.compile(target="numpy")
     state = mod.x0(x=0.3)
     np.testing.assert_allclose(mod.rhs(0.0, state)[2:], [-12 / 5 * 0.3] * 2, rtol=1e-13)
+
+
+def test_angles_that_close_loops_in_space_are_refused() -> None:
+    """Such an angle is known up to full turns only: a coupling would jump with it."""
+    m = build("spatial_loop")
+    wheel = m.body("wheel", mass=1, inertia=(1, 1, 1))
+    m.revolute("W", m.ground, wheel, coordinate="turn")
+    m.coupling("follow", {"C_3": 1, "turn": -1})
+    with pytest.raises(eg.ModelError, match=r"constraints.follow: the angle 'C_3' closes a loop in space"):
+        m.derive()
 
 
 def test_coordinates_of_cut_joints_can_be_coupled() -> None:
