@@ -25,6 +25,9 @@ EXAMPLE_NAMES = (
     "cart_pendulum",
     "spherical_pendulum",
     "andrews_squeezer",
+    "planetary_gear",
+    "cam_follower",
+    "rolling_disc",
 )
 
 

@@ -9,6 +9,8 @@ from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from .build_constraints import build_constraints
+from .build_contacts import declare_contacts
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -57,6 +59,7 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
     build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
+    contacts = declare_contacts(reader, sections["constraints"])
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
     )
@@ -65,6 +68,7 @@ def build(description: Description) -> Mechanism:
     joints = build_joints(reader, specs)
     forces = build_forces(reader, sections["forces"], specs)
     lagrangian = build_lagrangian(reader, lagrangian_values)
+    constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
@@ -81,6 +85,7 @@ def build(description: Description) -> Mechanism:
         check_connected(bodies, joints, faults)
     if faults:
         raise ModelError(faults.sorted())
+    bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
     return Mechanism(
         name=str(name),
         graph=graph,
@@ -97,6 +102,7 @@ def build(description: Description) -> Mechanism:
         independent=independent,
         simulation=simulation,
         lagrangian=lagrangian,
+        constraints=constraints,
         lines=dict(description.lines),
         doc=doc,
     )

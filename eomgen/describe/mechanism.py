@@ -19,6 +19,7 @@ from ..graph.vectors import Mat3, Vec3
 from .description import place_of
 
 if TYPE_CHECKING:
+    from ..constraints.base import Constraint
     from ..forces.base import Force
     from ..joints.base import Joint
 
@@ -161,6 +162,7 @@ class Mechanism:
     independent: tuple[str, ...] = ()
     simulation: Simulation = Simulation()
     lagrangian: Lagrangian | None = None
+    constraints: tuple[Constraint, ...] = ()
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
 

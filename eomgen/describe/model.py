@@ -9,8 +9,10 @@ from ..joints import JOINTS
 from . import FORCE_FIELDS
 from .build import build
 from .description import GROUND_NAME, SECTIONS, Description
+from .fields_constraints import CONSTRAINT
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
+from .model_constraints import ConstraintMethods
 from .model_forces import ForceMethods
 from .model_functions import FunctionMethods
 from .model_joints import JointMethods
@@ -26,7 +28,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(BodyMethods, JointMethods, ForceMethods, FunctionMethods, TotalMethods):
+class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, FunctionMethods, TotalMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
@@ -295,7 +297,9 @@ class Model(BodyMethods, JointMethods, ForceMethods, FunctionMethods, TotalMetho
         from .names import suggestion
 
         near = suggestion(name, [n for n in dir(type(self)) if not n.startswith("_")])
-        hint = near or f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCE_FIELDS)}"
+        hint = near or (
+            f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCE_FIELDS)}; constraints: {', '.join(CONSTRAINT)}"
+        )
         raise AttributeError(f"a Model has no attribute {name!r}; {hint}")
 
     def _counts(self) -> str:

@@ -30,6 +30,7 @@ from .fields import (
     joint_fields,
     solid_fields,
 )
+from .fields_constraints import CONSTRAINT, ONE_OF_CONSTRAINT, WHEELS, constraint_fields
 from .names import LONGEST
 
 Schema = dict[str, Any]
@@ -100,6 +101,14 @@ _KINDS: dict[str, Schema] = {
     "pair": _ref("pair"),
     "axis": _ref("axis"),
     "shape": _ref("vector"),
+    "joints": {"type": "array", "items": _ref("name"), "minItems": 2, "maxItems": 2},
+    "two": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
+    "factors": {"type": "object", "additionalProperties": _ref("expression"), "minProperties": 1},
+    "wheels": {
+        "type": "object",
+        "properties": dict.fromkeys(WHEELS, _ref("expression")),
+        "additionalProperties": False,
+    },
     "forces": {
         "anyOf": [
             {"type": "array", "items": _ref("expression")},
@@ -152,6 +161,13 @@ def _force(type_name: str) -> Schema:
     return schema
 
 
+def _constraint(type_name: str) -> Schema:
+    schema = _typed(constraint_fields(type_name), type_name)
+    if type_name in ONE_OF_CONSTRAINT:
+        schema["oneOf"] = [{"required": [key]} for key in ONE_OF_CONSTRAINT[type_name]]
+    return schema
+
+
 def _section(entry: Schema, doc: str) -> Schema:
     return {
         "type": ["object", "null"],
@@ -187,6 +203,7 @@ def model_schema() -> dict[str, Any]:
         "bodies": _section(_body(), MODEL["bodies"].doc),
         "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
         "forces": _section({"oneOf": [_force(name) for name in FORCE]}, MODEL["forces"].doc),
+        "constraints": _section({"oneOf": [_constraint(name) for name in CONSTRAINT]}, MODEL["constraints"].doc),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
         "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},
         "simulation": {**_table(SIMULATION), "description": MODEL["simulation"].doc},

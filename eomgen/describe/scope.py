@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from ..errors import ExpressionError
 from ..frames import Marker
@@ -116,12 +116,16 @@ class Scope:
         level: int,
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
+        local: Mapping[str, Expr] | None = None,
     ) -> None:
         self.graph, self.names, self.path, self.level = graph, names, path, level
         self.marker, self.quantities = marker, quantities
+        self.local = local or {}
 
     def resolve(self, name: str) -> Expr:
         """The expression of a name."""
+        if name in self.local:
+            return self.local[name]
         quantity = quantity_of(name)
         if quantity is not None:
             try:

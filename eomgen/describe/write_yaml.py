@@ -79,10 +79,10 @@ def _is_default(key: str, value: Any) -> bool:
 def _value(value: Any, functions: Names) -> str:
     if value is None:
         return "null"
-    if isinstance(value, bool):
-        return "true" if value else "false"
     if isinstance(value, os.PathLike):
         return _text(os.fspath(value))
+    if isinstance(value, bool):
+        return "true" if value else "false"
     if not isinstance(value, numbers.Real | str | Mapping | list | tuple):
         listed = items(value)
         if listed is not None:

@@ -15,6 +15,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
+from .couplings import couple
 from .loops import Constraints, close_loop, differentiate_constraints, lagrangian_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
@@ -77,6 +78,8 @@ class Kinematics:
     loop_coordinates: LoopCoordinates
     forces: tuple[ForceTerms, ...]
     length_scale: Expr
+    coupled: tuple[str, ...] = ()  #: labels of the equations of constraint elements
+    hints: tuple[tuple[str, Expr], ...] = ()  #: where assembly looks for coordinates of contact points
 
     @property
     def graph(self) -> Graph:
@@ -144,12 +147,13 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_names += spec.coordinates
         loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
-    constraints = differentiate_constraints(graph, rows, aligned, state)
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
     second = jvp(list(rates), state.along) if layout.balls else a
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
+    coupled = couple(mechanism, motion)
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
@@ -170,6 +174,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         twists=twists,
         motion=motion,
         constraints=constraints,
+        coupled=tuple(row.label for row in coupled.rows),
+        hints=tuple(coupled.hints),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
         length_scale=_length_scale(mechanism),
@@ -251,6 +257,11 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
                 message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
                 remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
                 problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
+    for constraint in mechanism.constraints:
+        for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
+            message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
+            remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
     if problems:
         raise ModelError(problems)
 
@@ -291,4 +302,5 @@ def _length_scale(mechanism: Mechanism) -> Expr:
     total = graph.zero
     for square in squares:
         total = total + square
-    return graph.apply("max", graph.apply("sqrt", total / float(len(squares))), 1e-9)
+    size = graph.apply("sqrt", total / float(len(squares)))
+    return graph.apply("select", graph.apply("lt", size, 1e-9), 1.0, size)  # parameters may make all of them 0

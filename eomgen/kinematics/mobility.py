@@ -88,6 +88,7 @@ class ConstraintFunctions:
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
+        self._hints = self._compile([value for _, value in kinematics.hints])
         (length,) = self._compile([kinematics.length_scale])(self.neutral)
         self.length_scale = float(length)
         self.scales = Scales.of_kinds(kinematics.velocity_kinds, c.kinds, self.length_scale, space)
@@ -157,6 +158,9 @@ class ConstraintFunctions:
             free = np.ones(self.n)
             free[self.scales.velocities(held)] = 0.0
             start = close(System(self.position, self.scales, free, rough), start)[0]
+        for (name, _), value in zip(k.hints, self._hints(start), strict=True):
+            if name not in given and name not in guess:
+                start[k.names.index(name)] = value
         equations = self._equations(given)
         return assemble(
             self.position,
@@ -333,5 +337,7 @@ def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: 
     if r == 0:
         return tuple(range(n_dof))
     named = {c for spec in kinematics.mechanism.joints if spec.named for c in spec.coordinates}
+    if kinematics.hints and not named:  # the angle of a contact point is nobody's choice
+        named = set(names) - {name for name, _ in kinematics.hints}
     prefer = [*picked, *(j for j, name in enumerate(names) if name in named and j not in picked)]
     return tuple(int(j) for j in choose_independent(jacobians, r, prefer))

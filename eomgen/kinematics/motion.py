@@ -20,7 +20,7 @@ COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 
 
 class Motion:
-    """Implements :class:`eomgen.forces.View`, and resolves every derived symbol of a mechanism.
+    """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
 
     Parameters
     ----------
@@ -44,6 +44,13 @@ class Motion:
         self.coordinates = coordinates
         self.state = state
         self.turning = turning or {}
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        base = self.poses.common(start, end)
+        outer, inner = self.poses.marker(start, base), self.poses.marker(end, base)
+        back = vec.transpose(outer.rotation)
+        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
 
     def position(self, marker: Marker) -> Vec3:
         """Origin of the marker, ground axes (m)."""

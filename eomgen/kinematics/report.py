@@ -18,9 +18,9 @@ class MechanismReport:
     Attributes
     ----------
     gruebler_kutzbach : int or None
-        6 (bodies) - sum over joints of 6 - f; None for a bare Lagrangian.
+        6 (bodies) - sum over joints of 6 - f - equations of constraint elements; None for a bare Lagrangian.
     gruebler_kutzbach_planar : int or None
-        3 (bodies) - sum of 3 - f, where the mechanism moves in a plane.
+        The same with 3 - f, where the mechanism moves in a plane.
     constraints : int
         Rows that do not vanish identically, of ``constraints_declared``; ``nonholonomic`` of them at velocity level.
     degrees_of_freedom, configuration_freedoms : int
@@ -116,9 +116,10 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     spatial = planar = None
     if m.lagrangian is None:
         freedoms = [j.joint.allows for j in m.joints]
-        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms)
+        spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
         if _moves_in_a_plane(kinematics) and all(j.joint.role != "loop" for j in m.joints):
             planar = 3 * len(m.bodies) - sum(3 - f for f in freedoms)
+            planar -= sum(label in c.labels for label in kinematics.coupled)
     return MechanismReport(
         name=m.name,
         bodies=names[1:],

@@ -25,6 +25,8 @@ CONSERVATIVE = {
     "chain": {},
     "cart_pendulum": {},
     "spherical_pendulum": {},
+    "cam_follower": {},
+    "rolling_disc": {},
     "free_slider_crank": {"theta_dot": 30.0},
     "skewed_four_bar": {},
     "spatial_loop": {"theta_dot": 4.0},

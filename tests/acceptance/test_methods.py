@@ -156,7 +156,19 @@ def peaucellier_forces(mod: Any, bodies: judges.Bodies, q: np.ndarray, v: np.nda
     return -5.0 * np.arctan2(bodies.R[crank][1, 0], bodies.R[crank][0, 0]) * bodies.J_w[crank][2]
 
 
+def planetary_forces(mod: Any, bodies: judges.Bodies, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    sun = mod.body_names.index("sun")
+    return (0.3 - 0.001 * bodies.w[sun][2]) * bodies.J_w[sun][2]
+
+
+def cam_forces(mod: Any, bodies: judges.Bodies, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    lever = mod.body_names.index("lever")
+    return -4.0 * (np.arctan2(bodies.R[lever][1, 0], bodies.R[lever][0, 0]) + 0.5) * bodies.J_w[lever][2]
+
+
 FORCES = {
+    "planetary_gear": planetary_forces,
+    "cam_follower": cam_forces,
     "slider_crank": slider_crank_forces,
     "andrews_squeezer": squeezer_forces,
     "peaucellier": peaucellier_forces,

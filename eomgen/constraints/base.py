@@ -1,0 +1,65 @@
+"""Constraint elements: each a frozen class holding graph expressions and markers, asked for conditions that must hold.
+
+An element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.  Coordinates are
+held as symbols under their own names; the kinematics stage replaces those of cut joints.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Protocol
+
+from ..frames import Frame, Marker
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+
+POSITION, VELOCITY = "position", "velocity"
+
+
+class View(Protocol):
+    """Motion of markers, as expressions; in ground axes unless said."""
+
+    graph: Graph
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of ``end`` in the axes of ``start``."""
+        ...
+
+    def position(self, marker: Marker) -> Vec3: ...
+    def velocity(self, marker: Marker) -> Vec3: ...
+    def rotation(self, marker: Marker) -> Mat3: ...
+    def angular_velocity(self, marker: Marker) -> Vec3: ...
+
+
+class Condition(NamedTuple):
+    """One equation ``expression = 0``.
+
+    ``kind`` is 'length' (m, or m/s) or 'angle' (rad, a ratio, or rad/s).  ``level`` is 'position' for an equation of
+    coordinates, or 'velocity' for one that is linear in velocities and cannot be integrated (nonholonomic).
+    """
+
+    label: str
+    expression: Expr
+    kind: str
+    level: str = POSITION
+
+
+@dataclass(frozen=True)
+class Constraint(ABC):
+    """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions."""
+
+    type_name: ClassVar[str]
+    name: str
+
+    @abstractmethod
+    def conditions(self, view: View) -> list[Condition]:
+        """The equations this element adds."""
+
+    def aligned(self, view: View) -> list[Expr]:
+        """Expressions that must be positive: the equations alone also admit contact from the wrong side."""
+        return []
+
+    def hints(self, view: View) -> list[tuple[Expr, Expr]]:
+        """Where assembly may look for a coordinate of the element's own: (its symbol, a value near by)."""
+        return []

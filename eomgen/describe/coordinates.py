@@ -1,0 +1,45 @@
+"""Stage describe, coordinates: what a user named, a joint or a coordinate -> the coordinate, its kind, its joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from .build_joints import Declared
+from .names import nearest
+from .reading import Reader
+from .sympy_face import name_of
+
+
+class Found(NamedTuple):
+    """A coordinate: its name, 'angle' or 'length', and the joint it belongs to (None: a bare Lagrangian's own)."""
+
+    name: str
+    kind: str
+    joint: str | None
+
+
+def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value: Any) -> Found | None:
+    """The coordinate meant by the name of a joint of one degree, or by its own; None, and a fault, if there is none."""
+    faults, given = reader.faults, name_of(value)
+    own = next((j for j in joints if j.entry.name == given), None)
+    home = next((j for j in joints if given in j.coordinates), None)
+    if own is not None and home is not None and own is not home:
+        faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", "rename one of them")
+        return None
+    if home is not None:
+        return Found(str(given), home.joint.coordinates[home.coordinates.index(given)].kind, home.entry.name)
+    if own is not None:
+        if len(own.coordinates) == 1:
+            return Found(own.coordinates[0], own.joint.coordinates[0].kind, own.entry.name)
+        names = ", ".join(own.coordinates) or "none"
+        faults.add(path, f"joint {given!r} has {len(own.coordinates)} coordinates", f"name one of them: {names}")
+        return None
+    if isinstance(given, str) and reader.names.kinds.get(given) == "coordinate":
+        return Found(given, "angle", None)
+    if faults.under(f"joints.{given}"):
+        return None  # the joint itself is at fault, which is told already
+    known = [j.entry.name for j in joints]
+    known += [c for c in reader.names.of("coordinate") if c not in known]
+    faults.add(path, f"no joint {given!r}", nearest(str(given), known, "joints and coordinates"))
+    return None
