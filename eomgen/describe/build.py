@@ -59,7 +59,7 @@ def build(description: Description) -> Mechanism:
 
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
-    forces = build_forces(reader, sections["forces"], specs)
+    forces = build_forces(reader, sections["forces"], specs, bodies, parameters)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])

@@ -62,9 +62,9 @@ class Reader:
             self.faults.add(path, f"{shown if len(shown) < 80 else shown[:77] + '...'} is not {KINDS[kind]}")
 
     # -- scalars --------------------------------------------------------------------------------------------------
-    def expression(self, path: str, value: Any, level: int = CONSTANT) -> Expr:
-        """A scalar: a number, a text or a SymPy expression."""
-        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities)
+    def expression(self, path: str, value: Any, level: int = CONSTANT, local: Mapping[str, Expr] | None = None) -> Expr:
+        """A scalar: a number, a text or a SymPy expression; ``local`` are names that only this one knows."""
+        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local)
         try:
             if isinstance(value, str):
                 return parse(value, self.graph, scope.resolve, scope.locate if level >= OUTPUT else None)

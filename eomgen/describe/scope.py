@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from ..errors import ExpressionError
 from ..frames import Marker
@@ -103,12 +103,20 @@ class Scope:
         level: int,
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
+        local: Mapping[str, Expr] | None = None,
     ) -> None:
         self.graph, self.names, self.path, self.level = graph, names, path, level
         self.marker, self.quantities = marker, quantities
+        self.local = local or {}
 
     def resolve(self, name: str) -> Expr:
         """The expression of a name."""
+        if name in self.local:
+            kind = self.names.kinds.get(name)
+            if kind is not None:
+                message = f"{name!r} is the {kind} at {self.names.places.get(name, '?')} and the element's own too"
+                self.names.faults.add(self.path, message, f"rename the {kind}")
+            return self.local[name]
         quantity = quantity_of(name)
         if quantity is not None:
             try:
@@ -122,7 +130,7 @@ class Scope:
         elif kind is None and name in ENERGIES and self.level >= OUTPUT:
             return self.graph.symbol(f"{name}()")
         elif kind is None:
-            known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
+            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level)]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
         elif LEVELS[kind] > self.level:
