@@ -126,6 +126,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_bodies=len(terms.poses) // 16,
         n_k=terms.n_k,
         n_a=len(terms.alignment),
+        n_e=len(terms.finite_forces),
     )
 
 

@@ -13,6 +13,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
+from .soundness import flag_forces
 from .terms import SystemTerms
 
 
@@ -51,6 +52,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         n_dof=mobility.n_dof,
         preferred=tuple(names.index(n) for n in mobility.independent),
         parent=kinematics.parent,
+        finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
     )
 
 
@@ -116,6 +118,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),
+        "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
         "units": units,

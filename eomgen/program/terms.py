@@ -50,6 +50,7 @@ class SystemTerms:
     n_dof: int  #: degrees of freedom; n - n_dof is the rank of C_q
     preferred: tuple[int, ...]  #: n_dof indices into v: independent coordinates, in the order of q_i
     parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
+    finite_forces: Row = ()  #: (n_e,) of (q, v): 1 where a force element's loads are finite, else 0
 
     @property
     def n_v(self) -> int:
