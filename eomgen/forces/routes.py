@@ -124,7 +124,8 @@ def _wrap(view: View, start: Marker, end: Marker, around: Cylinder) -> Piece:
     last: Vec3 = (r * q[0], r * q[1], b[2] - h * t_b / across)
     torque = vec.sub(vec.cross(first, leaving), vec.cross(last, arriving))
 
-    touching = view.graph.apply("lt", 0.0, w)
+    # written so that an end inside the cylinder counts as touching, which fails, and not as free
+    touching = view.graph.apply("not", view.graph.apply("le", w, 0.0))
     straight = _straight(view, start, end)
 
     def chosen(wrapped: Vec3, free: Vec3) -> Vec3:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
+import judges
 import models
 import numpy as np
 import pytest
@@ -260,3 +262,67 @@ def test_a_nonlinear_pendulum_drive_on_an_angle() -> None:
         results.append(mod.rhs(0.0, np.array([1.2, -2.0]))[1])
         assert mod.energy(np.array([1.2, -2.0]))[1] == pytest.approx(2.0 * 1.2**4 / 4)
     np.testing.assert_allclose(results, (-2 * 1.2**3 + 0.3 * 4.0) / 0.4, rtol=1e-13)
+
+
+def bearing_everything() -> eg.Model:
+    """The slider-crank with one element of every kind, on tree and cut joints alike."""
+    m = models.build("slider_crank")
+    slider, crank, rod = "slider", "crank", "rod.tip"
+    drum = {"around": m.ground.at(0.2, -0.3, 0), "radius": 0.05, "sense": "positive"}
+    m.element("oil", m.ground.at(0.6, 0.1, 0), slider, law="-3*rate*abs(rate) + tau/length", via=[drum])
+    m.element("stiff", "s", potential="50*length**4", law="-rate**3")
+    m.torsional_element("drive", "theta", law="-0.01*rate*abs(rate)", potential="0.1*cos(angle)")
+    m.bushing(
+        "mount", m.ground.at(0.3, 0, 0), slider, stiffness=[20, 30, 40, 1, 2, 3], damping=[1, 1, 1, 0.1, 0.1, 0.1]
+    )
+    m.point_gravity("moon", m.ground.at(0.1, 0.8, 0.2), "rod", mu=2.0, extent="maccullagh")
+    m.friction("rub", "s", viscous=0.2, coulomb=1.5, static=2.0, stribeck=0.3, smoothing=0.1)
+    m.friction("pin", "B", coulomb=0.05, smoothing=0.5)
+    m.stop("ends", "s", lower=0.3, upper=0.42, stiffness=4e3, dissipation=0.8)
+    floor = m.ground.at(0, -0.05, 0, rpy=(-np.pi / 2, 0, 0))
+    rubbing = {"stiffness": 3e3, "dissipation": 0.5, "friction": 0.3, "smoothing": 0.1}
+    m.sphere_plane("floor", floor, rod, radius=0.08, **rubbing)
+    m.point_plane("edge", floor, rod, **rubbing)
+    m.sphere_sphere("bump", crank, rod, radii=(0.2, 0.15), **rubbing)
+    m.muscle(
+        "pull",
+        m.ground.at(-0.1, 0.3, 0),
+        rod,
+        activation="0.5*exp(-t)",
+        force_max=30,
+        fiber_length=0.2,
+        slack_length=0.3,
+    )
+    return m
+
+
+def test_all_elements_on_a_closed_loop() -> None:
+    """Methods and energies agree, and the Jacobian is that of the right-hand side, loop included."""
+    m = bearing_everything()
+    modules = [m.compile(method=method, target="numpy") for method in ("embedding", "lagrange")]
+    for theta in np.linspace(0.1, 6.2, 7):
+        x = modules[0].x0(theta=theta, theta_dot=3.0)
+        a, b = (mod.rhs(0.2, x) for mod in modules)
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
+        np.testing.assert_allclose(modules[0].energy(x), modules[1].energy(x), rtol=1e-12)
+        for mod in modules:
+            slopes = np.stack([judges.first(partial(mod.rhs, 0.2), x, d, h=2e-5) for d in np.eye(mod.n_x)], axis=1)
+            assert np.abs(mod.jacobian(0.2, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()
+
+
+def test_elements_with_a_potential_keep_the_energy() -> None:
+    """A run through stops, contacts, bushing, laws and gravity of a point, all without losses."""
+    m = models.build("slider_crank")
+    drum = {"around": m.ground.at(0.2, -0.3, 0), "radius": 0.05, "sense": "positive"}
+    m.element("hard", m.ground.at(0.6, 0.1, 0), "slider", potential="20*(length - 0.4)**4", via=[drum])
+    m.bushing("mount", m.ground.at(0.3, 0, 0), "slider", stiffness=[20, 30, 40, 1, 2, 3])
+    m.point_gravity("moon", m.ground.at(0.1, 0.8, 0.2), "rod", mu=2.0, extent="maccullagh")
+    m.stop("ends", "s", lower=0.28, upper=0.42, stiffness=4e3, exponent=2.5)
+    m.sphere_sphere("bump", m.ground.at(0, 0.2, 0), "rod.tip", radii=(0.15, 0.18), stiffness=2e3, exponent=2.5)
+    mod = m.compile(target="numpy")
+    traj = mod.simulate((0, 2), initial={"theta": 0.3, "theta_dot": 8.0}, rtol=1e-11, atol=1e-13)
+    T, V = mod.energy(traj.x)
+    assert np.ptp(traj["s"]) > 0.12
+    assert (traj["s"] < 0.28).any()
+    assert (traj["s"] > 0.42).any()
+    assert np.abs(T + V - T[0] - V[0]).max() < 1e-8 * T.max()

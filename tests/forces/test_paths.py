@@ -14,7 +14,7 @@ from force_bench import Seen, Wrench
 from scipy.optimize import minimize
 
 import eomgen as eg
-from eomgen.errors import ModelError
+from eomgen.errors import ModelError, NonFiniteError
 
 
 def test_a_spring_over_a_via_point_of_a_third_place(tmp_path: Path) -> None:
@@ -165,6 +165,17 @@ def test_the_length_has_no_kink_where_the_string_lifts_off() -> None:
     force = [float(mod.rhs(0.0, np.array([s, 0.0]))[1]) for s in (-1e-6, 0.0, 1e-6)]
     assert np.ptp(force) < 2e-6
     assert abs(force[1]) < 1e-12
+
+
+def test_an_end_inside_the_cylinder_is_an_error_that_names_the_element() -> None:
+    m = eg.Model("inside")
+    body = m.body("b", mass=1)
+    m.prismatic("s", m.ground, body, axis="x")
+    m.spring("cord", m.ground.at(-1, 0, 0), body, stiffness=1, via=[{"around": m.ground, "radius": 0.3}])
+    mod = m.compile(target="numpy")
+    assert np.isfinite(mod.rhs(0.0, np.array([0.4, 0.0]))).all()
+    with pytest.raises(NonFiniteError, match="the loads of cord are not"):
+        mod.rhs(0.0, np.array([0.2, 0.0]))
 
 
 def test_atwoods_machine() -> None:
