@@ -129,3 +129,29 @@ def test_the_curves_of_the_muscle() -> None:
         np.testing.assert_allclose(
             evaluate([ours(x)], {"x": points})[0], sympy.lambdify(y, curve, "numpy")(points), rtol=1e-12, atol=1e-14
         )
+
+
+def test_an_angle_between_axes_that_do_not_stay_in_line_is_refused() -> None:
+    m = eg.Model("skew")
+    b = m.body("b", mass=1, inertia=(1, 1, 1))
+    m.spherical("ball", m.ground, b)
+    m.torsional_element("motor", m.ground, b, law="-rate")
+    with pytest.raises(ModelError, match=r"forces.motor: the z axes of its two markers do not stay in line"):
+        m.compile(target="numpy")
+
+
+def test_friction_without_a_law_in_a_file(tmp_path: Path) -> None:
+    text = """\
+name: dry
+bodies: {b: {mass: 1}}
+joints: {s: {type: prismatic, between: [ground, b]}}
+forces:
+  rub: {type: friction, joint: s}
+  oil: {type: element, joint: s, law: -rate, potential: rate**2}
+"""
+    (tmp_path / "m.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError) as error:
+        eg.load(tmp_path / "m.yaml").mechanism()
+    told = [str(p) for p in error.value.problems]
+    assert any("m.yaml:5: forces.rub: has no law" in line for line in told)
+    assert any("m.yaml:6: forces.oil.potential: unknown name 'rate'" in line for line in told)
