@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..forces import MarkerLoad
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -74,18 +73,18 @@ def _generalized_forces(kinematics: Kinematics) -> list[Expr]:
     direct = [graph.zero] * n
     loop = kinematics.loop_coordinates
     for terms in kinematics.forces:
-        for load in terms.remainder:
-            if isinstance(load, MarkerLoad):
-                velocities += kinematics.motion.velocity(load.marker)
-                weights += load.force
-                velocities += kinematics.motion.angular_velocity(load.marker)
-                weights += load.torque
-            elif load.coordinate in kinematics.names:
-                j = kinematics.names.index(load.coordinate)
-                direct[j] = direct[j] + load.value
+        for load in terms.marker_remainder:
+            velocities += kinematics.motion.velocity(load.marker)
+            weights += load.force
+            velocities += kinematics.motion.angular_velocity(load.marker)
+            weights += load.torque
+        for along in terms.coordinate_remainder:
+            if along.coordinate in kinematics.names:
+                j = kinematics.names.index(along.coordinate)
+                direct[j] = direct[j] + along.value
             else:
-                velocities.append(loop.rates[loop.names.index(load.coordinate)])
-                weights.append(load.value)
+                velocities.append(loop.rates[loop.names.index(along.coordinate)])
+                weights.append(along.value)
     powers = _weighted(velocities, weights, list(kinematics.v))
     return [a + b + c for a, b, c in zip(direct, powers, _bare_forces(kinematics), strict=True)]
 

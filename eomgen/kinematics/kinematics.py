@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, is_dataclass
 
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
-from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Turn
+from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -35,14 +35,15 @@ class LoopCoordinates:
 class ForceTerms:
     """One force element resolved: its loads, and its potential if it has one.
 
-    ``remainder`` holds those of its loads that the potential does not account for; all loads where there is none.
+    The last two hold those of its loads that the potential does not account for; all loads where there is none.
     """
 
     force: Force
     marker_loads: tuple[MarkerLoad, ...]
     coordinate_loads: tuple[CoordinateLoad, ...]
     potential: Expr | None
-    remainder: tuple[MarkerLoad | CoordinateLoad, ...]
+    marker_remainder: tuple[MarkerLoad, ...]
+    coordinate_remainder: tuple[CoordinateLoad, ...]
 
 
 @dataclass(frozen=True)
@@ -207,12 +208,13 @@ def _resolve_force(force: Force, motion: Motion, mechanism: Mechanism) -> ForceT
         allowed = {p.name for p in mechanism.parameters} | {n for n, _ in _coordinate_symbols(motion)}
         if not symbols_of([potential]) <= allowed:
             potential = None
-    return ForceTerms(
-        force,
+    return ForceTerms(force, *_sorted(loads), potential, *_sorted(loads if potential is None else rest))
+
+
+def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[CoordinateLoad, ...]]:
+    return (
         tuple(load for load in loads if isinstance(load, MarkerLoad)),
         tuple(load for load in loads if isinstance(load, CoordinateLoad)),
-        potential,
-        tuple(loads if potential is None else rest),
     )
 
 
@@ -257,7 +259,7 @@ def _coordinate_symbols(motion: Motion) -> list[tuple[str, Expr]]:
     return [(name, triple[0]) for name, triple in motion.coordinates.items()]
 
 
-def _with_entries(load: MarkerLoad | CoordinateLoad, values: Iterator[Expr]) -> MarkerLoad | CoordinateLoad:
+def _with_entries(load: Load, values: Iterator[Expr]) -> Load:
     """A load with its entries replaced by the next values."""
     if isinstance(load, CoordinateLoad):
         return CoordinateLoad(load.coordinate, next(values))

@@ -326,3 +326,21 @@ def test_elements_with_a_potential_keep_the_energy() -> None:
     assert (traj["s"] < 0.28).any()
     assert (traj["s"] > 0.42).any()
     assert np.abs(T + V - T[0] - V[0]).max() < 1e-8 * T.max()
+
+
+def test_the_energy_balance_of_a_run_counts_what_a_bushing_and_a_stop_lose() -> None:
+    from eomgen.cli.energy import balance_energy
+
+    m = eg.Model("losses", gravity=(0, 0, -9.81))
+    body = m.body("b", mass=1.0)
+    m.prismatic("z", m.ground, body, axis="z")
+    m.bushing("mount", m.ground, body, stiffness=[1, 1, 50, 1, 1, 1], damping=[0, 0, 0.8, 0, 0, 0])
+    m.stop("ends", "z", lower=-0.2, upper=0.3, stiffness=1e3, exponent=2, dissipation=0.4)
+    m.friction("rub", "z", coulomb=0.5, smoothing=0.2)
+    equations = m.derive()
+    run = equations.compile(target="numpy").simulate((0, 1), initial={"z_dot": 3.0}, dense_output=True, **TIGHT)
+    found = balance_energy(equations, run, {})
+    assert found.work is not None
+    assert found.work < -1
+    assert found.power_balance is not None
+    assert found.power_balance < 1e-8
