@@ -82,14 +82,12 @@ def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, f
 
 
 def _power(kinematics: Kinematics) -> Expr:
-    """Power (W) of every force element without a potential: wrench . twist at its markers, in ground axes."""
+    """Power (W) of all that has no potential in force elements: wrench . twist at their markers, in ground axes."""
     motion, power = kinematics.motion, kinematics.graph.zero
     for terms in kinematics.forces:
-        if terms.potential is not None:
-            continue
-        for load in terms.marker_loads:
+        for load in terms.marker_remainder:
             power = power + vec.dot(load.force, motion.velocity(load.marker))
             power = power + vec.dot(load.torque, motion.angular_velocity(load.marker))
-        for along in terms.coordinate_loads:
+        for along in terms.coordinate_remainder:
             power = power + along.value * motion.coordinate(along.coordinate)[1]
     return kinematics.resolve([power])[0]

@@ -9,8 +9,8 @@ from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
-from .build_contacts import declare_contacts
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -66,7 +66,7 @@ def build(description: Description) -> Mechanism:
 
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
-    forces = build_forces(reader, sections["forces"], specs)
+    forces = build_forces(reader, sections["forces"], specs, bodies, parameters)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)

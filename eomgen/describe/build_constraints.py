@@ -7,8 +7,8 @@ from typing import Any
 
 from ..constraints import Constraint, KnifeEdge, RollingDisc, RollingSphere
 from ..frames import Marker
+from .build_cam_points import Contacts
 from .build_cams import cam, cam_contact
-from .build_contacts import Contacts
 from .build_couplings import belt, coupling, gear, planetary, rack
 from .build_joints import Declared
 from .checks import check_keys, check_names

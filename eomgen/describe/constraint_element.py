@@ -8,7 +8,7 @@ from typing import Any
 
 from ..frames import Marker
 from ..graph.core import Expr
-from .build_contacts import Contacts
+from .build_cam_points import Contacts
 from .build_joints import Declared
 from .coordinates import Found, find_coordinate
 from .description import Entry, items

@@ -6,36 +6,20 @@ This one table drives the check of Python calls, the keys of model files and the
 from __future__ import annotations
 
 from itertools import product
-from typing import Any, NamedTuple
 
 from ..joints import JOINTS
 from ..solids import SOLIDS
+from .field import CONSTANT as CONSTANT
+from .field import MOTION as MOTION
+from .field import NUMBER as NUMBER
+from .field import OUTPUT as OUTPUT
+from .field import Field as Field
+from .field import Fields as Fields
+from .force_fields import FORCE as FORCE
+from .force_fields import ONE_OF as ONE_OF
+from .force_fields import force_fields as force_fields
 from .mechanism import Simulation
 from .splines import KINDS as TABLES
-
-# What the expressions of a field may depend on; each level includes those before it.
-NUMBER = -1  #: numbers, pi
-CONSTANT = 0  #: parameters
-MOTION = 1  #: t, inputs, coordinates and their velocities
-OUTPUT = 2  #: accelerations, and the motion of markers
-
-
-class Field(NamedTuple):
-    """What one key holds.
-
-    ``kind`` is one of :data:`KINDS`; ``level`` says what its expressions may depend on; ``choices`` lists the words of
-    a choice.
-    """
-
-    kind: str
-    doc: str
-    required: bool = False
-    default: Any = None
-    level: int = CONSTANT
-    choices: tuple[str, ...] = ()
-
-
-Fields = dict[str, Field]
 
 #: kind -> how a message describes it
 KINDS = {
@@ -71,6 +55,9 @@ KINDS = {
     "count": "a whole number greater than 0",
     "functions": "a list of names of C functions, null for one that is not there",
     "shape": "three expressions [x, y, z] of the joint's own first coordinates and of parameters",
+    "via": "a list of markers and cylinders {around, radius, sense}",
+    "matrix6": "six numbers or expressions for the diagonal, or 6 x 6 of them",
+    "radii": "two numbers or expressions",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -117,6 +104,11 @@ FUNCTION: dict[str, Fields] = {
 MARKER: Fields = {
     "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
     "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0)),
+}
+CYLINDER: Fields = {
+    "around": Field("marker", "its z axis is the axis of the cylinder", required=True),
+    "radius": Field("expression", "radius (m)", required=True),
+    "sense": Field("choice", "turn of the path about the axis", default="positive", choices=("positive", "negative")),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
 BODY: Fields = {
@@ -179,55 +171,6 @@ JOINT_OPTIONS: Fields = {
     ),
 }
 
-_ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")
-_BETWEEN = Field("pair", "two markers")
-_AXES = Field("choice", "axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
-_STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True)
-_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION)
-
-FORCE: dict[str, Fields] = {
-    "force": {
-        "marker": Field("marker", "where it acts", required=True),
-        "value": Field("vector", "force (N)", required=True, level=MOTION),
-        "axes": _AXES,
-    },
-    "torque": {
-        "joint": _ON_JOINT,
-        "body": Field("marker", "a body"),
-        "value": Field("value", "torque (N m): one on a joint, three on a body", required=True, level=MOTION),
-        "axes": _AXES,
-    },
-    "spring": {
-        "between": _BETWEEN._replace(required=True),
-        "stiffness": _STIFFNESS,
-        "length": Field("expression", "length without force (m)", default=0),
-    },
-    "damper": {"between": _BETWEEN._replace(required=True), "damping": _DAMPING},
-    "torsional_spring": {
-        "joint": _ON_JOINT,
-        "between": _BETWEEN,
-        "stiffness": _STIFFNESS,
-        "angle": Field("expression", "angle without torque (rad)", default=0),
-    },
-    "torsional_damper": {"joint": _ON_JOINT, "between": _BETWEEN, "damping": _DAMPING},
-    "friction": {
-        "joint": _ON_JOINT._replace(required=True),
-        "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", required=True, level=MOTION),
-    },
-    "actuator": {
-        "joint": _ON_JOINT,
-        "between": _BETWEEN,
-        "value": Field("expression", "force that pushes apart or drives (N or N m)", required=True, level=MOTION),
-    },
-}
-#: Types of force of which exactly one of these keys says what they act on.
-ONE_OF: dict[str, tuple[str, str]] = {
-    "torque": ("joint", "body"),
-    "torsional_spring": ("joint", "between"),
-    "torsional_damper": ("joint", "between"),
-    "actuator": ("joint", "between"),
-}
-
 LAGRANGIAN: Fields = {
     "coordinates": Field("names", "generalized coordinates, in order", required=True),
     "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
@@ -280,11 +223,6 @@ def joint_fields(type_name: str) -> Fields:
     for option in joint.options:
         fields[option] = JOINT_OPTIONS.get(option, Field("text", option))
     return fields
-
-
-def force_fields(type_name: str) -> Fields:
-    """The keys of one type of force, ``type`` among them."""
-    return {"type": Field("choice", "type of the force", required=True, choices=tuple(FORCE)), **FORCE[type_name]}
 
 
 def solid_fields(type_name: str) -> Fields:

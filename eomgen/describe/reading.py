@@ -62,9 +62,19 @@ class Reader:
             self.faults.add(path, f"{shown if len(shown) < 80 else shown[:77] + '...'} is not {KINDS[kind]}")
 
     # -- scalars --------------------------------------------------------------------------------------------------
-    def expression(self, path: str, value: Any, level: int = CONSTANT, local: Mapping[str, Expr] | None = None) -> Expr:
-        """A scalar: a number, a text or a SymPy expression; names in ``local`` come before those of the model."""
-        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local)
+    def expression(
+        self,
+        path: str,
+        value: Any,
+        level: int = CONSTANT,
+        local: Mapping[str, Expr] | None = None,
+        exclusive: bool = False,
+    ) -> Expr:
+        """A scalar: a number, a text or a SymPy expression.
+
+        Names in ``local`` come before those of the model; with ``exclusive`` a name must not be both.
+        """
+        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local, exclusive)
         try:
             if isinstance(value, str):
                 return parse(value, self.graph, scope.resolve, scope.locate if level >= OUTPUT else None)

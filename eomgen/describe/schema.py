@@ -8,6 +8,7 @@ from ..joints import JOINTS
 from .fields import (
     AXES,
     BODY,
+    CYLINDER,
     FORCE,
     FUNCTION,
     INERTIA,
@@ -38,6 +39,7 @@ Schema = dict[str, Any]
 _NAME: Schema = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": LONGEST}
 _EXPRESSION: Schema = {"type": ["number", "string"]}
 _VECTOR: Schema = {"type": "array", "items": {"$ref": "#/$defs/expression"}, "minItems": 3, "maxItems": 3}
+_SIX: Schema = {"type": "array", "minItems": 6, "maxItems": 6}
 _MARKER_NAME: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"}
 
 
@@ -61,6 +63,7 @@ def _definitions() -> Schema:
         "placement": {"anyOf": [_ref("vector"), _table(MARKER)]},
         "markers": {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("placement")},
         "marker": {"anyOf": [_MARKER_NAME, _table(PLACED)]},
+        "stop": {"anyOf": [_ref("marker"), _table(CYLINDER)]},
         "pair": {"type": "array", "items": _ref("marker"), "minItems": 2, "maxItems": 2},
         "axis": {
             "anyOf": [
@@ -109,6 +112,14 @@ _KINDS: dict[str, Schema] = {
         "properties": dict.fromkeys(WHEELS, _ref("expression")),
         "additionalProperties": False,
     },
+    "via": {"type": "array", "items": _ref("stop")},
+    "matrix6": {
+        "anyOf": [
+            {**_SIX, "items": _ref("expression")},
+            {**_SIX, "items": {**_SIX, "items": _ref("expression")}},
+        ]
+    },
+    "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {
         "anyOf": [
             {"type": "array", "items": _ref("expression")},

@@ -117,14 +117,19 @@ class Scope:
         marker: Callable[[str], Marker],
         quantities: dict[str, Quantity],
         local: Mapping[str, Expr] | None = None,
+        exclusive: bool = False,
     ) -> None:
         self.graph, self.names, self.path, self.level = graph, names, path, level
         self.marker, self.quantities = marker, quantities
-        self.local = local or {}
+        self.local, self.exclusive = local or {}, exclusive
 
     def resolve(self, name: str) -> Expr:
         """The expression of a name."""
         if name in self.local:
+            kind = self.names.kinds.get(name) if self.exclusive else None
+            if kind is not None:
+                message = f"{name!r} is the {kind} at {self.names.places.get(name, '?')} and the element's own too"
+                self.names.faults.add(self.path, message, f"rename the {kind}")
             return self.local[name]
         quantity = quantity_of(name)
         if quantity is not None:
@@ -142,7 +147,7 @@ class Scope:
             self.quantities[f"{name}()"] = Quantity(None, *TOTALS[name])
             return self.graph.symbol(f"{name}()")
         elif kind is None:
-            known = [n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level]
+            known = [*self.local, *(n for n, k in self.names.kinds.items() if LEVELS[k] <= self.level)]
             remedy = f"{nearest(name, known, 'known here')}; or declare a parameter of that name"
             self.names.faults.add(self.path, f"unknown name {name!r}", remedy)
         elif LEVELS[kind] > self.level:

@@ -80,14 +80,12 @@ def _generalized_forces(kinematics: Kinematics) -> list[Expr]:
     direct = [graph.zero] * n
     loop = kinematics.loop_coordinates
     for terms in kinematics.forces:
-        if terms.potential is not None:
-            continue
-        for load in terms.marker_loads:
+        for load in terms.marker_remainder:
             velocities += kinematics.motion.velocity(load.marker)
             weights += load.force
             velocities += kinematics.motion.angular_velocity(load.marker)
             weights += load.torque
-        for along in terms.coordinate_loads:
+        for along in terms.coordinate_remainder:
             if along.coordinate in kinematics.names:
                 j = kinematics.freedoms.index(along.coordinate)
                 direct[j] = direct[j] + along.value

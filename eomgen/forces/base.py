@@ -55,6 +55,7 @@ class Force(ABC):
     """A force element.  ``name`` is the user's; a subclass adds its markers and laws."""
 
     type_name: ClassVar[str]
+    uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
     name: str
 
     @abstractmethod
@@ -62,5 +63,9 @@ class Force(ABC):
         """Everything this element exerts, its conservative part included."""
 
     def potential(self, view: View) -> Expr | None:
-        """Potential energy (J) if the element is conservative as a whole, else None."""
+        """Potential energy (J) of the element's conservative part, None if it has none."""
         return None
+
+    def remainder(self, view: View) -> list[Load]:
+        """What the loads are beyond the slope of the potential, where there is one: friction, damping."""
+        return []

@@ -21,6 +21,7 @@ class Spring(Force):
     """
 
     type_name: ClassVar[str] = "spring"
+    uses_value: ClassVar[bool] = True
     path: Path
     stiffness: Expr
     rest: Expr

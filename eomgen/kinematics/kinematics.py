@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
-from ..forces import CoordinateLoad, Force, JointCoordinate, MarkerLoad, Spring, Turn
+from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -40,12 +40,17 @@ class LoopCoordinates:
 
 @dataclass(frozen=True)
 class ForceTerms:
-    """One force element resolved: its loads, and its potential if it is conservative."""
+    """One force element resolved: its loads, and its potential if it has one.
+
+    The last two hold those of its loads that the potential does not account for; all loads where there is none.
+    """
 
     force: Force
     marker_loads: tuple[MarkerLoad, ...]
     coordinate_loads: tuple[CoordinateLoad, ...]
     potential: Expr | None
+    marker_remainder: tuple[MarkerLoad, ...]
+    coordinate_remainder: tuple[CoordinateLoad, ...]
 
 
 @dataclass(frozen=True)
@@ -216,23 +221,24 @@ def _resolve_force(force: Force, motion: Motion, mechanism: Mechanism) -> ForceT
     """Evaluate a force element and write its loads in terms of the tree's own symbols."""
     loads = force.loads(motion)
     potential = force.potential(motion)
-    flat = [e for load in loads for e in _entries(load)]
+    rest = force.remainder(motion) if potential is not None else []
+    flat = [e for load in [*loads, *rest] for e in _entries(load)]
     mapping = motion.derived_symbols(mechanism, symbols_of([*flat, *([potential] if potential is not None else [])]))
     values = iter(substitute(flat, mapping) if mapping else flat)
-    markers: list[MarkerLoad] = []
-    along: list[CoordinateLoad] = []
-    for load in loads:
-        if isinstance(load, MarkerLoad):
-            x = [next(values) for _ in range(6)]
-            markers.append(MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5])))
-        else:
-            along.append(CoordinateLoad(load.coordinate, next(values)))
+    loads, rest = ([_with_entries(load, values) for load in part] for part in (loads, rest))
     if potential is not None:
         potential = substitute([potential], mapping)[0] if mapping else potential
         allowed = {p.name for p in mechanism.parameters} | {n for n, _ in _coordinate_symbols(motion)}
         if not symbols_of([potential]) <= allowed:
             potential = None
-    return ForceTerms(force, tuple(markers), tuple(along), potential)
+    return ForceTerms(force, *_sorted(loads), potential, *_sorted(loads if potential is None else rest))
+
+
+def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[CoordinateLoad, ...]]:
+    return (
+        tuple(load for load in loads if isinstance(load, MarkerLoad)),
+        tuple(load for load in loads if isinstance(load, CoordinateLoad)),
+    )
 
 
 def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Sequence[str]) -> None:
@@ -250,7 +256,7 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
             message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
             remedy = "turn the markers (rpy) so that z is the axis of the joint between them, or give joint="
             problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
-        if isinstance(force, Spring) and isinstance(path, JointCoordinate):
+        if force.uses_value and isinstance(path, JointCoordinate):
             used.add(path.name)
         for name in wrapping:
             if name in used:
@@ -279,6 +285,14 @@ def _expressions(value: object) -> list[Expr]:
 
 def _coordinate_symbols(motion: Motion) -> list[tuple[str, Expr]]:
     return [(name, triple[0]) for name, triple in motion.coordinates.items()]
+
+
+def _with_entries(load: Load, values: Iterator[Expr]) -> Load:
+    """A load with its entries replaced by the next values."""
+    if isinstance(load, CoordinateLoad):
+        return CoordinateLoad(load.coordinate, next(values))
+    x = [next(values) for _ in range(6)]
+    return MarkerLoad(load.marker, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
 
 def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:

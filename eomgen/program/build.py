@@ -130,6 +130,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_k=terms.n_k,
         n_a=len(terms.alignment),
         n_com=3 if terms.centroidal else 0,
+        n_e=len(terms.finite_forces),
     )
 
 

@@ -14,6 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
+from .soundness import flag_forces
 from .terms import SystemTerms
 
 
@@ -55,6 +56,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         centroidal=tuple(_centroidal(kinematics)),
         balls=kinematics.balls,
         rates=kinematics.rates if kinematics.balls else (),
+        finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
     )
 
 
@@ -146,6 +148,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),
+        "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "p_values": [p.value for p in m.parameters],
         "u_values": [u.value for u in m.inputs],
         "units": units,

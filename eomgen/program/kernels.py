@@ -23,6 +23,7 @@ class Sizes:
     n_k: int
     n_a: int
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
+    n_e: int = 0
 
 
 @dataclass(frozen=True)
@@ -70,5 +71,6 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
+    Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

@@ -56,6 +56,7 @@ class SystemTerms:
 
     centroidal: Row = ()  #: (18 + 3n,) of (q, v), all bodies, ground axes; empty for a system without mass: centre of
     #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
+    finite_forces: Row = ()  #: (n_e,) of (q, v): 1 where a force element's loads are finite, else 0
 
     @property
     def n_v(self) -> int:

@@ -72,6 +72,10 @@ class Kernels:
     def _culprit(self, status: int, t: float, x: Array) -> str:
         """Names what a failure at a state is due to, as far as it can be told."""
         layout, q = self.layout, x[: self.layout.n_q]
+        if status == 1 and layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
+            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
+            bad = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
+            return f"the loads of {bad} are not (ends that meet, or a law outside its domain)" if bad else ""
         if status == 2:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():

@@ -43,6 +43,7 @@ class Layout:
         self.loop_accelerations = tuple(f"{name}_ddot" for name in self.loops)
         self.constraint_labels: tuple[str, ...] = tuple(data.get("constraint_labels", ()))
         self.alignment_labels: tuple[str, ...] = tuple(data.get("alignment_labels", ()))
+        self.fragile_forces: tuple[str, ...] = tuple(data.get("fragile_forces", ()))
         self.n_q, self.n_v, self.n_x = len(self.q), len(self.v), len(self.q) + len(self.v)
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)
@@ -55,6 +56,7 @@ class Layout:
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_com: int = data.get("n_com", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
+        self.n_e = len(self.fragile_forces)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
@@ -191,5 +193,6 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "loop_coordinates": ("motion", (3, "n_k")),
     "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
     "alignment": ("q", ("n_a",)),
+    "finite_forces": ("x", ("n_e",)),
     "scales": ("none", ("n_v+n_c",)),
 }

@@ -1,0 +1,57 @@
+"""Stage describe, contact points of cams: entries of cams -> coordinates, and the massless bodies that turn by them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..joints import JOINTS
+from .description import Entry
+from .mechanism import Body, JointSpec
+from .reading import Reader
+from .sympy_face import name_of
+
+
+@dataclass
+class Contacts:
+    """Contact points: the coordinate of each by the path of its entry, and the bodies and joints made for them."""
+
+    coordinates: dict[str, str] = field(default_factory=dict)
+    bodies: list[Body] = field(default_factory=list)
+    joints: list[JointSpec] = field(default_factory=list)
+
+    def place(self, reader: Reader, entry: Entry, cam: Marker, index: int) -> Marker | None:
+        """A marker at a cam's axis on a new body ``index`` without mass, whose x axis points to the contact point."""
+        graph, name = reader.graph, f"{entry.name}_contact"
+        if name in reader.bodies:
+            message = f"its contact point is a body {name!r}, which there is already"
+            reader.faults.add(entry.path, message, "rename one of them")
+            return None
+        o = vec.zero(graph)
+        point = Marker(index, Frame(reader.identity, o), name)
+        coordinate = self.coordinates[entry.path]
+        self.bodies.append(Body(name, graph.zero, o, (o, o, o)))
+        self.joints.append(JointSpec(name, JOINTS["revolute"](), cam, point, (coordinate,), False))
+        return point
+
+
+def needs_point(values: dict[str, Any]) -> bool:
+    """Whether a cam's contact is found by an angle of its own."""
+    return (
+        values.get("type") == "cam_contact" and "contour" in values and values.get("shape") in ("roller", "flat_face")
+    )
+
+
+def declare_contacts(reader: Reader, entries: list[Entry]) -> Contacts:
+    """Take the polar angles of all contact points into the namespace."""
+    contacts = Contacts()
+    for entry in entries:
+        if needs_point(entry.values) and isinstance(entry.name, str):
+            given = entry.values.get("coordinate")
+            name = f"{entry.name}_contact" if given is None else name_of(given)
+            path = entry.path if given is None else f"{entry.path}.coordinate"
+            reader.names.declare("coordinate", name, path)
+            contacts.coordinates[entry.path] = str(name)
+    return contacts

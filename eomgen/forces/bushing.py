@@ -1,0 +1,98 @@
+"""Force elements, bushing: six relative displacements of two markers times full matrices of stiffness and damping."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..frames import Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from .base import Force, Load, MarkerLoad, View
+
+Row6 = tuple[Expr, Expr, Expr, Expr, Expr, Expr]
+Mat6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
+
+
+@dataclass(frozen=True)
+class Bushing(Force):
+    """Forces -K y - C y' of the displacements y = [d; theta] of marker ``second`` from marker ``first``.
+
+    d (m) is the vector between their origins in the axes of the first; theta (rad) = 2 sin(phi / 2) n for the relative
+    rotation by phi about n: twice the vector part of its Euler parameters, the same in the axes of either marker, equal
+    to the small-rotation vector to second order, defined for phi < pi.  The force acts at the second marker's origin,
+    its opposite at the same point on the first body.  K is symmetric; V = y^T K y / 2.
+    """
+
+    type_name: ClassVar[str] = "bushing"
+    first: Marker
+    second: Marker
+    stiffness: Mat6
+    damping: Mat6
+
+    def loads(self, view: View) -> list[Load]:
+        y, rate = self._displacements(view), self._rates(view)
+        return self._pair(
+            view, [-(a + b) for a, b in zip(_times(self.stiffness, y), _times(self.damping, rate), strict=True)]
+        )
+
+    def potential(self, view: View) -> Expr | None:
+        y = self._displacements(view)
+        total = view.graph.zero
+        for a, b in zip(y, _times(self.stiffness, y), strict=True):
+            total = total + a * b
+        return 0.5 * total
+
+    def remainder(self, view: View) -> list[Load]:
+        if all(entry.is_zero for row in self.damping for entry in row):
+            return []
+        return self._pair(view, [-x for x in _times(self.damping, self._rates(view))])
+
+    def _reach(self, view: View) -> Vec3:
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        return vec.transpose_times(view.rotation(self.first), reach)
+
+    def _turn(self, view: View) -> tuple[Expr, Vec3]:
+        """Scalar and vector part of the Euler parameters of the relative rotation, the scalar part positive."""
+        R = vec.product(vec.transpose(view.rotation(self.first)), view.rotation(self.second))
+        e0 = 0.5 * sqrt(1.0 + R[0][0] + R[1][1] + R[2][2])
+        k = 4.0 * e0
+        return e0, ((R[2][1] - R[1][2]) / k, (R[0][2] - R[2][0]) / k, (R[1][0] - R[0][1]) / k)
+
+    def _displacements(self, view: View) -> list[Expr]:
+        _, e = self._turn(view)
+        return [*self._reach(view), *(2.0 * x for x in e)]
+
+    def _rates(self, view: View) -> list[Expr]:
+        """d' = R^T (v_2 - v_1) - w_1 x d and theta' = e0 w + w x e, w the relative angular velocity, in first axes."""
+        axes = view.rotation(self.first)
+        w1 = view.angular_velocity(self.first)
+        w = vec.transpose_times(axes, vec.sub(view.angular_velocity(self.second), w1))
+        drift = vec.cross(w1, vec.sub(view.position(self.second), view.position(self.first)))
+        relative = vec.sub(vec.sub(view.velocity(self.second), view.velocity(self.first)), drift)
+        e0, e = self._turn(view)
+        return [*vec.transpose_times(axes, relative), *vec.add(vec.scale(e0, w), vec.cross(w, e))]
+
+    def _pair(self, view: View, along: Sequence[Expr]) -> list[Load]:
+        """Wrenches whose power is that of the six forces on the six rates: torque e0 m + e x m of the moments m."""
+        force: Vec3 = (along[0], along[1], along[2])
+        moments: Vec3 = (along[3], along[4], along[5])
+        e0, e = self._turn(view)
+        axes = view.rotation(self.first)
+        push = vec.times(axes, force)
+        turn = vec.times(axes, vec.add(vec.scale(e0, moments), vec.cross(e, moments)))
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        back = vec.neg(vec.add(turn, vec.cross(reach, push)))
+        return [MarkerLoad(self.second, push, turn), MarkerLoad(self.first, vec.neg(push), back)]
+
+
+def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
+    result = []
+    for row in m:
+        total = row[0] * y[0]
+        for entry, x in zip(row[1:], y[1:], strict=True):
+            total = total + entry * x
+        result.append(total)
+    return result

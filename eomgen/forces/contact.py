@@ -1,0 +1,117 @@
+"""Force elements, unilateral contact of two bodies: where surfaces meet, a normal law and friction."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..frames import Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, sqrt
+from ..graph.vectors import Vec3
+from .base import Force, Load, MarkerLoad, View
+from .friction import Friction
+from .normal_laws import HuntCrossley
+
+#: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
+Touch = tuple[Vec3, Expr, Vec3, Vec3]
+
+
+@dataclass(frozen=True)
+class Contact(Force):
+    """Contact at one point: a Hunt-Crossley force along the normal and friction against the sliding velocity.
+
+    The force on the second body is F_n n - F_n [c(v) / sqrt(v^2 + smoothing^2) + viscous] v_t, with the velocity v_t of
+    the second body relative to the first, across n, at the contact point, the middle of the overlap; its opposite acts
+    on the first body at the same point.
+    """
+
+    first: Marker
+    second: Marker
+    normal_law: HuntCrossley
+    friction: Friction | None
+
+    @abstractmethod
+    def touch(self, view: View) -> Touch:
+        """Where the surfaces meet."""
+
+    def loads(self, view: View) -> list[Load]:
+        normal, depth, arms, sliding, rate = self._motion(view)
+        push = self.normal_law.force(depth, rate)
+        return self._pair(arms, vec.add(vec.scale(push, normal), self._drag(push, sliding)))
+
+    def potential(self, view: View) -> Expr | None:
+        return self.normal_law.energy(self.touch(view)[1])
+
+    def remainder(self, view: View) -> list[Load]:
+        normal, depth, arms, sliding, rate = self._motion(view)
+        push = self.normal_law.force(depth, rate)
+        lost = push - self.normal_law.elastic(depth)
+        return self._pair(arms, vec.add(vec.scale(lost, normal), self._drag(push, sliding)))
+
+    def _motion(self, view: View) -> tuple[Vec3, Expr, tuple[Vec3, Vec3], Vec3, Expr]:
+        """Normal, penetration, arms, sliding velocity and the rate of penetration."""
+        normal, depth, first, second = self.touch(view)
+        v1, v2 = (
+            vec.add(view.velocity(marker), vec.cross(view.angular_velocity(marker), arm))
+            for marker, arm in ((self.first, first), (self.second, second))
+        )
+        relative = vec.sub(v2, v1)
+        parting = vec.dot(normal, relative)
+        return normal, depth, (first, second), vec.sub(relative, vec.scale(parting, normal)), -parting
+
+    def _drag(self, push: Expr, sliding: Vec3) -> Vec3:
+        if self.friction is None:
+            return vec.zero(push.graph)
+        return vec.scale(-push * self.friction.per_velocity(vec.dot(sliding, sliding)), sliding)
+
+    def _pair(self, arms: tuple[Vec3, Vec3], force: Vec3) -> list[Load]:
+        """The force on the second body at the contact point, its opposite on the first."""
+        first, second = arms
+        return [
+            MarkerLoad(self.second, force, vec.cross(second, force)),
+            MarkerLoad(self.first, vec.neg(force), vec.cross(force, first)),
+        ]
+
+
+@dataclass(frozen=True)
+class SpherePlane(Contact):
+    """A sphere about the second marker on the plane through the first, whose z axis points out of the solid.
+
+    A radius of 0 makes it a point.
+    """
+
+    type_name: ClassVar[str] = "sphere_plane"
+    radius: Expr
+
+    def touch(self, view: View) -> Touch:
+        normal = vec.transpose(view.rotation(self.first))[2]
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        depth = self.radius - vec.dot(normal, reach)
+        second = vec.scale(0.5 * depth - self.radius, normal)
+        return normal, depth, vec.add(reach, second), second
+
+
+@dataclass(frozen=True)
+class PointPlane(SpherePlane):
+    """A point, the second marker's origin, on the plane through the first marker."""
+
+    type_name: ClassVar[str] = "point_plane"
+
+
+@dataclass(frozen=True)
+class SphereSphere(Contact):
+    """Two spheres about the markers; undefined where their centres coincide."""
+
+    type_name: ClassVar[str] = "sphere_sphere"
+    radii: tuple[Expr, Expr]
+
+    def touch(self, view: View) -> Touch:
+        reach = vec.sub(view.position(self.second), view.position(self.first))
+        distance = sqrt(vec.dot(reach, reach))
+        normal: Vec3 = (reach[0] / distance, reach[1] / distance, reach[2] / distance)
+        depth = self.radii[0] + self.radii[1] - distance
+        first = vec.scale(self.radii[0] - 0.5 * depth, normal)
+        second = vec.scale(0.5 * depth - self.radii[1], normal)
+        return normal, depth, first, second

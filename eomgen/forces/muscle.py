@@ -1,0 +1,83 @@
+"""Force elements, a muscle with its tendon: the Hill-type model of De Groote and others, rigid tendon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..graph.core import Expr, sin, sqrt
+from .base import Force, Load, View
+from .paths import Path
+
+# Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
+# problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement.
+_ACTIVE = (
+    (0.814, 1.06, 0.162, 0.0633),
+    (0.433, 0.717, -0.0299, 0.2),
+    (0.1, 1.0, 0.354, 0.0),
+)
+_VELOCITY = (-0.318, -8.149, -0.374, 0.886)
+_STRAIN, _SHAPE = 0.6, 4.0
+
+
+def active_force_length(length: Expr) -> Expr:
+    """Active force over fibre length, both normalised: three bells exp(-((l - b2) / (b3 + b4 l))^2 / 2)."""
+    total = length.graph.zero
+    for height, middle, width, slope in _ACTIVE:
+        x = (length - middle) / (width + slope * length)
+        total = total + height * length.graph.apply("exp", -0.5 * (x * x))
+    return total
+
+
+def passive_force_length(length: Expr) -> Expr:
+    """Passive force over fibre length, both normalised: (exp(4 (l - 1) / 0.6) - 1) / (exp(4) - 1)."""
+    g = length.graph
+    return (g.apply("exp", _SHAPE * (length - 1.0) / _STRAIN) - 1.0) / (g.apply("exp", _SHAPE) - 1.0)
+
+
+def force_velocity(velocity: Expr) -> Expr:
+    """Force over lengthening velocity, both normalised: d1 log(y + sqrt(y^2 + 1)) + d4, y = d2 v + d3."""
+    d1, d2, d3, d4 = _VELOCITY
+    y = d2 * velocity + d3
+    return d1 * velocity.graph.apply("log", y + sqrt(y * y + 1.0)) + d4
+
+
+@dataclass(frozen=True)
+class Muscle(Force):
+    """A muscle and its rigid tendon, pulling the ends of its path together.
+
+        tension = force_max [a fl(l) fv(v) + fp(l) + damping v] cos alpha
+
+    with the fibre length l l_opt = sqrt((L - slack)^2 + (l_opt sin alpha_opt)^2) of the path's length L, its pennation
+    cos alpha = (L - slack) / (l l_opt), and v velocity_max = L' cos alpha.  The activation a is an input or any
+    expression: the state holds coordinates and velocities only, so dynamics of activation and an elastic tendon are
+    outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
+    """
+
+    type_name: ClassVar[str] = "muscle"
+    uses_value: ClassVar[bool] = True
+    path: Path
+    activation: Expr
+    force_max: Expr
+    fiber_length: Expr
+    slack_length: Expr
+    velocity_max: Expr
+    pennation: Expr
+    damping: Expr
+
+    def tension(self, length: Expr, rate: Expr) -> Expr:
+        """Pull of the tendon (N) from the length and the lengthening rate of the path."""
+        along = length - self.slack_length
+        if self.pennation.is_zero:
+            fiber, tilt = along, length.graph.one
+        else:
+            thickness = self.fiber_length * sin(self.pennation)
+            fiber = sqrt(along * along + thickness * thickness)
+            tilt = along / fiber
+        l, v = fiber / self.fiber_length, rate * tilt / self.velocity_max
+        active = self.activation * active_force_length(l) * force_velocity(v)
+        return self.force_max * (active + passive_force_length(l) + self.damping * v) * tilt
+
+    def loads(self, view: View) -> list[Load]:
+        length, rate = self.path.measure(view)
+        return self.path.loads(view, -self.tension(length, rate))

@@ -1,0 +1,142 @@
+"""Force elements, paths over via points and around cylinders: the length of a taut string, and its loads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..frames import Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, atan2, sqrt
+from ..graph.vectors import Vec3
+from .base import Load, MarkerLoad, View
+from .branches import where
+from .paths import Line, Path
+
+PI = 3.141592653589793
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A smooth cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
+
+    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.
+    """
+
+    marker: Marker
+    radius: Expr
+    sense: int
+
+
+class Piece(NamedTuple):
+    """A piece of a path between two markers: its length, and the directions in which it leaves and arrives.
+
+    ``force`` and ``torque`` are the resultant on the cylinder per unit of force that lengthens the path.
+    """
+
+    length: Expr
+    leaving: Vec3
+    arriving: Vec3
+    force: Vec3
+    torque: Vec3
+
+
+@dataclass(frozen=True)
+class Route(Path):
+    """A taut string from one marker to another over via points, which it slides through, and around cylinders (m).
+
+    Without friction its tension is the same all along.  A cylinder stands between two markers of the path.
+    """
+
+    start: Marker
+    end: Marker
+    via: tuple[Marker | Cylinder, ...]
+
+    def measure(self, view: View) -> tuple[Expr, Expr]:
+        length = view.graph.zero
+        for _, _, _, piece in self._pieces(view):
+            length = length + piece.length
+        rate = view.graph.zero
+        for load in self.loads(view, view.graph.one):  # loads of a unit force: their power is the rate
+            assert isinstance(load, MarkerLoad)
+            rate = rate + vec.dot(load.force, view.velocity(load.marker))
+            rate = rate + vec.dot(load.torque, view.angular_velocity(load.marker))
+        return length, rate
+
+    def loads(self, view: View, force: Expr) -> list[Load]:
+        o = vec.zero(view.graph)
+        result: list[Load] = []
+        for start, end, cylinder, piece in self._pieces(view):
+            result.append(MarkerLoad(start, vec.scale(-force, piece.leaving), o))
+            result.append(MarkerLoad(end, vec.scale(force, piece.arriving), o))
+            if cylinder is not None:
+                push, turn = vec.scale(force, piece.force), vec.scale(force, piece.torque)
+                result.append(MarkerLoad(cylinder.marker, push, turn))
+        return result
+
+    def _pieces(self, view: View) -> list[tuple[Marker, Marker, Cylinder | None, Piece]]:
+        found = []
+        last, around = self.start, None
+        for stop in (*self.via, self.end):
+            if isinstance(stop, Cylinder):
+                around = stop
+                continue
+            piece = _straight(view, last, stop) if around is None else _wrap(view, last, stop, around)
+            found.append((last, stop, around, piece))
+            last, around = stop, None
+        return found
+
+
+def _straight(view: View, start: Marker, end: Marker) -> Piece:
+    reach = Line(start, end).reach(view)
+    length = sqrt(vec.dot(reach, reach))
+    direction = (reach[0] / length, reach[1] / length, reach[2] / length)
+    o = vec.zero(view.graph)
+    return Piece(length, direction, direction, o, o)
+
+
+def _wrap(view: View, start: Marker, end: Marker, around: Cylinder) -> Piece:
+    """The shortest path that turns about a cylinder in the given sense; straight where it does not touch.
+
+    Across the axis it is a tangent of length t_a, an arc of r w and a tangent of length t_b.  The surface unrolls into
+    a plane, in which the path is straight: it rises along the axis in proportion, and
+    L^2 = (t_a + r w + t_b)^2 + h^2 with the rise h.
+    """
+    r, s = around.radius, float(around.sense)
+    rotation, center = view.rotation(around.marker), view.position(around.marker)
+    a, b = (vec.transpose_times(rotation, vec.sub(view.position(end_), center)) for end_ in (start, end))
+    square_a, square_b = a[0] * a[0] + a[1] * a[1], b[0] * b[0] + b[1] * b[1]
+    t_a, t_b = sqrt(square_a - r * r), sqrt(square_b - r * r)  # not real, so not a number, inside the cylinder
+    # angle from start to end about the axis in the sense of the path, 0 to 2 pi, less those from the ends to where the
+    # tangents touch
+    cross, dot = s * (a[0] * b[1] - a[1] * b[0]), a[0] * b[0] + a[1] * b[1]
+    w = PI + atan2(-cross, -dot) - atan2(t_a, r) - atan2(t_b, r)
+    across = t_a + r * w + t_b
+    h = b[2] - a[2]
+    length = sqrt(across * across + h * h)
+    # radial directions to where the path touches first (p) and last (q)
+    p = ((a[0] * r - s * a[1] * t_a) / square_a, (a[1] * r + s * a[0] * t_a) / square_a)
+    q = ((b[0] * r + s * b[1] * t_b) / square_b, (b[1] * r - s * b[0] * t_b) / square_b)
+    planar, rise = s * across / length, h / length
+    leaving: Vec3 = (-p[1] * planar, p[0] * planar, rise)
+    arriving: Vec3 = (-q[1] * planar, q[0] * planar, rise)
+    first: Vec3 = (r * p[0], r * p[1], a[2] + h * t_a / across)
+    last: Vec3 = (r * q[0], r * q[1], b[2] - h * t_b / across)
+    torque = vec.sub(vec.cross(first, leaving), vec.cross(last, arriving))
+
+    # written so that an end inside the cylinder counts as touching, which fails, and not as free
+    touching = view.graph.apply("not", view.graph.apply("le", w, 0.0))
+    straight = _straight(view, start, end)
+
+    def chosen(wrapped: Vec3, free: Vec3) -> Vec3:
+        x, y, z = (where(touching, i, k) for i, k in zip(vec.times(rotation, wrapped), free, strict=True))
+        return (x, y, z)
+
+    leave, arrive = chosen(leaving, straight.leaving), chosen(arriving, straight.arriving)
+    return Piece(
+        where(touching, length, straight.length),
+        leave,
+        arrive,
+        vec.sub(leave, arrive),
+        chosen(torque, vec.zero(view.graph)),
+    )

@@ -1,0 +1,282 @@
+"""Paths over via points and around cylinders: lengths, loads, pulleys; judged by closed forms, SymPy and a search."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import force_bench as bench
+import judges
+import numpy as np
+import pytest
+from force_bench import Seen, Wrench
+from scipy.optimize import minimize
+
+import eomgen as eg
+from eomgen.errors import ModelError, NonFiniteError
+
+
+def test_a_spring_over_a_via_point_of_a_third_place(tmp_path: Path) -> None:
+    """The middle point slides freely: it bears the sum of the pulls of both pieces."""
+    at = np.array([0.3, 0.8, -0.2])
+
+    def add(m: Any, p: Any, q: Any) -> None:
+        m.spring("cord", p, q, stiffness="k", length=0.5, via=[m.ground.at(*at)])
+
+    def loads(p: Seen, q: Seen, *_: Any) -> list[Wrench]:
+        a, b = at - p.r, q.r - at
+        la, lb = np.linalg.norm(a), np.linalg.norm(b)
+        pull = 30.0 * (la + lb - 0.5)
+        return [Wrench(0, p.r, pull * a / la), Wrench(1, q.r, -pull * b / lb)]
+
+    bench.judge(add, loads, lambda *_: [], bench.states(11, 3), tmp_path)
+
+
+def planar_length(a: np.ndarray, b: np.ndarray, r: float, sense: int) -> float:
+    """A string around a circle by elementary geometry: two tangents and an arc, or straight."""
+    ra, rb = np.hypot(*a), np.hypot(*b)
+    between = (sense * (np.arctan2(b[1], b[0]) - np.arctan2(a[1], a[0]))) % (2 * np.pi)
+    arc = between - np.arccos(r / ra) - np.arccos(r / rb)
+    if arc <= 0:
+        return float(np.hypot(*(b - a)))
+    return float(np.sqrt(ra**2 - r**2) + r * arc + np.sqrt(rb**2 - r**2))
+
+
+def spatial_length(a: np.ndarray, b: np.ndarray, r: float, sense: int) -> float:
+    """The shortest path found by searching over where it touches first and last: straight, helix, straight."""
+    start = np.arctan2(a[1], a[0])
+    between = (sense * (np.arctan2(b[1], b[0]) - start)) % (2 * np.pi)
+    from_a, from_b = np.arccos(r / np.hypot(*a[:2])), np.arccos(r / np.hypot(*b[:2]))
+
+    def length(x: np.ndarray) -> float:
+        angles = start + sense * np.array([x[0], x[0] + x[1]])
+        p, q = (np.array([r * np.cos(w), r * np.sin(w), z]) for w, z in zip(angles, x[2:], strict=True))
+        return float(np.linalg.norm(p - a) + np.hypot(r * x[1], q[2] - p[2]) + np.linalg.norm(b - q))
+
+    # a search along the surface: the straight pieces may touch the cylinder but not enter it
+    guess = np.array([from_a, between - from_a - from_b, a[2] + 0.3 * (b[2] - a[2]), a[2] + 0.6 * (b[2] - a[2])])
+    bounds = [(None, from_a), (0.0, None), (None, None), (None, None)]
+    keep = {"type": "ineq", "fun": lambda x: x[0] + x[1] - (between - from_b)}
+    limit = {"type": "ineq", "fun": lambda x: from_a - x[0]}
+    found = minimize(length, guess * 1.0, bounds=bounds, constraints=[keep, limit], tol=1e-14, options={"maxiter": 500})
+    return float(found.fun)
+
+
+def string(a: Any, b: Any, r: float, sense: str) -> Any:
+    """A probe: a prismatic body carries the end of a string around a cylinder; its energy gives the length."""
+    m = eg.Model("probe")
+    body = m.body("b", mass=1)
+    m.prismatic("s", m.ground, body, axis="x")
+    via = [{"around": m.ground, "radius": r, "sense": sense}]
+    m.element("probe", m.ground.at(*a), body.at(*b), potential="length", via=via)
+    return m.compile(target="numpy")
+
+
+@pytest.mark.parametrize("sense", ["positive", "negative"])
+def test_lengths_against_geometry_and_a_search(sense: str) -> None:
+    random = np.random.default_rng(12)
+    wrapped = 0
+    s = 1 if sense == "positive" else -1
+    for _ in range(12):
+        a, b = random.uniform(0.4, 1.2, (2, 1)) * np.array([np.cos(w := random.uniform(0, 6.3, 2)), np.sin(w)]).T
+        r = random.uniform(0.1, 0.38)
+        flat = string((*a, 0), (*b, 0), r, sense).energy(np.zeros(2))[1]
+        assert flat == pytest.approx(planar_length(a, b, r, s), rel=1e-13)
+        rise = np.hypot(flat, 0.7)
+        up_a, up_b = np.array([*a, 0.1]), np.array([*b, 0.8])
+        length = string(up_a, up_b, r, sense).energy(np.zeros(2))[1]
+        assert length == pytest.approx(rise, rel=1e-13)
+        if flat > np.hypot(*(b - a)) + 1e-9:
+            wrapped += 1
+            assert length == pytest.approx(spatial_length(up_a, up_b, r, s), rel=1e-7)
+    assert wrapped >= 4
+
+
+def test_a_geodesic_of_sympy() -> None:
+    """Both ends on the cylinder: SymPy's own WrappingCylinder."""
+    from sympy.physics.mechanics import Point, ReferenceFrame
+    from sympy.physics.mechanics.wrapping_geometry import WrappingCylinder
+
+    N, O = ReferenceFrame("N"), Point("O")
+    cylinder = WrappingCylinder(0.2, O, N.z)
+    ends = []
+    for angle, z in ((0.3, -0.1), (2.2, 0.5)):
+        point = Point(f"p{z}")
+        point.set_pos(O, 0.2 * np.cos(angle) * N.x + 0.2 * np.sin(angle) * N.y + z * N.z)
+        ends.append((point, [0.2 * np.cos(angle), 0.2 * np.sin(angle), z]))
+    theirs = float(cylinder.geodesic_length(ends[0][0], ends[1][0]))
+    lift = 1 + 1e-14  # rounding must not put the ends inside
+    a, b = (np.array(x) * [lift, lift, 1] for _, x in ends)
+    assert string(a, b, 0.2, "positive").energy(np.zeros(2))[1] == pytest.approx(theirs, rel=1e-7)
+    assert theirs == pytest.approx(np.hypot(0.2 * 1.9, 0.6), rel=1e-12)
+
+
+@pytest.mark.parametrize("sense", ["positive", "negative"])
+def test_loads_of_a_wrapped_path_by_virtual_work(sense: str, tmp_path: Path) -> None:
+    """Cylinder on one body, ends on the other and on ground: loads against differences of the length.
+
+    The judge of the loads is the energy: Lagrange's equations differentiate it, the embedding uses the loads.
+    """
+    wrapped = 0
+
+    def add(m: Any, p: Any, q: Any) -> None:
+        drum = {"around": p, "radius": 0.12, "sense": sense}
+        m.spring("cord", m.ground.at(-0.6, -0.5, 0.3), q, stiffness="k", length=0.2, via=[drum])
+        m.damper("oil", m.ground.at(-0.6, -0.5, 0.3), q, damping="c", via=[drum])
+
+    model = bench.flyers(add)
+    embedded, lagrange = (model.compile(method=x, target="numpy") for x in ("embedding", "lagrange"))
+    bare = bench.flyers().compile(target="numpy")
+    for x in bench.states(13, 12, reach=0.9):
+        q, n = x[:12], 12
+
+        def length(columns: np.ndarray) -> np.ndarray:
+            return 0.2 + np.sqrt(2 * (embedded.energy(np.vstack([columns, 0 * columns]))[1]) / 30.0)[None]
+
+        slope = np.array([judges.first(length, q, e, h=1e-3)[0] for e in np.eye(n)])
+        expected = -(30.0 * (length(q[:, None])[0, 0] - 0.2) + 1.5 * slope @ x[n:]) * slope
+        bodies = judges.Bodies(bare, q, x[n:])
+        p, end = bench.see(bodies, 0, bench.P), bench.see(bodies, 1, bench.Q)
+        a, b = (p.R.T @ (y - p.r) for y in (np.array([-0.6, -0.5, 0.3]), end.r))
+        s = 1 if sense == "positive" else -1
+        flat = planar_length(a[:2], b[:2], 0.12, s)
+        assert length(q[:, None])[0, 0] == pytest.approx(np.hypot(flat, b[2] - a[2]), rel=1e-10)
+        wrapped += flat > np.hypot(*(b - a)[:2]) + 1e-9
+        for mod in (embedded, lagrange):
+            found = bare.bias(0.0, x) - mod.bias(0.0, x)
+            assert np.abs(found - expected).max() <= 1e-8 * np.abs(expected).max()
+            rhs = partial(mod.rhs, 0.0)
+            slopes = np.stack([judges.first(rhs, x, d, h=1e-5) for d in np.eye(24)], axis=1)
+            assert np.abs(mod.jacobian(0.0, x) - slopes).max() <= 1e-6 * np.abs(slopes).max()
+    assert 2 <= wrapped <= 11
+
+
+def test_the_length_has_no_kink_where_the_string_lifts_off() -> None:
+    """Sliding the end past the tangent: the slope is the same on both sides."""
+    r = 0.3
+    mod = string((-1.0, r, 0), (0.0, 0.0, 0), r, "negative")
+    # the end moves along y = const: at x = 1, y = r the string is straight and just touches
+    m = eg.Model("lift")
+    body = m.body("b", mass=1)
+    m.prismatic("s", m.ground.at(1, r, 0), body, axis="y")
+    m.element("probe", m.ground.at(-1, r, 0), body, law=1, via=[{"around": m.ground, "radius": r, "sense": "negative"}])
+    mod = m.compile(target="numpy")
+    force = [float(mod.rhs(0.0, np.array([s, 0.0]))[1]) for s in (-1e-6, 0.0, 1e-6)]
+    assert np.ptp(force) < 2e-6
+    assert abs(force[1]) < 1e-12
+
+
+def test_an_end_inside_the_cylinder_is_an_error_that_names_the_element() -> None:
+    m = eg.Model("inside")
+    body = m.body("b", mass=1)
+    m.prismatic("s", m.ground, body, axis="x")
+    m.spring("cord", m.ground.at(-1, 0, 0), body, stiffness=1, via=[{"around": m.ground, "radius": 0.3}])
+    mod = m.compile(target="numpy")
+    assert np.isfinite(mod.rhs(0.0, np.array([0.4, 0.0]))).all()
+    with pytest.raises(NonFiniteError, match="the loads of cord are not"):
+        mod.rhs(0.0, np.array([0.2, 0.0]))
+
+
+def test_atwoods_machine() -> None:
+    """Two masses on a stiff string over a pulley: a = g (m1 - m2) / (m1 + m2), tension 2 m1 m2 g / (m1 + m2)."""
+    m = eg.Model("atwood", gravity=(0, "-g", 0))
+    g, m1, m2, r = 9.81, 3.0, 2.0, 0.25
+    m.parameter("g", g)
+    left, right = m.body("left", mass=m1), m.body("right", mass=m2)
+    m.prismatic("x1", m.ground.at(-r, -1, 0), left, axis="y")
+    m.prismatic("x2", m.ground.at(r, -2, 0), right, axis="y")
+    m.element(
+        "rope", left, right, law="-tension", via=[{"around": m.ground, "radius": r, "sense": "negative"}]
+    )  # a rope of given tension: at Atwood's, both accelerate alike
+    m.parameter("tension", 2 * m1 * m2 * g / (m1 + m2))
+    a = g * (m1 - m2) / (m1 + m2)
+    mod = m.compile(target="numpy")
+    np.testing.assert_allclose(mod.rhs(0.0, np.zeros(4))[2:], [-a, a], rtol=1e-13)
+    stiff = eg.Model("stiff_atwood", gravity=(0, -g, 0))
+    k = 1e6
+    left, right = stiff.body("left", mass=m1), stiff.body("right", mass=m2)
+    stiff.prismatic("x1", stiff.ground.at(-r, -1, 0), left, axis="y")
+    stiff.prismatic("x2", stiff.ground.at(r, -2, 0), right, axis="y")
+    stretch = 2 * m1 * m2 * g / (m1 + m2) / k
+    length = 1 + 2 + np.pi * r - stretch
+    drum = {"around": stiff.ground, "radius": r, "sense": "negative"}
+    stiff.spring("rope", left, right, stiffness=k, length=length, via=[drum])
+    traj = stiff.compile(target="numpy").simulate((0, 0.4), rtol=1e-10, atol=1e-12)
+    assert traj["x1"][-1] == pytest.approx(-a * 0.4**2 / 2, rel=1e-6)
+    assert traj["x2"][-1] == pytest.approx(a * 0.4**2 / 2, rel=1e-6)
+
+
+def test_a_muscle_over_a_joint_reproduces_the_published_arm() -> None:
+    """An arm on a lever with biceps and triceps (SymPy's tutorial), the triceps wrapped around the elbow."""
+    import models
+
+    given = models.reference("muscle_lever_sympy")
+    p = given["parameters_SI"]
+    lA, lC, lD, r = p["lA"], p["lC"], p["lD"], p["r"]
+    m = eg.Model("arm", gravity=(0, 0, p["g"]))
+
+    axial: dict[str, float] = {}
+
+    def rod(name: str, mass: float, length: float, along: int, at: float) -> Any:
+        thin: list[Any] = [mass * length**2 / 12] * 3
+        thin[along] = m.parameter(f"I{name}", mass * length**2 / 12)  # the tutorial's m l^2 / 2 no rod has: given later
+        axial[f"I{name}"] = mass * length**2 / 2
+        center = [0.0, 0.0, 0.0]
+        center[along] = at
+        return m.body(name, mass=mass, com=center, inertia=thin)
+
+    A, C, D = rod("A", p["mA"], lA, 1, 0.0), rod("C", p["mC"], lC, 2, lC / 2), rod("D", p["mD"], lD, 2, lD / 2)
+    B = m.body("B", mass=0)
+    m.revolute("q1", m.ground.at(p["dx"], 0, 0), A, coordinate="q1")
+    m.revolute("q2", m.ground.at(0, p["dy"], p["dz"]), B, axis="y", coordinate="q2")
+    m.revolute("q3", B, C, coordinate="q3")
+    m.revolute("q4", C.at(0, 0, lC), D, axis="y", coordinate="q4")
+    m.spherical("hand", A.at(0, lA, 0), D.at(0, 0, lD))
+    m.torsional_element("grip", "q1", law=f"-{p['k']}*angle - {p['c']}*rate")
+    elbow = C.at(0, 0, lC, rpy=(-np.pi / 2, 0, 0))  # its z axis is y of the upper arm
+    for name, ends, via in (
+        ("biceps", (C.at(0, 0, lC / 3), D.at(0, 0, lD / 3)), []),
+        ("triceps", (C.at(0, 0, lC / 3), D.at(0, 0, lD / 3)), [{"around": elbow, "radius": r, "sense": "positive"}]),
+    ):
+        own = p[name]
+        sizes = {"force_max": own["F_max"], "fiber_length": own["l_opt"], "slack_length": own["l_slack"]}
+        m.muscle(name, *ends, activation=0, **sizes, via=via)
+    q = given["own"]["q0"]
+    m.initial(**{f"q{k + 1}": value for k, value in enumerate(q)})
+    m.guess(q1=q[0], q2=q[1], q3=q[2], q4=q[3])
+    for method in ("embedding", "lagrange"):
+        mod = m.compile(method=method, target="numpy")
+        x = np.zeros(mod.n_x)
+        for k, value in enumerate(q):
+            x[mod.x_names.index(f"q{k + 1}")] = value
+        assert np.abs(mod.constraints(x[: mod.n_q])).max() < 1e-9
+        a = mod.rhs(0.0, x, p=[axial[name] for name in mod.p_names])[mod.n_q :]
+        found = [a[mod.v_names.index(f"q{k}_dot")] for k in range(1, 5)]
+        np.testing.assert_allclose(found, given["own"]["qdd0"], rtol=1e-7)
+
+
+def test_faults_of_paths_are_told_by_place() -> None:
+    m = eg.Model("faults")
+    b = m.body("b", mass=1)
+    m.prismatic("s", m.ground, b)
+    drum = {"around": m.ground, "radius": 0.1}
+    m.spring("k1", m.ground, b, stiffness=1, via=[drum, drum])
+    m.spring("k2", m.ground, b, stiffness=1, via=[{"around": m.ground, "radius": -0.1, "sense": "up"}, "nobody"])
+    m.spring("k3", m.ground, b, stiffness=1, via=[{"around": m.ground}])
+    m.actuator("a1", "s", 1, via=[b])
+    m.element("e1", m.ground, b)
+    m.element("e2", m.ground, b, law="k*angle")
+    m.parameter("rate", 1)
+    m.element("e3", m.ground, b, law="rate")
+    with pytest.raises(ModelError) as error:
+        m.mechanism()
+    told = {p.path: f"{p.message}; {p.remedy}" for p in error.value.problems}
+    assert "follows another cylinder" in told["forces.k1.via[1]"]
+    assert told["forces.k2.via[0].radius"].startswith("is -0.1")
+    assert "allowed: positive, negative" in told["forces.k2.via[0].sense"]
+    assert "no body 'nobody'" in told["forces.k2.via[1]"]
+    assert told["forces.k3.via[0].radius"].startswith("is missing")
+    assert "a joint's coordinate has no path" in told["forces.a1.via"]
+    assert "unknown name 'angle'" in told["forces.e2.law"]
+    assert "'rate' is the parameter at parameters.rate and the element's own too" in told["forces.e3.law"]
