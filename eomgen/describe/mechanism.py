@@ -45,12 +45,18 @@ class Input:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes."""
+    """A rigid body: mass (kg), centre of mass (m) and inertia about it (kg m^2), both in body axes.
+
+    ``moment`` (m c, kg m) and ``inertia_origin`` (about the body's origin) are there where the user gave them, so that
+    these parameters stay as they are; the centre of mass and the inertia about it follow from them then.
+    """
 
     name: str
     mass: Expr
     com: Vec3
     inertia: Mat3
+    moment: Vec3 | None = None
+    inertia_origin: Mat3 | None = None
 
 
 @dataclass(frozen=True)
