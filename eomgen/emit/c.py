@@ -74,6 +74,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
         "parent": program.parent,
+        "by_columns": program.by_columns,
         "kernels": [
             {
                 "name": k.name,

@@ -13,6 +13,7 @@ from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
+from .program import Limits
 from .terms import SystemTerms
 
 
@@ -21,6 +22,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
     c, loop = kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     length = kinematics.length_scale
+    by_columns = equations.accelerations is not None and len(names) > Limits().unrolled
     scale = {"length": length, "angle": kinematics.graph.one}
     return SystemTerms(
         graph=kinematics.graph,
@@ -31,7 +33,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         multipliers=tuple(f"lambda[{i}]" for i in range(len(c.values))),
         u=kinematics.input_names,
         p=kinematics.parameter_names,
-        mass_matrix=equations.mass_matrix,
+        mass_matrix=() if by_columns else equations.mass_matrix,
         bias=equations.bias,
         inverse_dynamics=equations.inverse_dynamics,
         kinetic=equations.kinetic_energy,
@@ -51,6 +53,8 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         n_dof=mobility.n_dof,
         preferred=tuple(names.index(n) for n in mobility.independent),
         parent=kinematics.parent,
+        accelerations=equations.accelerations,
+        pivots=equations.pivots,
     )
 
 
