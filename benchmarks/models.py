@@ -54,6 +54,23 @@ def arm_joints(name: str) -> list[dict[str, Any]]:
     return joints
 
 
+def spatial_chain(n: int) -> eg.Model:
+    """A chain of n rods on hinges that are across each other in turn, about z and about y; every parameter a symbol."""
+    m = eg.Model(f"spatial_chain_{n}", gravity=(0, 0, "-g"))
+    m.parameter("g", 9.81)
+    previous = m.ground
+    for k in range(1, n + 1):
+        length = 1.0 - 0.03 * (k % 5)
+        values = {"m": 1.0 + 0.1 * (k % 7), "l": length, "d": length / 2, "a": 0.01, "b": 0.02, "c": 0.025}
+        for letter, value in values.items():
+            m.parameter(f"{letter}{k}", value)
+        inertia = {"xx": f"a{k}", "yy": f"b{k}", "zz": f"c{k}"}
+        link = m.body(f"link{k}", mass=f"m{k}", com=(f"d{k}", 0, 0), inertia=inertia)
+        m.revolute(f"q{k}", previous, link, axis="zy"[k % 2])
+        previous = link.at(f"l{k}", 0, 0)
+    return m
+
+
 def rpy(rotation: np.ndarray) -> tuple[float, float, float]:
     """Roll, pitch and yaw of a rotation; roll 0 where the pitch is a quarter turn."""
     across = float(np.hypot(rotation[0, 0], rotation[1, 0]))

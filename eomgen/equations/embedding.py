@@ -3,9 +3,9 @@
 M = B^T M_body B and h = B^T (M_body gamma - Q_v - Q_e), with body velocities B v (Computational Dynamics, sec. 5.7 and
 ch. 7).  B is never formed: h is one outward and one inward sweep (Newton-Euler; Featherstone, RBDA, table 5.1) and M is
 summed over composite bodies (table 6.2), all in link axes.  The sweep carries U = [alpha] + [omega] [omega], by which a
-point of a link at r accelerates at A + U r, and takes force and moment from U directly (W. Khalil and J.-F. Kleinfinger,
-Minimum operations and minimum parameters of the dynamic models of tree structure robots, IEEE J. Robotics and
-Automation 3 (1987), 517-526).
+point of a link at r accelerates at A + U r, and takes force and moment from U (W. Khalil, J.-F. Kleinfinger, Minimum
+operations and minimum parameters of the dynamic models of tree structure robots, IEEE J. Robotics and Automation 3
+(1987), 517-526).
 """
 
 from __future__ import annotations

@@ -45,9 +45,7 @@ class SpatialInertia:
 
     def turned(self, rotation: Mat3) -> SpatialInertia:
         """In the axes that ``rotation`` takes its axes to."""
-        return SpatialInertia(
-            self.mass, vec.times(rotation, self.moment), rotate_symmetric(rotation, self.inertia)
-        )
+        return SpatialInertia(self.mass, vec.times(rotation, self.moment), rotate_symmetric(rotation, self.inertia))
 
     def shifted(self, p: Vec3) -> SpatialInertia:
         """About the point that sees its origin at p (Featherstone, RBDA, eq. 2.66)."""
@@ -104,7 +102,7 @@ def skew(a: Vec3) -> Mat3:
 
 
 def axis_of(rotation: Mat3) -> int | None:
-    """The coordinate axis of a turn by an angle about it, None for any other rotation and where the cosine is 0 or 1."""
+    """The coordinate axis that a rotation turns about by an angle; None for other rotations and quarter turns."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         alone = all(rotation[k][m].is_zero and rotation[m][k].is_zero for m in (i, j))

@@ -3,7 +3,7 @@
 What a joint lets a link do relative to its parent leaves some combinations of the ten inertial parameters without any
 effect on the difference between the two (M. Gautier and W. Khalil, Direct calculation of minimum set of inertial
 parameters of serial robots, IEEE Trans. Robotics and Automation 6 (1990), 368-373): carried by the parent they give the
-same kinetic energy and the same work of gravity.  Links are left with seven parameters or fewer, and recursions shorter.
+same kinetic energy and the same work of gravity.  Links are left with seven parameters or fewer.
 Kept by its link, the rest need not look like a body: masses vanish and moments of inertia may be negative.
 """
 
@@ -57,5 +57,3 @@ def movable(graph: Graph, link: Link, inertia: SpatialInertia) -> SpatialInertia
 def _less(a: SpatialInertia, b: SpatialInertia) -> SpatialInertia:
     tensor = symmetric(subtract_matrices(a.inertia, b.inertia))
     return SpatialInertia(a.mass - b.mass, vec.sub(a.moment, b.moment), tensor)
-
-
