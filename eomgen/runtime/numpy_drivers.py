@@ -157,7 +157,8 @@ class Drivers:
     def _mass_matrix(self, t: float, x: Array, u: Array, c: Array) -> Array:
         if "mass_times" in self.blocks:
             columns = np.vstack([np.repeat(x[:, None], self.layout.n_v, axis=1), np.eye(self.layout.n_v)])
-            return np.asarray(self.blocks["mass_times"](t, columns, u, c), dtype=float)
+            M = np.asarray(self.blocks["mass_times"](t, columns, u, c), dtype=float)
+            return np.asarray(np.triu(M) + np.triu(M, 1).T)
         return self.terms(t, u, c, x, np.zeros(self.layout.n_v)).M
 
     def _bias(self, t: float, x: Array, u: Array, c: Array) -> Array:
