@@ -30,10 +30,9 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     given = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
     inverse = _sweep(kinematics, inertias, rates, kinematics.a)
-    if kinematics.mechanism.parameters:  # grouping symbols is work too: keep what takes fewer operations
-        plain = _sweep(kinematics, given, rates, kinematics.a)
-        if count(plain).total < count(inverse).total:
-            inertias, inverse = given, plain
+    plain = _sweep(kinematics, given, rates, kinematics.a)
+    if count(plain).total < count(inverse).total:  # grouping symbols is work too
+        inertias, inverse = given, plain
     kinetic = graph.zero
     for inertia, twist in zip(given, kinematics.twists, strict=True):
         kinetic = kinetic + _project(twist, inertia.times(*twist))

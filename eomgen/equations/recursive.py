@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.count import count
 from ..graph.differentiate import jacobian
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
@@ -93,12 +94,16 @@ class Release:
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Equations of the spanning tree; of a tree without loops also its accelerations in closed form."""
-    inertias = regroup(kinematics.graph, kinematics.links)
-    rates = joint_rates(kinematics)
-    products = _velocity_products(kinematics, rates)
-    loads = _loads(kinematics, inertias)
+    products = _velocity_products(kinematics, joint_rates(kinematics))
     a = kinematics.a
+    inertias = [link.spatial for link in kinematics.links]
+    loads = _loads(kinematics, inertias)
     inverse = _newton_euler(kinematics, inertias, products, loads, a)
+    grouped = regroup(kinematics.graph, kinematics.links)
+    lighter = _loads(kinematics, grouped)
+    shorter = _newton_euler(kinematics, grouped, products, lighter, a)
+    if count(shorter).total <= count(inverse).total:  # grouping symbols is work too
+        inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
     tree = not kinematics.constraints.values
     accelerations, pivots = _articulated(kinematics, inertias, products, loads) if tree else (None, ())
