@@ -6,14 +6,13 @@ import json
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 import eomgen as eg
 
 from .measure import ROOT
 
 EXAMPLES = ROOT / "examples"
-PANDA = ROOT / "tests" / "reference" / "panda_arm.json"
+REFERENCE = ROOT / "tests" / "reference"
 
 
 def chain_values(n: int) -> dict[str, float]:
@@ -41,26 +40,69 @@ def chain(n: int) -> eg.Model:
     return m
 
 
-def panda_joints() -> list[dict[str, Any]]:
-    """The joints of the Panda arm as in its reference file, entries of rotations next to 0 and +-1 made exact."""
-    joints: list[dict[str, Any]] = json.loads(PANDA.read_text(encoding="utf-8"))["joints"]
+def arm_joints(name: str) -> list[dict[str, Any]]:
+    """The joints of an arm as in its reference file, entries of rotations next to 0 and +-1 made exact.
+
+    URDF files write quarter turns with few digits: entries are off by up to 5e-12.
+    """
+    path = REFERENCE / f"{name}_arm.json"
+    joints: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["joints"]
     for joint in joints:
         rotation = np.array(joint["rotation"])
         nearest = np.round(rotation)
-        joint["rotation"] = np.where(np.abs(rotation - nearest) < 1e-12, nearest, rotation)
+        joint["rotation"] = np.where(np.abs(rotation - nearest) < 1e-11, nearest, rotation)
     return joints
+
+
+def spatial_chain(n: int) -> eg.Model:
+    """A chain of n rods on hinges that are across each other in turn, about z and about y; every parameter a symbol."""
+    m = eg.Model(f"spatial_chain_{n}", gravity=(0, 0, "-g"))
+    m.parameter("g", 9.81)
+    previous = m.ground
+    for k in range(1, n + 1):
+        length = 1.0 - 0.03 * (k % 5)
+        values = {"m": 1.0 + 0.1 * (k % 7), "l": length, "d": length / 2, "a": 0.01, "b": 0.02, "c": 0.025}
+        for letter, value in values.items():
+            m.parameter(f"{letter}{k}", value)
+        inertia = {"xx": f"a{k}", "yy": f"b{k}", "zz": f"c{k}"}
+        link = m.body(f"link{k}", mass=f"m{k}", com=(f"d{k}", 0, 0), inertia=inertia)
+        m.revolute(f"q{k}", previous, link, axis="zy"[k % 2])
+        previous = link.at(f"l{k}", 0, 0)
+    return m
+
+
+def rpy(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation; roll 0 where the pitch is a quarter turn."""
+    across = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = float(np.arctan2(-rotation[2, 0], across))
+    if across < 1e-12:
+        return 0.0, pitch, float(np.arctan2(-rotation[0, 1], rotation[1, 1]))
+    return (
+        float(np.arctan2(rotation[2, 1], rotation[2, 2])),
+        pitch,
+        float(np.arctan2(rotation[1, 0], rotation[0, 0])),
+    )
+
+
+def numeric_arm(name: str, driven: bool = False) -> eg.Model:
+    """An arm of revolute joints, all parameters numbers; ``driven`` by a torque for an input at every joint."""
+    m = eg.Model(name, gravity=(0, 0, -9.81))
+    bodies = [m.ground]
+    for joint in arm_joints(name):
+        marker = bodies[joint["parent"] + 1].at(*joint["position"], rpy=rpy(joint["rotation"]))
+        body = m.body(f"{joint['name']}_body", mass=joint["mass"], com=joint["com"], inertia=joint["inertia_com"])
+        pin = m.revolute(joint["name"], marker, body, axis=joint["axis"])
+        if driven:
+            m.torque(f"drive_{joint['name']}", pin, m.input(f"tau_{joint['name']}"))
+        bodies.append(body)
+    return m
 
 
 def panda() -> eg.Model:
     """The arm of Franka's Panda, seven revolute joints, all parameters numbers."""
-    m = eg.Model("panda", gravity=(0, 0, -9.81))
-    bodies = [m.ground]
-    for joint in panda_joints():
-        rpy = Rotation.from_matrix(joint["rotation"]).as_euler("xyz")
-        quarters = rpy / (np.pi / 2)
-        rpy = np.where(np.abs(quarters - np.round(quarters)) < 1e-12, np.round(quarters) * (np.pi / 2), rpy)
-        marker = bodies[joint["parent"] + 1].at(*joint["position"], rpy=tuple(rpy.tolist()))
-        body = m.body(f"{joint['name']}_body", mass=joint["mass"], com=joint["com"], inertia=joint["inertia_com"])
-        m.revolute(joint["name"], marker, body, axis=joint["axis"])
-        bodies.append(body)
-    return m
+    return numeric_arm("panda")
+
+
+def humanoid() -> eg.Model:
+    """A floating trunk with arms, legs, waist and neck, 30 joints in all, every parameter a number."""
+    return eg.load(ROOT / "benchmarks" / "humanoid.yaml")

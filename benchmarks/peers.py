@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sm
 from sympy.physics import mechanics as me
 
-from .models import panda_joints
+from .models import arm_joints
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def chain(n: int, absolute: bool = True) -> Kane:
 
 def panda() -> Kane:
     """The Panda arm, all parameters numbers."""
-    joints = panda_joints()
+    joints = arm_joints("panda")
     s = _System(len(joints))
     frames, pins = [s.ground], [s.origin]
     for k, joint in enumerate(joints):

@@ -17,6 +17,7 @@ from .kinematics.report import MechanismReport, report
 from .kinematics.state import acceleration_name
 
 if TYPE_CHECKING:
+    from .program.choice import Choice
     from .runtime.module import Module
 
 READABLE = 400  #: operations up to which equations are shown written out
@@ -29,7 +30,9 @@ class Equations:
     Attributes
     ----------
     method : str
-        How they were derived: ``embedding`` or ``lagrange``.
+        How they were derived: ``embedding``, ``lagrange`` or ``recursive``.
+    choice : Choice or None
+        What ``auto`` compared, of a tree.
     report : MechanismReport
         Bodies, joints, loops, rank, degrees of freedom, partition.
     q, v, parameters : tuple of sympy.Symbol
@@ -45,6 +48,7 @@ class Equations:
     mobility: Mobility = field(repr=False)
     tree: TreeEquations = field(repr=False)
     seconds: dict[str, float] = field(default_factory=dict, repr=False)
+    choice: Choice | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
@@ -70,11 +74,13 @@ class Equations:
     def operations(self) -> dict[str, Operations]:
         """Operations of each part, counted on the graph; work that depends on parameters only is included."""
         tree, c = self.tree, self.kinematics.constraints
-        lower = [x for i, row in enumerate(tree.mass_matrix) for x in row[: i + 1]]
-        parts: dict[str, Sequence[Expr]] = {
-            "mass_matrix": lower,
-            "bias": tree.bias,
-            "mass_matrix and bias": [*lower, *tree.bias],
+        parts: dict[str, Sequence[Expr]] = {"bias": tree.bias}
+        if tree.accelerations is None:
+            lower = [x for i, row in enumerate(tree.mass_matrix) for x in row[: i + 1]]
+            parts = {"mass_matrix": lower, "bias": tree.bias, "mass_matrix and bias": [*lower, *tree.bias]}
+        else:
+            parts["accelerations"] = tree.accelerations
+        parts |= {
             "inverse_dynamics": tree.inverse_dynamics,
             "energy": [tree.kinetic_energy, tree.potential_energy],
         }
@@ -174,6 +180,8 @@ class Equations:
         lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
         for name, operations in self.operations.items():
             lines.append(f"  {name:<22}{operations.total:>7} operations")
+        if self.choice is not None:
+            lines.append(f"  {self.choice}")
         return "\n".join(lines)
 
     __repr__ = __str__

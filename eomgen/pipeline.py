@@ -25,6 +25,7 @@ from .kinematics.report import MechanismReport, report
 if TYPE_CHECKING:
     from .describe.mechanism import Mechanism
     from .describe.model import Model
+    from .program.choice import Choice
     from .program.program import Program
     from .runtime.module import Module
 
@@ -51,11 +52,11 @@ def _without_collection() -> Iterator[None]:
 
 
 def choose_method(mechanism: Mechanism, method: str) -> str:
-    """Resolve ``auto``; refuse a method that is not there or does not fit."""
+    """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
     bare = mechanism.lagrangian is not None
-    if method == "auto":
-        return "lagrange" if bare else "embedding"
-    if method not in METHODS:
+    if method == "auto" and bare:
+        return "lagrange"
+    if method not in ("auto", *METHODS):
         raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
     if bare and method != "lagrange":
         raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, lagrange")
@@ -68,7 +69,9 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     Parameters
     ----------
     model : Model
-    method : {'auto', 'embedding', 'lagrange'}
+    method : {'auto', 'embedding', 'lagrange', 'recursive'}
+        ``auto`` takes, of a tree, embedding or recursive, whichever has the right-hand side of fewer operations;
+        embedding where there are loops; lagrange of a bare Lagrangian.
     independent : names of coordinates, optional
         The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
 
@@ -81,6 +84,8 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     UsageError
         No such method.
     """
+    from .program.choice import choose
+
     seconds: dict[str, float] = {}
     with _timed(seconds, "describe"):
         mechanism = model.mechanism()
@@ -89,8 +94,14 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
         kinematics = analyse(mechanism, independent or ())
         mobility = _judge(kinematics, independent or ())
     with _without_collection(), _timed(seconds, "equations"):
-        tree = METHODS[chosen](kinematics)
-    return Equations(kinematics, mobility, tree, seconds)
+        choice: Choice | None = None
+        if chosen != "auto":
+            tree = METHODS[chosen](kinematics)
+        elif kinematics.constraints.values:
+            tree = METHODS["embedding"](kinematics)
+        else:
+            tree, choice = choose(kinematics)
+    return Equations(kinematics, mobility, tree, seconds, choice)
 
 
 def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
@@ -136,6 +147,12 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     n, r = len(names), mobility.rank
     if n == r:
         return
+    if tree.pivots:
+        moved = compile_evaluator(list(tree.pivots), (*kinematics.names, *numbers, "t"))
+        for sample in mobility.samples:
+            sizes = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
+            if sizes.min() > 1e-12 * sizes.max():
+                return
     mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
     scales = functions.scales.q
     worst: tuple[float, np.ndarray] | None = None

@@ -57,6 +57,7 @@ def summary(derived: Equations) -> dict[str, Any]:
     return {
         "name": derived.name,
         "method": derived.method,
+        "choice": dict(derived.choice.operations) if derived.choice else None,
         "report": derived.report.to_dict(),
         "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
         "seconds": dict(derived.seconds),
@@ -70,6 +71,8 @@ def print_operations(derived: Equations) -> None:
         [name, *(str(n) for n in (c.multiplications, c.additions, c.divisions, c.total, sum(c.functions.values())))]
         for name, c in derived.operations.items()
     ]
+    if derived.choice:
+        click.echo(str(derived.choice))
     header = ["", "multiply", "add", "divide", "total", "functions"]
     print_table(header, rows, right=range(1, len(header)))
 

@@ -23,7 +23,7 @@ method_option = click.option(
     default="auto",
     show_default=True,
     metavar="M",
-    help="Method of derivation: auto, embedding, lagrange (the integrator's method stands in the model file).",
+    help="Method of derivation: auto, embedding, lagrange, recursive (the integrator stands in the model file).",
 )
 
 

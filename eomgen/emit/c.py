@@ -80,6 +80,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "parent": program.parent,
         "balls": program.balls,
         "coordinate_of": program.coordinate_of,
+        "by_columns": program.by_columns,
         "kernels": [
             {
                 "name": k.name,

@@ -19,6 +19,13 @@ TREES: dict[str, tuple[str, ...]] = {
 }
 
 
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "jacobian": ("columns_jacobian",),
+    "mass_matrix": ("columns_mass", "columns_mass_drive"),
+    "embedded_mass_matrix": ("columns_mass", "columns_mass_embedded"),
+}
+
+
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
@@ -27,7 +34,9 @@ def driver_files(program: Program) -> list[str]:
         space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
         files.update(dict.fromkeys(space if program.balls else ("space_plain",)))
     for driver in program.drivers:
-        if not program.has_loops:
+        if program.by_columns:
+            needed = COLUMNS[driver.name]
+        elif not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
         elif driver.name == "jacobian":
             needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian")

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .core import Expr
+from .substitute import symbols_of
 from .traverse import common_graph, reachable
 
 Value = Any  # float or ndarray
@@ -254,4 +255,6 @@ def evaluate(outputs: Sequence[Expr], values: Mapping[str, Value]) -> list[Value
     UsageError
         A symbol has no value.
     """
-    return Evaluator(outputs, list(values))(values)
+    used = symbols_of(outputs)  # of many values a small expression needs few
+    needed = {name: value for name, value in values.items() if name in used}
+    return Evaluator(outputs, list(needed))(needed)

@@ -13,6 +13,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from .inertia import SpatialInertia, body_inertia
 from .topology import Topology
 
 Twist = tuple[Vec3, Vec3]
@@ -37,6 +38,7 @@ class Link:
     mass: Expr
     com: Vec3  #: centre of mass, link axes
     inertia: Mat3  #: about the centre of mass, link axes
+    spatial: SpatialInertia  #: about the link's origin, link axes
     frame: Frame  #: the link frame in the body
 
     def down(self, x: Vec3) -> Vec3:
@@ -95,6 +97,7 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
                 mass=body.mass,
                 com=vec.times(back, vec.sub(body.com, frame.position)),
                 inertia=vec.product(back, vec.product(body.inertia, frame.rotation)),
+                spatial=body_inertia(body, frame),
                 frame=frame,
             )
         )

@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import factorize, positivity, solve
+from .factor import exceeding, factorize, positivity, solve
 from .kernels import KERNELS, Sizes
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
@@ -38,7 +38,8 @@ class BlockMaker:
     @property
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
-        return not self.has_loops and self.sizes.n_v <= self.limits.unrolled
+        small = self.sizes.n_v <= self.limits.unrolled
+        return not self.has_loops and (small or self.terms.accelerations is not None)
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:
@@ -57,6 +58,11 @@ class BlockMaker:
     def _accelerations(self) -> tuple[list[Expr], list[Expr]]:
         """v' of a tree in terms of (q, v), and the conditions for it to exist."""
         terms = self.terms
+        if terms.accelerations is not None and terms.pivots:
+            pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
+            zero = terms.graph.zero
+            one = [terms.graph.apply("lt", zero, d) for d in pivots]
+            return list(terms.accelerations), one if len(pivots) == 1 else exceeding(pivots, pivots)
         factor = factorize(terms.mass_matrix, terms.parent)
         checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
         return solve(factor, [-h for h in terms.bias]), checks
@@ -113,8 +119,9 @@ class BlockMaker:
         }
         return Port(name, symbols[name])
 
-    def _internal(self, name: str, ports: str, outputs: Sequence[Expr]) -> Block:
-        return Block(name, tuple(map(self.port, ports.split())), tuple(outputs), (len(outputs),), public=False)
+    def _internal(self, name: str, ports: str, outputs: Sequence[Expr], checks: Sequence[Expr] = ()) -> Block:
+        inputs = tuple(map(self.port, ports.split()))
+        return Block(name, inputs, tuple(outputs), (len(outputs),), tuple(checks), public=False)
 
     def public(self, name: str) -> Block | None:
         """The public kernel of this name if it is straight-line code for this system, else None."""
@@ -142,6 +149,8 @@ class BlockMaker:
             "kinematics": lambda: self._symbols((*terms.q, *terms.v, *terms.a)),
         }
         checks: list[Expr] = []
+        if terms.by_columns and name in ("mass_matrix", "embedded_mass_matrix"):
+            return None
         if name in always:
             outputs = always[name]()
         elif name in trees and not self.has_loops:
@@ -162,6 +171,8 @@ class BlockMaker:
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
+        if self.terms.by_columns:
+            return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
             terms = ("mass_matrix", "bias", "scales")
             return {
@@ -197,12 +208,22 @@ class BlockMaker:
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self._residual_jacobian())
+            case "mass_times":  # M a
+                along = {a: a for a in self._symbols(terms.a)}
+                return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
+            case "acceleration_tangent":  # dv' along (dq, dv)
+                accelerations, checks = self._accelerations
+                return self._internal(name, "q v dq dv", jvp(accelerations, self._directions), checks)
             case "residual_tangent":  # dr1, dr2, dr3 along (dq, dv)
                 residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
-                seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
-                along = dict(zip(self._symbols((*terms.q, *terms.v)), self._symbols(seeds), strict=True))
-                return self._internal(name, "q v a multipliers dq dv", jvp(residuals, along))
+                return self._internal(name, "q v a multipliers dq dv", jvp(residuals, self._directions))
         raise KeyError(name)
+
+    @property
+    def _directions(self) -> dict[Expr, Expr]:
+        """q and v -> the symbols of their changes."""
+        seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
+        return dict(zip(self._symbols((*self.terms.q, *self.terms.v)), self._symbols(seeds), strict=True))
 
     def _residual_jacobian(self) -> list[Expr]:
         terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero

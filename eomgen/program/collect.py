@@ -14,6 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
+from .program import Limits
 from .soundness import flag_forces
 from .terms import SystemTerms
 
@@ -23,6 +24,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
     c, loop = kinematics.constraints, kinematics.loop_coordinates
     names = kinematics.names
     length = kinematics.length_scale
+    by_columns = equations.accelerations is not None and len(kinematics.v) > Limits().unrolled
     scale = {"length": length, "angle": kinematics.graph.one}
     return SystemTerms(
         graph=kinematics.graph,
@@ -33,7 +35,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         multipliers=tuple(f"lambda[{i}]" for i in range(len(c.labels))),
         u=kinematics.input_names,
         p=kinematics.parameter_names,
-        mass_matrix=equations.mass_matrix,
+        mass_matrix=() if by_columns else equations.mass_matrix,
         bias=equations.bias,
         inverse_dynamics=equations.inverse_dynamics,
         kinetic=equations.kinetic_energy,
@@ -57,6 +59,8 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         balls=kinematics.balls,
         rates=kinematics.rates if kinematics.balls else (),
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
+        accelerations=equations.accelerations,
+        pivots=equations.pivots,
     )
 
 

@@ -84,9 +84,15 @@ def positivity(matrix: Sequence[Sequence[Expr]], factor: Factor, scales: Sequenc
     if len(matrix) == 1:
         return [graph.apply("lt", 0.0, matrix[0][0])]
     squares = [s * s for s in scales]
-    largest, *rest = (matrix[i][i] * squares[i] for i in range(len(matrix)))
+    sizes = [matrix[i][i] * squares[i] for i in range(len(matrix))]
+    return exceeding([d * s for d, s in zip(factor.pivots, squares, strict=True)], sizes)
+
+
+def exceeding(pivots: Sequence[Expr], sizes: Sequence[Expr]) -> list[Expr]:
+    """Conditions (each 1.0 or 0.0): each pivot exceeds 1e-13 of the largest size."""
+    graph = pivots[0].graph
+    largest, *rest = sizes
     for entry in rest:  # plain comparison, not "max": NaN is caught with the result, and this is one instruction
         largest = graph.apply("select", graph.apply("lt", largest, entry), entry, largest)
     limit = largest * SINGULAR
-    conditions = [graph.apply("lt", limit, d * s) for d, s in zip(factor.pivots, squares, strict=True)]
-    return conditions
+    return [graph.apply("lt", limit, d) for d in pivots]

@@ -158,7 +158,12 @@ class Program:
     @property
     def composes_terms(self) -> bool:
         """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
-        return not self.has_loops and bool(self.drivers)
+        return not self.has_loops and bool(self.drivers) and not self.by_columns
+
+    @property
+    def by_columns(self) -> bool:
+        """Whether drivers make the mass matrix and the Jacobian of a tree column by column."""
+        return not self.block_names.isdisjoint(("mass_times", "acceleration_tangent"))
 
     @property
     def kernels(self) -> tuple[Block | Driver, ...]:

@@ -28,7 +28,7 @@ class SystemTerms:
     u: tuple[str, ...]  #: inputs
     p: tuple[str, ...]  #: parameters
 
-    mass_matrix: tuple[Row, ...]  #: (n, n) of q
+    mass_matrix: tuple[Row, ...]  #: (n, n) of q; none where it is made column by column from the inverse dynamics
     bias: Row  #: (n,) h of (q, v): M a + h = 0 for a tree
     inverse_dynamics: Row  #: (n,) M a + h of (q, v, a)
     kinetic: Expr  #: T of (q, v)
@@ -58,6 +58,9 @@ class SystemTerms:
     #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
     finite_forces: Row = ()  #: (n_e,) of (q, v): 1 where a force element's loads are finite, else 0
 
+    accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
+    pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
+
     @property
     def n_v(self) -> int:
         """Number of velocities."""
@@ -86,6 +89,11 @@ class SystemTerms:
         """Number of coordinates of cut joints."""
         return len(self.loop_coordinate_jacobian)
 
+    @property
+    def by_columns(self) -> bool:
+        """Whether the mass matrix is not written out: entries would be many, and nothing but itself needs them."""
+        return self.accelerations is not None and self.n_v > 0 and not self.mass_matrix
+
     def check_shapes(self) -> None:
         """Refuse terms whose sizes contradict each other.
 
@@ -99,7 +107,7 @@ class SystemTerms:
             "q": (len(self.q), n + len(self.balls)),
             "a": (len(self.a), n),
             "multipliers": (len(self.multipliers), m),
-            "mass_matrix": (len(self.mass_matrix), n),
+            "mass_matrix": (len(self.mass_matrix), 0 if self.by_columns else n),
             "bias": (len(self.bias), n),
             "inverse_dynamics": (len(self.inverse_dynamics), n),
             "constraint_jacobian": (len(self.constraint_jacobian), m),
@@ -112,6 +120,8 @@ class SystemTerms:
             "constraint_scales": (len(self.constraint_scales), m),
             "preferred": (len(self.preferred), self.n_dof),
             "parent": (len(self.parent), n),
+            "accelerations": (n if self.accelerations is None else len(self.accelerations), n),
+            "pivots": (len(self.pivots), 0 if self.accelerations is None else n),
         }
         wrong = [f"{field} has {given} entries, {expected} expected" for field, (given, expected) in sizes.items()
                  if given != expected]  # fmt: skip

@@ -57,8 +57,12 @@ class Drivers:
             names = [n for n in names if n not in ("rhs", "jacobian", "project", "outputs", "kinematics")]
         if "terms" not in blocks and "rhs" not in blocks:
             names = [n for n in names if n != "outputs"]
-        if "terms" not in blocks and (loops or "mass_matrix" not in blocks):
+        if "mass_times" in blocks:
+            names += ["mass_matrix", "embedded_mass_matrix"]
+        elif "terms" not in blocks and (loops or "mass_matrix" not in blocks):
             names = [n for n in names if n != "embedded_mass_matrix"]
+        if "acceleration_tangent" in blocks:
+            names.append("jacobian")
         if loops and "terms" not in blocks:
             names = [n for n in names if n != "kinematics"]
         self.names = tuple(names)
@@ -71,9 +75,9 @@ class Drivers:
 
     def singular(self, name: str, t: float, x: Array, u: Array, c: Array) -> int:
         """The status of a result that is not finite: 2 if a singular mass matrix is why, else 1."""
-        if name in ("rhs", "jacobian", "outputs") and "mass_matrix" in self.blocks and not self.layout.n_c:
-            n = self.layout.n_v
-            M = np.asarray(self.blocks["mass_matrix"](t, x[: self.layout.n_q], u, c), dtype=float).reshape(n, n)
+        known = "mass_matrix" in self.blocks or "mass_times" in self.blocks
+        if name in ("rhs", "jacobian", "outputs") and known and not self.layout.n_c:
+            M = self._matrix(t, x[: self.layout.n_q], u, c)
             if np.isfinite(M).all() and np.linalg.eigvalsh(M)[0] <= embedded.SINGULAR * M.diagonal().max():
                 return 2
         return 1
@@ -134,13 +138,30 @@ class Drivers:
 
     def _jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, layout = self.layout.n_q, self.layout
+        if "acceleration_tangent" in self.blocks:
+            unit, space = np.eye(layout.n_x), layout.space
+            along = np.vstack([np.repeat(x[:, None], layout.n_x, axis=1), unit])
+            changes = np.asarray(self.blocks["acceleration_tangent"](t, along, u, c), dtype=float)
+            dq, dv = unit[:n], unit[n:]
+            return np.vstack([dv if space is None else space.change(x[:n], dq, x[n:, None], dv), changes])
         terms, position, rate = self._bound(t, u, c)
         residuals = partial(self.residuals, t, u, c)
         return embedded.jacobian(
             terms, residuals, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent
         )
 
+    def _matrix(self, t: float, q: Array, u: Array, c: Array) -> Array:
+        """M, written out or column by column."""
+        n = self.layout.n_v
+        if "mass_matrix" in self.blocks:
+            return np.asarray(self.blocks["mass_matrix"](t, q, u, c), dtype=float).reshape(n, n)
+        return self._mass_matrix(t, q, u, c)
+
     def _mass_matrix(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        if "mass_times" in self.blocks:
+            columns = np.vstack([np.repeat(x[:, None], self.layout.n_v, axis=1), np.eye(self.layout.n_v)])
+            M = np.asarray(self.blocks["mass_times"](t, columns, u, c), dtype=float)
+            return np.asarray(np.triu(M) + np.triu(M, 1).T)
         return self.terms(t, u, c, x, np.zeros(self.layout.n_v)).M
 
     def _bias(self, t: float, x: Array, u: Array, c: Array) -> Array:
@@ -148,10 +169,7 @@ class Drivers:
 
     def _embedded_mass_matrix(self, t: float, x: Array, u: Array, c: Array) -> Array:
         layout = self.layout
-        if "mass_matrix" in self.blocks:
-            M = np.asarray(self.blocks["mass_matrix"](t, x, u, c), dtype=float).reshape(layout.n_v, layout.n_v)
-        else:
-            M = self._mass_matrix(t, x, u, c)
+        M = self._matrix(t, x, u, c)
         C_q = self.position(t, u, c, x)[1]
         return embedded.embedded_mass(M, C_q, self.scales(c), layout.rank, layout.independent)
 

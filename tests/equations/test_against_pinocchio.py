@@ -89,3 +89,23 @@ def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
             assert np.abs(number(pose.position) - data.oMf[index].translation).max() <= 1e-13 * 10
             rotation = number(x for row in pose.rotation for x in row).reshape(3, 3)
             assert np.abs(rotation - data.oMf[index].rotation).max() <= 1e-14 * 10
+
+
+@pytest.mark.parametrize("planar", [False, True])
+@pytest.mark.parametrize("seed", range(30))
+def test_articulated_bodies_equal_pinocchio(seed: int, planar: bool) -> None:
+    made = random_mechanism(seed, bodies=1 + seed % 8, planar=planar, forces=False)
+    kinematics = analyse(made.mechanism)
+    tree = METHODS["recursive"](kinematics)
+    assert tree.accelerations is not None
+    model, _ = pinocchio_model(made, [b.body for b in kinematics.topology.branches])
+    data, n = model.createData(), model.nv
+    q, v = np.random.default_rng(seed).uniform(-1, 1, (2, n))
+    values = {"t": 0.0} | dict(zip(kinematics.names, q.tolist(), strict=True))
+    values |= dict(zip([name + "_dot" for name in kinematics.names], v.tolist(), strict=True))
+    expected = pin.aba(model, data, q, v, np.zeros(n))
+    mass = pin.crba(model, data, q)
+    condition = np.linalg.cond(np.triu(mass) + np.triu(mass, 1).T)
+    accelerations = np.array(evaluate(list(tree.accelerations), values), dtype=float)
+    assert np.abs(accelerations - expected).max() <= 1e-12 * max(1.0, condition / 1e3) * np.abs(expected).max()
+    assert np.array(evaluate(list(tree.pivots), values), dtype=float).min() > 0.0

@@ -1,0 +1,42 @@
+"""Stage kinematics: resolved force elements -> their wrenches on links and their forces along coordinates."""
+
+from __future__ import annotations
+
+from ..frames import GROUND
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from .inertia import Wrench
+from .kinematics import Kinematics
+
+
+def applied_wrenches(kinematics: Kinematics) -> list[Wrench]:
+    """Force elements' wrench on each link, about its origin in link axes."""
+    graph, poses = kinematics.graph, kinematics.poses
+    total: list[Wrench] = [(vec.zero(graph), vec.zero(graph)) for _ in kinematics.links]
+    for terms in kinematics.forces:
+        for load in terms.marker_loads:
+            if load.marker.body == GROUND:
+                continue
+            k = poses.link_of[load.marker.body]
+            rotation = poses.link(k).rotation
+            push = vec.transpose_times(rotation, load.force)
+            turn = vec.transpose_times(rotation, load.torque)
+            arm = poses.marker_in_link(load.marker).position
+            total[k] = vec.add(total[k][0], vec.add(turn, vec.cross(arm, push))), vec.add(total[k][1], push)
+    return total
+
+
+def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
+    """Force elements along coordinates, those of cut joints through their y_q."""
+    graph, loop = kinematics.graph, kinematics.loop_coordinates
+    total = [graph.zero] * len(kinematics.v)
+    place = {name: j for j, name in enumerate(kinematics.freedoms)}
+    for terms in kinematics.forces:
+        for load in terms.coordinate_loads:
+            if load.coordinate in place:
+                j = place[load.coordinate]
+                total[j] = total[j] + load.value
+            else:
+                row = loop.jacobian[loop.names.index(load.coordinate)]
+                total = [f + load.value * entry for f, entry in zip(total, row, strict=True)]
+    return total
