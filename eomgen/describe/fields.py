@@ -53,6 +53,8 @@ KINDS = {
     "joint": "the name of a joint, or of one coordinate of a joint",
     "axis": "x, y, z, -x, -y, -z or three numbers",
     "choice": "one of the listed words",
+    "limits": "a mapping of lower, upper, velocity and effort to numbers",
+    "display": "a list of shapes {shape, ...}",
     "forces": "a mapping of coordinates to expressions, or a list of one expression for each coordinate",
     "table": "a mapping",
 }
@@ -84,13 +86,30 @@ MARKER: Fields = {
     "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0)),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
+SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
+DISPLAY: Fields = {
+    "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
+    "file": Field("text", "file of a mesh, as the robot's file names it; it is not read"),
+    "scale": Field("vector", "scale of a mesh"),
+    "size": Field("vector", "edges of a box (m)"),
+    "radius": Field("number", "radius (m)"),
+    "length": Field("number", "length along z (m)"),
+    **MARKER,
+}
+LIMITS: Fields = {
+    "lower": Field("number", "least value (rad or m)"),
+    "upper": Field("number", "greatest value (rad or m)"),
+    "velocity": Field("number", "greatest speed (rad/s or m/s)"),
+    "effort": Field("number", "greatest torque or force of the drive (N m or N)"),
+}
 BODY: Fields = {
     "mass": Field("expression", "mass (kg); 0 for a body without mass", required=True),
     "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0)),
     "inertia": Field("inertia", "inertia about the centre of mass in body axes (kg m^2)", default=(0, 0, 0)),
     "markers": Field("markers", "named frames fixed in the body", default=()),
+    "display": Field("display", "shapes to draw, in body axes; data only", default=()),
 }
-GROUND: Fields = {"markers": BODY["markers"]}
+GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
 JOINT: Fields = {
     "type": Field("choice", "type of the joint", required=True, choices=tuple(JOINTS)),
@@ -99,6 +118,12 @@ JOINT: Fields = {
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
 COORDINATES = Field("names", "names of the coordinates, in order")
+#: Data of a joint that has coordinates; the last only where it has one.
+JOINT_DATA: Fields = {
+    "limits": Field("limits", "limits of the coordinate; data only"),
+    "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
+    "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
+}
 JOINT_OPTIONS: Fields = {
     "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
 }
@@ -196,6 +221,9 @@ def joint_fields(type_name: str) -> Fields:
         fields["coordinate"] = COORDINATE
     if joint.coordinates:
         fields["coordinates"] = COORDINATES
+        fields["limits"] = JOINT_DATA["limits"]
+    if len(joint.coordinates) == 1:
+        fields |= JOINT_DATA
     for option in joint.options:
         fields[option] = JOINT_OPTIONS.get(option, Field("text", option))
     return fields

@@ -159,7 +159,14 @@ class Model(JointMethods, ForceMethods):
         return symbol("potential_energy")
 
     # -- bodies ---------------------------------------------------------------------------------------------------
-    def body(self, name: str, mass: Value = None, com: Vector = (0, 0, 0), inertia: Any = (0, 0, 0)) -> BodyHandle:
+    def body(
+        self,
+        name: str,
+        mass: Value = None,
+        com: Vector = (0, 0, 0),
+        inertia: Any = (0, 0, 0),
+        display: Sequence[Mapping[str, Any]] = (),
+    ) -> BodyHandle:
         """Add a rigid body.
 
         Parameters
@@ -173,6 +180,8 @@ class Model(JointMethods, ForceMethods):
         inertia : sequence of three, 3 x 3 tensor or mapping, optional
             About the centre of mass in body axes (kg m^2): ``(xx, yy, zz)``, a tensor, or a mapping of ``xx`` .. ``yz``
             with the tensor's own sign; what is missing is 0.
+        display : sequence of mappings, optional
+            Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
 
         Returns
         -------
@@ -181,6 +190,8 @@ class Model(JointMethods, ForceMethods):
         values: dict[str, Any] = {"com": com, "inertia": inertia}
         if mass is not None:
             values = {"mass": mass, **values}
+        if display:
+            values["display"] = list(display)
         return BodyHandle(self, name, self._description.add("bodies", name, values))
 
     @property
@@ -255,6 +266,11 @@ class Model(JointMethods, ForceMethods):
     def description(self) -> Description:
         """The raw data, in the layout of the model file."""
         return self._description
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What an import left out or changed, one sentence each."""
+        return tuple(self._description.notes)
 
     def mechanism(self) -> Mechanism:
         """Check the model and lower it to one graph.

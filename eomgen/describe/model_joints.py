@@ -39,7 +39,7 @@ class JointMethods:
         predecessor, successor : handle or str
             Bodies or markers.
         **keys
-            Whatever the type knows: axis, coordinate, coordinates, sequence.
+            Whatever the type knows: axis, coordinate, coordinates, sequence; limits, dry_friction, armature.
 
         Returns
         -------
@@ -52,16 +52,34 @@ class JointMethods:
         return JointHandle(model, entry)
 
     def revolute(
-        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinate: Any = None,
+        limits: Any = None,
+        dry_friction: Any = None,
+        armature: Any = None,
     ) -> JointHandle:
         """Add a joint that turns about an axis; see :meth:`joint`."""
-        return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate)
+        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
+        return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def prismatic(
-        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinate: Any = None,
+        limits: Any = None,
+        dry_friction: Any = None,
+        armature: Any = None,
     ) -> JointHandle:
         """Add a joint that slides along an axis; see :meth:`joint`."""
-        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate)
+        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
+        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def cylindrical(
         self,

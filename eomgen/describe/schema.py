@@ -8,10 +8,13 @@ from ..joints import JOINTS
 from .fields import (
     AXES,
     BODY,
+    DISPLAY,
     FORCE,
+    GROUND,
     INERTIA,
     INPUT,
     LAGRANGIAN,
+    LIMITS,
     MARKER,
     MODEL,
     ONE_OF,
@@ -63,6 +66,8 @@ def _definitions() -> Schema:
             ]
         },
         "names": {"type": "array", "items": _ref("name")},
+        "limits": _object({key: _each(field) for key, field in LIMITS.items()}),
+        "display": {"type": "array", "items": _table(DISPLAY)},
     }
 
 
@@ -81,6 +86,8 @@ _KINDS: dict[str, Schema] = {
     "inertia": _ref("inertia"),
     "markers": _ref("markers"),
     "marker": _ref("marker"),
+    "limits": _ref("limits"),
+    "display": _ref("display"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
     "forces": {
@@ -98,6 +105,12 @@ def _field(field: Field) -> Schema:
         default = field.default
         schema["default"] = list(default) if isinstance(default, tuple) else default
     return {**schema, "description": field.doc}
+
+
+def _each(field: Field) -> Schema:
+    """A number for the coordinate, or a list of one for each of several coordinates."""
+    number = {"type": ["number", "string", "null"]}
+    return {"anyOf": [number, {"type": "array", "items": number}], "description": field.doc}
 
 
 def _object(properties: Schema, required: list[str] | None = None) -> Schema:
@@ -162,7 +175,7 @@ def model_schema() -> dict[str, Any]:
         "initial": {**values, "description": MODEL["initial"].doc},
         "guess": {**values, "description": MODEL["guess"].doc},
     }
-    sections["bodies"]["properties"] = {"ground": _table({"markers": BODY["markers"]})}
+    sections["bodies"]["properties"] = {"ground": _table(GROUND)}
     properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

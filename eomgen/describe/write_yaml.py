@@ -35,7 +35,7 @@ def yaml_text(description: Description) -> str:
     UsageError
         An expression or value has no form in a model file.
     """
-    lines: list[str] = []
+    lines = [f"# {' '.join(note.split())}" for note in description.notes]
     for key in MODEL:
         if key in SECTIONS:
             lines += _section(key, description)

@@ -1,11 +1,12 @@
 """Stage equations: Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
 from . import embedding, lagrange
+from .armature import with_armature
 from .equations import Method, TreeEquations
 
 METHODS: dict[str, Method] = {
-    "embedding": embedding.derive,
-    "lagrange": lagrange.derive,
+    "embedding": with_armature(embedding.derive),
+    "lagrange": with_armature(lagrange.derive),
 }
 
 __all__ = ["METHODS", "Method", "TreeEquations"]

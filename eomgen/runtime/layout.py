@@ -61,6 +61,7 @@ class Layout:
         self.loop_scales = np.where(self.loop_angles, 1.0, self.length)
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
+        self.limits: dict[str, dict[str, float]] = data.get("limits", {})
         reference = data.get("q_reference")
         self.q_reference = np.zeros(self.n_q) if reference is None else np.array(reference, dtype=float)
 
