@@ -50,7 +50,7 @@ class Description:
     notes : list of str
         What an import left out or changed.
     renamed : dict
-        Name in an imported file -> name in the model, where they differ.
+        Section -> name in an imported file -> name in the model, where they differ.
     """
 
     values: Values = field(default_factory=dict)
@@ -59,7 +59,7 @@ class Description:
     lines: dict[str, tuple[str, int]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    renamed: dict[str, str] = field(default_factory=dict)
+    renamed: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def add(self, section: str, name: Any, values: Values) -> Entry:
         """Append an entry to a section."""

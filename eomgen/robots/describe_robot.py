@@ -57,10 +57,9 @@ class _Writer:
         self._loops()
         self._mimics()
         self._drives()
-        if self.names.renamed:
-            shown = ", ".join(f"{old!r} is {new}" for old, new in self.names.renamed.items())
-            self.out.notes.append(f"renamed: {shown}")
-        self.out.renamed = dict(self.names.renamed)
+        for section, names in self.names.renamed.items():
+            self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
+        self.out.renamed = self.names.renamed
         return self.out
 
     def _add(self, section: str, name: str, values: Values, place: tuple[str, int]) -> None:
@@ -182,7 +181,10 @@ class _Writer:
             remedy = "mimic='coupling' ties them"
             self.out.notes.append(f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}")
         if ties and "constraints" not in SECTIONS:
-            raise UsageError("couplings of joints need the model section constraints, which this version has not")
+            if self.options.mimic == "coupling":
+                raise UsageError("couplings of joints need the model section constraints, which this version has not")
+            self.out.notes.append(f"left out: couplings of joints ({', '.join(name for name, *_ in ties)})")
+            ties = []
         for name, joint_name, law, place in ties:
             self._coupling(name, joint_name, law, place)
 
@@ -205,17 +207,20 @@ class _Writer:
         self._add("constraints", self.names.link(name), values, place)
 
     def _drives(self) -> None:
-        for drive in self.robot.drives:
-            q = self.joints[drive.joint]
-            u = self.names.symbol(drive.name)
-            self._add("inputs", u, {"value": 0.0}, drive.place)
-            gear, (b0, b1, b2) = drive.gear, drive.bias
-            terms = [(gear * drive.gain, u), (gear * gear * b1, q), (gear * gear * b2, f"{q}_dot")]
-            text = " + ".join(f"({k!r})*{what}" for k, what in terms if k)
-            if b0:
-                text = f"{text} + ({gear * b0!r})" if text else repr(gear * b0)
-            name = self.names.link(f"{u}_drive")
-            self._add("forces", name, {"type": "actuator", "joint": q, "value": text or 0}, drive.place)
+        for k, drive in enumerate(self.robot.drives):
+            parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
+            fixed = sum(c * self.options.locked.get(joint, 0.0) for joint, c in drive.parts)
+            b0, b1, b2 = drive.bias
+            terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
+            name = f"tendon_{k}"
+            if drive.name:
+                name = self.names.symbol(drive.name)
+                self._add("inputs", name, {"value": 0.0}, drive.place)
+                terms.insert(0, (drive.gain, name))
+            law = " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
+            for q, c in parts if law else ():
+                force = self.names.link(f"{name}_drive")
+                self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
 
 
 def _axis(axis: tuple[float, float, float]) -> Any:

@@ -21,23 +21,23 @@ class Names:
 
     def __init__(self) -> None:
         self.taken: dict[str, set[str]] = {"link": {"ground"}, "joint": set(), "symbol": set()}
-        self.renamed: dict[str, str] = {}
+        self.renamed: dict[str, dict[str, str]] = {}  # section of the model -> old name -> new
 
     def link(self, name: str) -> str:
         """The name of a body or marker."""
-        return self._note(name, self._fresh(name, "link", ("",)))
+        return self._note("bodies", name, self._fresh(name, "link", ("",)))
 
     def joint(self, name: str, suffixes: Sequence[str]) -> str:
         """The name of a joint whose coordinates are that name with these suffixes."""
-        return self._note(name, self._fresh(name, "joint", suffixes))
+        return self._note("joints", name, self._fresh(name, "joint", suffixes))
 
     def symbol(self, name: str) -> str:
         """The name of a parameter or an input."""
-        return self._note(name, self._fresh(name, "symbol", ("",)))
+        return self._note("inputs", name, self._fresh(name, "symbol", ("",)))
 
-    def _note(self, name: str, given: str) -> str:
+    def _note(self, section: str, name: str, given: str) -> str:
         if given != name:
-            self.renamed[name] = given
+            self.renamed.setdefault(section, {})[name] = given
         return given
 
     def _fresh(self, name: str, kind: str, suffixes: Sequence[str]) -> str:

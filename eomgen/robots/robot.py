@@ -117,11 +117,13 @@ class Loop:
 
 @dataclass(frozen=True)
 class Drive:
-    """An input u that pushes along a joint's coordinate q: gear (gain u + b0 + b1 gear q + b2 gear q')."""
+    """A drive along L = sum c_j q_j: the force f = gain u + b0 + b1 L + b2 L' pushes c_j f along q_j.
+
+    ``parts`` holds joints and their c_j; without a name there is no input u.
+    """
 
     name: str
-    joint: str
-    gear: float
+    parts: tuple[tuple[str, float], ...]
     gain: float
     bias: tuple[float, float, float]
     place: Place

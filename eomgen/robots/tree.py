@@ -81,7 +81,7 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
         found.home[link.name] = body, frame
         waiting.extend(reversed(carried.get(link.name, ())))
     if len(found.bodies) == 1:
-        robot.problem("robot", "no link can move", "load it with floating=True, or --floating", (robot.file, 1))
+        robot.problem("robot", "no link can move", "give it joints; the base of a URDF robot floats with floating=True, or --floating", (robot.file, 1))
     _check_masses(robot, found)
     if robot.problems:
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))

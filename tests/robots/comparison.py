@@ -22,8 +22,7 @@ class Compiled:
 
     def __call__(self, s: State) -> dict[str, np.ndarray]:
         m = self.module
-        inputs = dict(zip(m.q_names, s.tau, strict=True))
-        u = np.array([inputs[name.removeprefix("tau_")] for name in m.u_names])
+        u = np.array([s.u[name] for name in m.u_names])
         still, x = np.zeros(m.n_u), np.concatenate([s.q, s.v])
         return {
             "M": m.mass_matrix(s.q),
@@ -78,8 +77,9 @@ def largest_differences(model: Any, run: Any, states: list[State]) -> dict[str, 
             "com": float(np.abs(centre_of_mass(model, ours["poses"], run.body_names) - s.com).max()),
             "frames": 0.0,
         }
-        assert set(frames) <= set(s.frames)
-        for link, (body, at) in frames.items():
+        assert set(s.frames) <= set(frames)
+        for link in s.frames:
+            body, at = frames[link]
             pose = at if body is None else ours["poses"][run.body_names.index(body)] @ at
             found["frames"] = max(found["frames"], float(np.abs(pose - s.frames[link]).max()))
         worst = {name: max(worst.get(name, 0.0), value) for name, value in found.items()}

@@ -24,6 +24,7 @@ class State:
     acceleration: np.ndarray
     frames: dict[str, np.ndarray]
     com: np.ndarray
+    u: dict[str, float]  #: inputs; ``tau`` is what they make
 
 
 class Judge:
@@ -39,7 +40,7 @@ class Judge:
             self.pin = pin.buildModelFromUrdf(str(path))
         self.data = self.pin.createData()
         self.model = model
-        renamed = model.description.renamed
+        renamed = model.renamed.get("joints", {})
         self.velocities: dict[str, int] = {}
         for joint, name in list(zip(self.pin.joints, self.pin.names, strict=True))[1:]:
             if name == "root_joint":
@@ -60,6 +61,7 @@ class Judge:
         model, data = self.pin, self.data
         v, a, tau = 3 * v, 5 * a, 10 * tau
         tau = np.where([name in self.actuated for name in self.names_of(order)], tau, 0.0)
+        u = {f"tau_{name}": x for name, x in zip(self.names_of(order), tau.tolist(), strict=True) if name in self.actuated}
         turned, theirs = np.zeros(model.nv), np.zeros((3, model.nv))
         turned[order] = q
         theirs[:, order] = v, a, tau
@@ -83,7 +85,7 @@ class Judge:
             if frame.type == pin.FrameType.BODY
         }
         com = pin.centerOfMass(model, data, pq).copy()
-        return State(q, v, a, tau, M[np.ix_(order, order)], bias[order], inverse[order], forward[order], frames, com)
+        return State(q, v, a, tau, M[np.ix_(order, order)], bias[order], inverse[order], forward[order], frames, com, u)
 
     @property
     def actuated(self) -> set[str]:
@@ -99,7 +101,7 @@ class Judge:
 
 def link_frames(model: Any) -> dict[str, tuple[str | None, np.ndarray]]:
     """Link of the file -> our body (None for ground) and the frame in it (4, 4), read from the description."""
-    back = {new: old for old, new in model.description.renamed.items()}
+    back = {new: old for old, new in model.renamed.get("bodies", {}).items()}
     found: dict[str, tuple[str | None, np.ndarray]] = {}
     for entry in model.description.sections["bodies"]:
         body = None if entry.name == "ground" else entry.name
