@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .failures import reports_failures
-from .options import json_option, load_model, model_argument
+from .options import json_option, load_model, model_argument, robot_options
 from .screen import print_json
 
 
@@ -29,15 +30,16 @@ def _print_schema(context: click.Context) -> None:
     callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
     help="Print the JSON Schema of model files, for editors, and stop.",
 )
+@robot_options
 @reports_failures
-def check(model: Path, as_json: bool) -> None:
+def check(model: Path, as_json: bool, robot: dict[str, Any]) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """
     from .. import pipeline
 
-    report = pipeline.check(load_model(model))
+    report = pipeline.check(load_model(model, robot))
     if as_json:
         print_json(report.to_dict())
     else:

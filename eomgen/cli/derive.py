@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .failures import reports_failures
-from .options import blaming_option, independent_option, json_option, load_model, method_option, model_argument
+from .options import (
+    blaming_option,
+    independent_option,
+    json_option,
+    load_model,
+    method_option,
+    model_argument,
+    robot_options,
+)
 from .screen import print_heading, print_json, print_table, stage
 
 if TYPE_CHECKING:
@@ -21,8 +29,11 @@ if TYPE_CHECKING:
 @independent_option
 @click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
 @json_option
+@robot_options
 @reports_failures
-def derive(model: Path, method: str, independent: tuple[str, ...], equations: bool, as_json: bool) -> None:
+def derive(
+    model: Path, method: str, independent: tuple[str, ...], equations: bool, as_json: bool, robot: dict[str, Any]
+) -> None:
     """Derive the equations of motion; parameters need no values.
 
     Prints the mechanism and the operations of each part of the equations.
@@ -30,7 +41,7 @@ def derive(model: Path, method: str, independent: tuple[str, ...], equations: bo
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        derived = pipeline.derive(load_model(model), method, independent or None)
+        derived = pipeline.derive(load_model(model, robot), method, independent or None)
         parts |= derived.seconds
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))

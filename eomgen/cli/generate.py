@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,6 +15,7 @@ from .options import (
     load_model,
     method_option,
     model_argument,
+    robot_options,
     target_option,
 )
 from .screen import print_json, stage
@@ -28,13 +30,16 @@ from .screen import print_json, stage
 @independent_option
 @target_option("c", "cython", "numpy")
 @json_option
+@robot_options
 @reports_failures
-def generate(model: Path, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool) -> None:
+def generate(
+    model: Path, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool, robot: dict[str, Any]
+) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
     from .. import pipeline
 
     with blaming_option(independent), stage("generate"):
-        folder = pipeline.generate(load_model(model), out, method, target, independent or None)
+        folder = pipeline.generate(load_model(model, robot), out, method, target, independent or None)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})

@@ -32,7 +32,7 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
     n = len(kinematics.v)
     mass = [list(row) for row in tree.mass_matrix]
     bias, inverse, kinetic = list(tree.bias), list(tree.inverse_dynamics), tree.kinetic_energy
-    still = {a: graph.zero for a in kinematics.a}
+    still = dict.fromkeys(kinematics.a, graph.zero)
     for name, inertia in drives:
         if name in kinematics.names:
             k = kinematics.names.index(name)

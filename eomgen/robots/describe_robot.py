@@ -121,6 +121,9 @@ class _Writer:
             values["axis"] = _axis(joint.axis)
         if joint.type in ("free", "spherical") and self.options.rotation != "euler_angles":
             values["rotation"] = self.options.rotation
+        names = [name + c.suffix for c in kind.coordinates]
+        if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
+            values |= {"coordinate": names[0]} if len(names) == 1 else {"coordinates": names}
         if joint.limits:
             values["limits"] = dict(joint.limits)
         if joint.dry_friction:
@@ -133,9 +136,8 @@ class _Writer:
         if joint.stiffness:
             self._spring(joint)
         if joint.initial:
-            coordinates = [name + c.suffix for c in kind.coordinates]
             start = self.out.values.setdefault("initial", {})
-            start.update({c: x for c, x in zip(coordinates, joint.initial, strict=True) if x})
+            start.update({c: x for c, x in zip(names, joint.initial, strict=True) if x})
         chosen = self.options.actuate
         if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
             force = self.names.symbol(f"tau_{name}")
@@ -179,7 +181,9 @@ class _Writer:
                 loose.append(f"{joint.name} = {joint.mimic.factor:g} {joint.mimic.joint} + {joint.mimic.offset:g}")
         if loose:
             remedy = "mimic='coupling' ties them"
-            self.out.notes.append(f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}")
+            self.out.notes.append(
+                f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}"
+            )
         if ties and "constraints" not in SECTIONS:
             if self.options.mimic == "coupling":
                 raise UsageError("couplings of joints need the model section constraints, which this version has not")

@@ -51,7 +51,9 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
 
         robot = read_mjcf(root, options)
     else:
-        problem = root.problem(root.tag, "is not a robot", "a URDF file begins with <robot>, an MJCF file with <mujoco>")
+        problem = root.problem(
+            root.tag, "is not a robot", "a URDF file begins with <robot>, an MJCF file with <mujoco>"
+        )
         raise ModelError([problem])
     return describe_robot(robot, options)
 

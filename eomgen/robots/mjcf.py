@@ -42,6 +42,9 @@ def read_mjcf(root: Element, options: Options) -> Robot:
         import mujoco
     except ImportError:
         raise MissingDependencyError("MJCF files need mujoco: pip install 'eomgen[robots]'") from None
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else MuJoCo writes a file MUJOCO_LOG.TXT into the current folder
     try:
         compiled = mujoco.MjModel.from_xml_path(root.file)
     except ValueError as error:
@@ -49,7 +52,11 @@ def read_mjcf(root: Element, options: Options) -> Robot:
         found = _LINE.findall(text)
         place = root.problem("mujoco", f"MuJoCo refuses it: {text}")
         raise ModelError([place._replace(line=int(found[-1]) if found else root.line)]) from None
-    return _Reader(compiled, root, lines).read()
+    finally:
+        mujoco.set_mju_user_warning(before)
+    robot = _Reader(compiled, root, lines).read()
+    robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in warnings]
+    return robot
 
 
 class _Reader:
@@ -120,7 +127,7 @@ class _Reader:
         if size > 1:
             if m.dof_armature[dof : dof + size].any():
                 message = f"armature on a {kind} joint, which adds inertia that is not a body's"
-                self.robot.problem(f"joint.{name}.armature", message, "set armature=\"0\" there", place)
+                self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
             if m.dof_damping[dof : dof + size].any() or m.jnt_stiffness[j]:
                 self.robot.notes.append(f"left out: damping and stiffness of the {kind} joint {name}")
             if kind == "spherical":

@@ -75,7 +75,11 @@ class _Scan:
             if "name" in given:
                 self.lines.setdefault((element.tag, given["name"]), (element.file, element.line))
             if element.tag == "compiler":
-                for key, kinds in (("assetdir", ("mesh", "texture")), ("meshdir", ("mesh",)), ("texturedir", ("texture",))):
+                for key, kinds in (
+                    ("assetdir", ("mesh", "texture")),
+                    ("meshdir", ("mesh",)),
+                    ("texturedir", ("texture",)),
+                ):
                     for kind in kinds if key in given else ():
                         self.folders[kind].add(given[key])
             if element.tag in _COUNTED:

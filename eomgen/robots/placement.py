@@ -13,7 +13,7 @@ Numbers = Sequence[float]
 
 @dataclass(frozen=True)
 class Placement:
-    """A frame in another: ``rotation`` (3, 3) takes its axes to the other's, ``position`` (3,) is in the other's (m)."""
+    """A frame in another: ``rotation`` (3, 3) takes its axes to the other's, ``position`` (3,) is in those (m)."""
 
     rotation: np.ndarray
     position: np.ndarray
@@ -54,7 +54,7 @@ def numbers(values: np.ndarray | Numbers) -> list[float]:
     return [float(x) + 0.0 for x in values]
 
 
-def moved(position: Numbers) -> Placement:
+def moved(position: np.ndarray | Numbers) -> Placement:
     """A frame that is moved only."""
     return Placement(np.eye(3), np.array(position, dtype=float))
 

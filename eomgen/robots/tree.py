@@ -81,7 +81,12 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
         found.home[link.name] = body, frame
         waiting.extend(reversed(carried.get(link.name, ())))
     if len(found.bodies) == 1:
-        robot.problem("robot", "no link can move", "give it joints; the base of a URDF robot floats with floating=True, or --floating", (robot.file, 1))
+        robot.problem(
+            "robot",
+            "no link can move",
+            "give it joints; the base of a URDF robot floats with floating=True, or --floating",
+            (robot.file, 1),
+        )
     _check_masses(robot, found)
     if robot.problems:
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
@@ -96,7 +101,9 @@ def _lock(robot: Robot, options: Options) -> None:
             robot.problem(f"lock.{name}", "no such joint", nearest(name, robot.joints, "joints"), (robot.file, 1))
             continue
         if joint.type not in ("revolute", "prismatic", "weld"):
-            robot.problem(f"lock.{name}", f"is a {joint.type} joint", "only joints of one degree are locked", joint.place)
+            robot.problem(
+                f"lock.{name}", f"is a {joint.type} joint", "only joints of one degree are locked", joint.place
+            )
             continue
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         motion = moved(value * axis) if joint.type == "prismatic" else Placement(about(axis, value), np.zeros(3))

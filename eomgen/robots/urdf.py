@@ -80,7 +80,7 @@ class _Reader:
         where = f"{path}.{key}"
         if text is None:
             if default is None:
-                self.fault(element, where, "is missing", f"give {key}=\"...\" in <{element.tag}>")
+                self.fault(element, where, "is missing", f'give {key}="..." in <{element.tag}>')
             return default or 0.0
         return self._finite(element, where, text)
 
@@ -100,7 +100,7 @@ class _Reader:
             return default  # type: ignore[return-value]
         parts = text.split()
         if len(parts) != 3:
-            self.fault(element, f"{path}.{key}", f"{text[:40]!r} is not three numbers", "write \"x y z\"")
+            self.fault(element, f"{path}.{key}", f"{text[:40]!r} is not three numbers", 'write "x y z"')
             return default  # type: ignore[return-value]
         x, y, z = (self._finite(element, f"{path}.{key}", part) for part in parts)
         return (x, y, z)
@@ -119,11 +119,13 @@ class _Reader:
         name = element.attributes.get("name")
         known = self.robot.links if element.tag == "link" else self.robot.joints
         if not name:
-            self.fault(element, element.tag, "has no name", f"give <{element.tag} name=\"...\">")
+            self.fault(element, element.tag, "has no name", f'give <{element.tag} name="...">')
             return None
         if name in known:
             first = known[name].place[1]
-            self.fault(element, f"{element.tag}.{name}", f"the name is given twice, first in line {first}", "rename one")
+            self.fault(
+                element, f"{element.tag}.{name}", f"the name is given twice, first in line {first}", "rename one"
+            )
             return None
         return name
 
@@ -196,7 +198,7 @@ class _Reader:
             found = element.find(end)
             link = found.attributes.get("link") if found is not None else None
             if not link:
-                self.fault(found or element, f"{path}.{end}", "is missing", f"give <{end} link=\"...\"/>")
+                self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>')
             ends[end] = link or ""
         axis = element.find("axis")
         direction = (1.0, 0.0, 0.0) if axis is None else self.triple(axis, "xyz", f"{path}.axis", (1.0, 0.0, 0.0))

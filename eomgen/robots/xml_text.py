@@ -1,4 +1,4 @@
-"""Robots, XML: the bytes of a file -> a tree of elements with their lines; entities and DTDs are refused, sizes bounded.
+"""Robots, XML: the bytes of a file -> a tree of elements with their lines; entities are refused, sizes bounded.
 
 The parser is expat behind defusedxml, which stops at the first declaration of an entity or a document type, so that
 nothing is expanded and no other file is read.

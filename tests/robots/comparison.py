@@ -1,4 +1,4 @@
-"""One robot against its judge: the largest relative differences over random states, in compiled C or in the evaluator."""
+"""One robot against its judge: the largest relative differences over random states, in C or in the evaluator."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ class Judge:
     """A model in MuJoCo, beside ours of the same file."""
 
     def __init__(self, path: Path, model: Any) -> None:
+        mujoco.set_mju_user_warning(lambda text: None)  # no log file in the current folder
         self.mj = mujoco.MjModel.from_xml_path(str(path))
         self.mj.opt.density = self.mj.opt.viscosity = 0.0  # the medium is left out of ours, which a note says
         self.mj.actuator_ctrllimited[:] = 0  # limits are data in ours

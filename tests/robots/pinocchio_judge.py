@@ -61,7 +61,11 @@ class Judge:
         model, data = self.pin, self.data
         v, a, tau = 3 * v, 5 * a, 10 * tau
         tau = np.where([name in self.actuated for name in self.names_of(order)], tau, 0.0)
-        u = {f"tau_{name}": x for name, x in zip(self.names_of(order), tau.tolist(), strict=True) if name in self.actuated}
+        u = {
+            f"tau_{name}": x
+            for name, x in zip(self.names_of(order), tau.tolist(), strict=True)
+            if name in self.actuated
+        }
         turned, theirs = np.zeros(model.nv), np.zeros((3, model.nv))
         turned[order] = q
         theirs[:, order] = v, a, tau

@@ -68,3 +68,30 @@ def urdf_robots() -> dict[str, tuple[Path, bool]]:
     if PYBULLET is not None:
         found |= {name: (PYBULLET / file, floating) for name, (file, floating) in URDF_PYBULLET.items()}
     return found
+
+
+#: Model -> package and file; the folder of its assets is that of the first two parts.
+MJCF: dict[str, tuple[str, str]] = {
+    "acrobot": ("dm_control", "suite/acrobot.xml"),
+    "cart-pole": ("dm_control", "suite/cartpole.xml"),
+    "cheetah": ("dm_control", "suite/cheetah.xml"),
+    "hopper": ("dm_control", "suite/hopper.xml"),
+    "walker": ("dm_control", "suite/walker.xml"),
+    "humanoid": ("dm_control", "suite/humanoid.xml"),
+    "fish": ("dm_control", "suite/fish.xml"),
+    "ball in cup": ("dm_control", "suite/ball_in_cup.xml"),
+    "jaco arm": ("dm_control", "third_party/kinova/jaco_arm.xml"),
+    "ant": ("gymnasium_robotics", "envs/mujoco/assets/ant.xml"),
+    "pusher": ("gymnasium_robotics", "envs/mujoco/assets/pusher.xml"),
+    "shadow hand": ("gymnasium_robotics", "envs/assets/hand/reach.xml"),
+}
+
+
+def mjcf_models() -> dict[str, tuple[Path, Path]]:
+    """Name -> file and the folder of its assets."""
+    found = {}
+    for name, (package, file) in MJCF.items():
+        folder = package_folder(package)
+        assert folder is not None, package
+        found[name] = folder / file, (folder / file).parents[1]
+    return found
