@@ -88,9 +88,12 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a joint that slides along an axis and turns about it; see :meth:`joint`."""
-        return self.joint("cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates)
+        return self.joint(
+            "cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits
+        )
 
     def spherical(
         self,
@@ -99,9 +102,12 @@ class JointMethods:
         successor: Any,
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a ball joint in Euler angles (intrinsic, ``"xyz"`` unless given); see :meth:`joint`."""
-        return self.joint("spherical", name, predecessor, successor, sequence=sequence, coordinates=coordinates)
+        return self.joint(
+            "spherical", name, predecessor, successor, sequence=sequence, coordinates=coordinates, limits=limits
+        )
 
     def planar(
         self,
@@ -110,9 +116,10 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a joint that moves in a plane and turns about its normal, the axis; see :meth:`joint`."""
-        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates)
+        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits)
 
     def free(
         self,
@@ -121,9 +128,12 @@ class JointMethods:
         successor: Any,
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add six degrees of freedom: position, then Euler angles; see :meth:`joint`."""
-        return self.joint("free", name, predecessor, successor, sequence=sequence, coordinates=coordinates)
+        return self.joint(
+            "free", name, predecessor, successor, sequence=sequence, coordinates=coordinates, limits=limits
+        )
 
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Fix two bodies to each other; see :meth:`joint`."""
