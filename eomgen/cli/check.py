@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .failures import reports_failures
-from .options import json_option, load_model, model_argument, native_option
+from .options import json_option, load_model, model_argument, native_option, robot_options
 from .screen import print_json
 
 
@@ -30,15 +31,16 @@ def _print_schema(context: click.Context) -> None:
     callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
     help="Print the JSON Schema of model files, for editors, and stop.",
 )
+@robot_options
 @reports_failures
-def check(model: Path, allow_native: bool, as_json: bool) -> None:
+def check(model: Path, allow_native: bool, as_json: bool, robot: dict[str, Any]) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """
     from .. import pipeline
 
-    report = pipeline.check(load_model(model, allow_native))
+    report = pipeline.check(load_model(model, allow_native, robot))
     if as_json:
         print_json(report.to_dict())
     else:

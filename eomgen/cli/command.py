@@ -18,6 +18,7 @@ VERBS = {
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",
     "generate": "Write a package that stands alone.",
+    "convert": "Write a robot (URDF, MJCF) as a model file.",
     "examples": "List the example models, or copy one here.",
     "doctor": "Say whether this installation can derive, compile and simulate.",
     "cache": "List, prune or clear the compiled modules.",

@@ -16,6 +16,7 @@ from .options import (
     method_option,
     model_argument,
     native_option,
+    robot_options,
 )
 from .screen import print_heading, print_json, print_table, stage
 
@@ -30,9 +31,16 @@ if TYPE_CHECKING:
 @independent_option
 @click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
 @json_option
+@robot_options
 @reports_failures
 def derive(
-    model: Path, allow_native: bool, method: str, independent: tuple[str, ...], equations: bool, as_json: bool
+    model: Path,
+    allow_native: bool,
+    method: str,
+    independent: tuple[str, ...],
+    equations: bool,
+    as_json: bool,
+    robot: dict[str, Any],
 ) -> None:
     """Derive the equations of motion; parameters need no values.
 
@@ -41,7 +49,7 @@ def derive(
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        derived = pipeline.derive(load_model(model, allow_native), method, independent or None)
+        derived = pipeline.derive(load_model(model, allow_native, robot), method, independent or None)
         parts |= derived.seconds
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))

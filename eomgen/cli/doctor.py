@@ -18,12 +18,13 @@ from .failures import TOOLCHAIN, reports_failures
 from .options import json_option
 from .screen import print_json, readable_size
 
-CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs")
+CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml")
 #: package -> (extra, what it is for)
 OPTIONAL = {
     "matplotlib": ("plot", "plots"),
     "pandas": ("results", "tables of results"),
     "ziglang": ("compiler", "a C compiler from pip"),
+    "mujoco": ("robots", "MJCF files"),
     "ipykernel": ("notebook", "Jupyter notebooks"),
 }
 

@@ -23,7 +23,7 @@ def example_files() -> dict[str, Traversable]:
     for file in sorted(files("eomgen.examples").iterdir(), key=lambda f: f.name):
         if file.name.endswith(".yaml"):
             found[file.name.removesuffix(".yaml")] = file
-        elif file.name.endswith(".py") and not file.name.startswith("_"):
+        elif file.name.endswith(".urdf") or (file.name.endswith(".py") and not file.name.startswith("_")):
             found[file.name] = file
     return found
 
@@ -34,10 +34,13 @@ def example_names() -> list[str]:
 
 
 def describe_example(file: Traversable) -> str:
-    """The ``doc:`` line of a model file, or the first line of a script's docstring."""
+    """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
     text = file.read_text(encoding="utf-8")
     if file.name.endswith(".py"):
         return (ast.get_docstring(ast.parse(text)) or "").split("\n", 1)[0]
+    if file.name.endswith(".urdf"):
+        comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
+        return " ".join(comment.group(1).split()) if comment else ""
     found = re.search(r"^doc:\s*(.+)$", text, re.MULTILINE)
     return found.group(1).strip().strip('"') if found else ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -15,6 +16,7 @@ from .options import (
     method_option,
     model_argument,
     native_option,
+    robot_options,
     target_option,
 )
 from .screen import print_json, stage
@@ -30,15 +32,23 @@ from .screen import print_json, stage
 @independent_option
 @target_option("c", "cython", "numpy")
 @json_option
+@robot_options
 @reports_failures
 def generate(
-    model: Path, allow_native: bool, out: Path, method: str, independent: tuple[str, ...], target: str, as_json: bool
+    model: Path,
+    allow_native: bool,
+    out: Path,
+    method: str,
+    independent: tuple[str, ...],
+    target: str,
+    as_json: bool,
+    robot: dict[str, Any],
 ) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
     from .. import pipeline
 
     with blaming_option(independent), stage("generate"):
-        folder = pipeline.generate(load_model(model, allow_native), out, method, target, independent or None)
+        folder = pipeline.generate(load_model(model, allow_native, robot), out, method, target, independent or None)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -72,8 +73,42 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
         raise
 
 
-def load_model(path: Path, allow_native: bool = False) -> Model:
-    """The model of a file.
+_ROBOT = (
+    click.option("--floating", is_flag=True, help="Robots (URDF): the base moves freely."),
+    click.option("--lock", multiple=True, metavar="JOINT[=VALUE]", help="Robots: hold a joint; repeat it for more."),
+    click.option("--mimic", metavar="HOW", help="Robots: joints that mimic others are independent, or a coupling."),
+    click.option("--rotation", metavar="HOW", help="Robots: free and ball joints in euler_angles or euler_parameters."),
+    click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
+    click.option("--symbolic", is_flag=True, help="Robots: masses and inertias become parameters."),
+    click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
+)
+
+
+def robot_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of robot files, handed to the verb as one mapping ``robot``."""
+    keys = ("floating", "lock", "mimic", "rotation", "actuate", "symbolic", "assets")
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        given = {key: value for key in keys if (value := kwargs.pop(key))}
+        return verb(*args, robot=given, **kwargs)
+
+    for option in reversed(_ROBOT):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def _locked(words: tuple[str, ...]) -> dict[str, float]:
+    """``joint`` or ``joint=value`` -> the value at which it is held."""
+    result: dict[str, float] = {}
+    for word in words:
+        name, equals, _ = word.rpartition("=")
+        result |= dict([_parse_setting(word)]) if equals and name else {word: 0.0}
+    return result
+
+
+def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | None = None) -> Model:
+    """The model of a file; what an import of a robot left out is told on stderr.
 
     Parameters
     ----------
@@ -92,7 +127,15 @@ def load_model(path: Path, allow_native: bool = False) -> Model:
         raise UsageError(_missing(path))
     from ..describe import load
 
-    return load(path, allow_native=allow_native)
+    options = dict(robot or {})
+    if "lock" in options:
+        options["lock"] = _locked(options["lock"])
+    if allow_native:
+        options["allow_native"] = True
+    model = load(path, **options)
+    for note in model.notes:
+        click.echo(f"note: {note}", err=True)
+    return model
 
 
 def _missing(path: Path) -> str:
@@ -103,7 +146,7 @@ def _missing(path: Path) -> str:
     if path.stem in example_names():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
-    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml")]
+    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
     near = difflib.get_close_matches(path.name, names, 1)
     return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
 

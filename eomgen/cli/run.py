@@ -21,6 +21,7 @@ from .options import (
     native_option,
     parse_settings,
     require_folder,
+    robot_options,
     target_option,
 )
 from .screen import finite, print_heading, print_json, print_rows, stage
@@ -51,6 +52,7 @@ TABLES = (".npz", ".csv")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @json_option
+@robot_options
 @reports_failures
 def run(
     model: Path,
@@ -63,6 +65,7 @@ def run(
     out: Path | None,
     plot: Path | None,
     as_json: bool,
+    robot: dict[str, Any],
 ) -> None:
     """Derive, compile and simulate a model, and report it.
 
@@ -80,7 +83,7 @@ def run(
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        described = load_model(model, allow_native)
+        described = load_model(model, allow_native, robot)
         _complete(described, chosen)
         equations = pipeline.derive(described, method, independent or None)
         parts |= equations.seconds

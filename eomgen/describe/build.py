@@ -20,6 +20,7 @@ from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
+from .joint_data import check_display
 from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
@@ -141,6 +142,8 @@ def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
     for entry in usable + ground:
         if not faults.under(entry.path):
             check_keys(entry.path, entry.values, GROUND_FIELDS if entry.name == GROUND_NAME else BODY, faults)
+        if "display" in entry.values:
+            check_display(reader, f"{entry.path}.display", entry.values["display"])
     origin = Frame(reader.identity, vec.zero(graph))
     for name, index in reader.bodies.items():
         reader.markers[name] = Marker(index, origin, name)

@@ -13,7 +13,8 @@ from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
 from .checks import check_names, unknown_key
 from .description import Entry, items
-from .fields import JOINT, JOINT_OPTIONS, KINDS, MOTION, Field, joint_fields
+from .fields import JOINT, JOINT_DATA, JOINT_OPTIONS, KINDS, MOTION, Field, joint_fields
+from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
@@ -102,8 +103,21 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         if columns != TURNS["z"]:
             turn = turn_matrix(reader.graph, columns)
             pair = (_turned(pair[0], turn), _turned(pair[1], turn))
-        result.append(JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named))
+        spec = JointSpec(joint.entry.name, kind, *pair, joint.coordinates, joint.named)
+        result.append(_with_data(reader, spec, path, values))
     return tuple(result)
+
+
+def _with_data(reader: Reader, spec: JointSpec, path: str, values: dict[str, Any]) -> JointSpec:
+    """Limits, dry friction and armature of a joint."""
+    data: dict[str, Any] = {}
+    if spec.coordinates and "limits" in values:
+        data["limits"] = read_limits(reader, f"{path}.limits", values["limits"], spec.coordinates)
+    if len(spec.coordinates) == 1 and "dry_friction" in values:
+        data["dry_friction"] = read_dry_friction(reader, f"{path}.dry_friction", values["dry_friction"])
+    if len(spec.coordinates) == 1 and "armature" in values:
+        data["armature"] = read_armature(reader, f"{path}.armature", values["armature"])
+    return replace(spec, **data) if data else spec
 
 
 def _turned(marker: Marker, turn: Mat3) -> Marker:
@@ -128,7 +142,8 @@ def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
     fields = joint_fields(type_name)
     for key in entry.values:
         if key not in fields:
-            elsewhere = key in JOINT or key in JOINT_OPTIONS or key in ("axis", "coordinate", "coordinates")
+            others = {*JOINT, *JOINT_OPTIONS, *JOINT_DATA, "axis", "coordinate", "coordinates"}
+            elsewhere = key in others
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
             reader.faults.add(f"{entry.path}.{key}", message, unknown_key(key, fields))
     for key, field in fields.items():

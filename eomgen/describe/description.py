@@ -52,6 +52,10 @@ class Description:
         Dotted path -> (file, line), filled when the model comes from a file.
     problems : list of Problem
         Faults found while the description was made.
+    notes : list of str
+        What an import left out or changed.
+    renamed : dict
+        Section -> name in an imported file -> name in the model, where they differ.
     """
 
     values: Values = field(default_factory=dict)
@@ -59,6 +63,8 @@ class Description:
     motions: dict[str, Values] = field(default_factory=dict)
     lines: dict[str, tuple[str, int]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    renamed: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def add(self, section: str, name: Any, values: Values) -> Entry:
         """Append an entry to a section."""

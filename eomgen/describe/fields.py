@@ -44,6 +44,8 @@ KINDS = {
     "two": "a list of two numbers or expressions",
     "factors": "a mapping of coordinates to numbers or expressions",
     "wheels": "a mapping of sun, planet, ring to numbers or expressions",
+    "limits": "a mapping of lower, upper, velocity and effort to numbers",
+    "display": "a list of shapes {shape, ...}",
     "forces": "a mapping of coordinates to expressions, or a list of one expression for each coordinate",
     "table": "a mapping",
     "file": "the path of a file",
@@ -111,6 +113,22 @@ CYLINDER: Fields = {
     "sense": Field("choice", "turn of the path about the axis", default="positive", choices=("positive", "negative")),
 }
 PLACED: Fields = {"body": Field("name", "a body or ground", required=True), **MARKER}
+SHAPES = ("mesh", "box", "cylinder", "sphere", "capsule")
+DISPLAY: Fields = {
+    "shape": Field("choice", "kind of shape", required=True, choices=SHAPES),
+    "file": Field("text", "file of a mesh, as the robot's file names it; it is not read"),
+    "scale": Field("vector", "scale of a mesh"),
+    "size": Field("vector", "edges of a box (m)"),
+    "radius": Field("number", "radius (m)"),
+    "length": Field("number", "length along z (m)"),
+    **MARKER,
+}
+LIMITS: Fields = {
+    "lower": Field("number", "least value (rad or m)"),
+    "upper": Field("number", "greatest value (rad or m)"),
+    "velocity": Field("number", "greatest speed (rad/s or m/s)"),
+    "effort": Field("number", "greatest torque or force of the drive (N m or N)"),
+}
 BODY: Fields = {
     "mass": Field("expression", "mass (kg); 0 for a body without mass"),
     "com": Field("vector", "centre of mass in body axes (m)", default=(0, 0, 0)),
@@ -127,6 +145,7 @@ BODY: Fields = {
     "solids": Field("solids", "solids of uniform density, from which mass, com and inertia follow", default=()),
     "points": Field("points", "point masses, added to the rest", default=()),
     "check_inertia": Field("flag", "whether mass and inertia must be those of a possible body (the model's own)"),
+    "display": Field("display", "shapes to draw, in body axes; data only", default=()),
 }
 POINT: Fields = {
     "mass": Field("expression", "mass (kg)", required=True),
@@ -148,7 +167,7 @@ SOLID: dict[str, Fields] = {
         "density": _DENSITY,
     }
 }
-GROUND: Fields = {"markers": BODY["markers"]}
+GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
 JOINT: Fields = {
     "type": Field("choice", "type of the joint", required=True, choices=tuple(JOINTS)),
@@ -157,6 +176,12 @@ JOINT: Fields = {
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
 COORDINATES = Field("names", "names of the coordinates, in order")
+#: Data of a joint that has coordinates; the last only where it has one.
+JOINT_DATA: Fields = {
+    "limits": Field("limits", "limits of the coordinate; data only"),
+    "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
+    "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
+}
 JOINT_OPTIONS: Fields = {
     "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
     "pitch": Field("expression", "advance in one turn (m), negative for a left-handed thread", required=True),
@@ -220,6 +245,9 @@ def joint_fields(type_name: str) -> Fields:
         fields["coordinate"] = COORDINATE
     if joint.coordinates:
         fields["coordinates"] = COORDINATES
+        fields["limits"] = JOINT_DATA["limits"]
+    if len(joint.coordinates) == 1:
+        fields |= JOINT_DATA
     for option in joint.options:
         fields[option] = JOINT_OPTIONS.get(option, Field("text", option))
     return fields

@@ -76,6 +76,9 @@ class JointSpec:
     successor: Marker
     coordinates: tuple[str, ...]
     named: bool
+    limits: tuple[tuple[tuple[str, float], ...], ...] = ()  #: (key, value) of each coordinate; data only
+    dry_friction: float = 0.0  #: data only
+    armature: Expr | None = None  #: inertia of the drive, added to the coordinate's own
 
     @property
     def velocities(self) -> tuple[str, ...]:

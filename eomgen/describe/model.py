@@ -241,6 +241,16 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         """The raw data, in the layout of the model file."""
         return self._description
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What an import left out or changed, one sentence each."""
+        return tuple(self._description.notes)
+
+    @property
+    def renamed(self) -> dict[str, dict[str, str]]:
+        """Section -> name in an imported file -> name in the model, where they differ."""
+        return self._description.renamed
+
     def mechanism(self) -> Mechanism:
         """Check the model and lower it to one graph.
 

@@ -30,6 +30,7 @@ class BodyMethods:
         solids: Sequence[Mapping[str, Any]] | None = None,
         points: Sequence[Mapping[str, Any]] | None = None,
         check_inertia: bool | None = None,
+        display: Sequence[Mapping[str, Any]] | None = None,
     ) -> BodyHandle:
         """Add a rigid body.
 
@@ -62,6 +63,8 @@ class BodyMethods:
             Point masses to add: ``{"mass": m, "at": (x, y, z)}``.
         check_inertia : bool, optional
             False takes a mass and inertia that no rigid body can have; the model's own setting unless given.
+        display : sequence of mappings, optional
+            Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
 
         Returns
         -------
@@ -78,6 +81,7 @@ class BodyMethods:
             "solids": solids,
             "points": points,
             "check_inertia": check_inertia,
+            "display": display,
         }
         values = {key: value for key, value in given.items() if value is not None}
         return BodyHandle(self, name, self._description.add("bodies", name, values))  # type: ignore[arg-type]

@@ -39,7 +39,8 @@ class JointMethods:
         predecessor, successor : handle or str
             Bodies or markers.
         **keys
-            Whatever the type knows: axis, coordinate, coordinates, sequence, rotation, pitch, length, curve, surface.
+            Whatever the type knows: axis, coordinate, coordinates, sequence, rotation, pitch, length, curve, surface;
+            limits, dry_friction, armature.
 
         Returns
         -------
@@ -52,16 +53,34 @@ class JointMethods:
         return JointHandle(model, entry)
 
     def revolute(
-        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinate: Any = None,
+        limits: Any = None,
+        dry_friction: Any = None,
+        armature: Any = None,
     ) -> JointHandle:
         """Add a joint that turns about an axis; see :meth:`joint`."""
-        return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate)
+        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
+        return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def prismatic(
-        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinate: Any = None,
+        limits: Any = None,
+        dry_friction: Any = None,
+        armature: Any = None,
     ) -> JointHandle:
         """Add a joint that slides along an axis; see :meth:`joint`."""
-        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate)
+        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
+        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def cylindrical(
         self,
@@ -70,9 +89,12 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a joint that slides along an axis and turns about it; see :meth:`joint`."""
-        return self.joint("cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates)
+        return self.joint(
+            "cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits
+        )
 
     def spherical(
         self,
@@ -82,9 +104,10 @@ class JointMethods:
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
         rotation: str | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a ball joint, in Euler angles (``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
-        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation, "limits": limits}
         return self.joint("spherical", name, predecessor, successor, **keys)
 
     def planar(
@@ -94,9 +117,10 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add a joint that moves in a plane and turns about its normal, the axis; see :meth:`joint`."""
-        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates)
+        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits)
 
     def free(
         self,
@@ -106,9 +130,10 @@ class JointMethods:
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
         rotation: str | None = None,
+        limits: Any = None,
     ) -> JointHandle:
         """Add six degrees of freedom: position, then rotation as for a spherical joint; see :meth:`joint`."""
-        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation, "limits": limits}
         return self.joint("free", name, predecessor, successor, **keys)
 
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:

@@ -9,11 +9,14 @@ from .fields import (
     AXES,
     BODY,
     CYLINDER,
+    DISPLAY,
     FORCE,
     FUNCTION,
+    GROUND,
     INERTIA,
     INPUT,
     LAGRANGIAN,
+    LIMITS,
     MARKER,
     MODEL,
     ONE_OF,
@@ -74,6 +77,8 @@ def _definitions() -> Schema:
         "names": {"type": "array", "items": _ref("name")},
         "solids": {"type": "array", "items": {"oneOf": [_solid(name) for name in SOLID]}},
         "points": {"type": "array", "items": _table(POINT)},
+        "limits": _object({key: _each(field) for key, field in LIMITS.items()}),
+        "display": {"type": "array", "items": _table(DISPLAY)},
     }
 
 
@@ -101,6 +106,8 @@ _KINDS: dict[str, Schema] = {
     "about": {"anyOf": [_MARKER_NAME, _ref("vector")]},
     "solids": _ref("solids"),
     "points": _ref("points"),
+    "limits": _ref("limits"),
+    "display": _ref("display"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
     "shape": _ref("vector"),
@@ -135,6 +142,12 @@ def _field(field: Field) -> Schema:
         default = field.default
         schema["default"] = list(default) if isinstance(default, tuple) else default
     return {**schema, "description": field.doc}
+
+
+def _each(field: Field) -> Schema:
+    """A number for the coordinate, or a list of one for each of several coordinates."""
+    number = {"type": ["number", "string", "null"]}
+    return {"anyOf": [number, {"type": "array", "items": number}], "description": field.doc}
 
 
 def _object(properties: Schema, required: list[str] | None = None) -> Schema:
@@ -221,7 +234,7 @@ def model_schema() -> dict[str, Any]:
         "initial": {**values, "description": MODEL["initial"].doc},
         "guess": {**values, "description": MODEL["guess"].doc},
     }
-    sections["bodies"]["properties"] = {"ground": _table({"markers": BODY["markers"]})}
+    sections["bodies"]["properties"] = {"ground": _table(GROUND)}
     properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

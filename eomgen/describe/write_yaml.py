@@ -38,7 +38,7 @@ def yaml_text(description: Description) -> str:
     UsageError
         An expression or value has no form in a model file.
     """
-    lines: list[str] = []
+    lines = [f"# {' '.join(note.split())}" for note in description.notes]
     functions = frozenset(entry.name for entry in description.sections["functions"])
     for key in MODEL:
         if key in SECTIONS:

@@ -1,12 +1,13 @@
 """Stage equations: Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
 from . import embedding, lagrange, recursive
+from .armature import with_armature
 from .equations import Method, TreeEquations
 
 METHODS: dict[str, Method] = {
-    "embedding": embedding.derive,
-    "lagrange": lagrange.derive,
-    "recursive": recursive.derive,
+    "embedding": with_armature(embedding.derive),
+    "lagrange": with_armature(lagrange.derive),
+    "recursive": with_armature(recursive.derive),
 }
 
 __all__ = ["METHODS", "Method", "TreeEquations"]

@@ -18,7 +18,7 @@ from ..graph.differentiate import jacobian
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
-from ..kinematics.loads import applied_wrenches, coordinate_forces
+from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
 from .equations import TreeEquations
@@ -48,8 +48,11 @@ class Articulated:
             symmetric(add_matrices(self.mass, other.mass)),
         )
 
-    def released(self, column: Twist, wrench: Wrench, reciprocal: Expr) -> Articulated:
-        """What is felt when the column moves freely: I - U U^T / D (Featherstone, RBDA, eq. 7.43)."""
+    def released(self, column: Twist, wrench: Wrench, reciprocal: Expr, driven: bool) -> Articulated:
+        """What is felt when the column moves freely: I - U U^T / D (Featherstone, RBDA, eq. 7.43).
+
+        ``driven`` tells that D holds the inertia of a drive, which resists along the column.
+        """
         turn, push = wrench
         turn_d, push_d = vec.scale(reciprocal, turn), vec.scale(reciprocal, push)
         inertia = [[self.inertia[i][j] - turn[i] * turn_d[j] for j in range(3)] for i in range(3)]
@@ -57,7 +60,7 @@ class Articulated:
         mass = [[self.mass[i][j] - push[i] * push_d[j] for j in range(3)] for i in range(3)]
         zero = reciprocal.graph.zero
         entries = [*column[0], *column[1]]
-        if sum(not x.is_zero for x in entries) == 1:  # a force along a free unit column vanishes: so exactly
+        if sum(not x.is_zero for x in entries) == 1 and not driven:  # no force along a free unit column: exactly so
             k = next(i for i, x in enumerate(entries) if not x.is_zero)
             for m in range(3):
                 if k < 3:
@@ -105,7 +108,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     if count(shorter).total <= count(inverse).total:  # grouping symbols is work too
         inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
-    tree = not kinematics.constraints.values
+    tree = not kinematics.constraints.labels
     accelerations, pivots = _articulated(kinematics, inertias, products, loads) if tree else (None, ())
     return TreeEquations(
         method="recursive",
@@ -213,17 +216,18 @@ def _articulated(
     bodies = [Articulated(i.inertia, skew(i.moment), _uniform(i.mass)) for i in inertias]
     wrenches = list(loads)
     forces = coordinate_forces(kinematics)
+    drives = drive_inertias(kinematics)
     releases: list[list[Release]] = [[] for _ in links]
     for k in reversed(range(len(links))):
         link, body, wrench = links[k], bodies[k], wrenches[k]
         for c in reversed(range(len(link.columns))):
             column, index = link.columns[c], link.first + c
             felt = body.times(column)
-            pivot = _dot(column, felt)
+            pivot = _dot(column, felt) + drives.get(index, graph.zero)
             release = Release(index, column, felt, pivot, 1.0 / pivot, forces[index] - _dot(column, wrench))
             releases[k].append(release)
             if link.parent != GROUND or c > 0:
-                body = body.released(column, felt, release.reciprocal)
+                body = body.released(column, felt, release.reciprocal, index in drives)
                 wrench = _add(wrench, _scaled(release.force * release.reciprocal, felt))
         if link.parent != GROUND:
             bodies[link.parent] = bodies[link.parent].plus(body.lifted(link))

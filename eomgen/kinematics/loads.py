@@ -40,3 +40,12 @@ def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
                 row = loop.jacobian[loop.names.index(load.coordinate)]
                 total = [f + load.value * entry for f, entry in zip(total, row, strict=True)]
     return total
+
+
+def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
+    """Inertias of drives on coordinates of the tree, by the index of the velocity."""
+    found: dict[int, Expr] = {}
+    for spec in kinematics.mechanism.joints:
+        if spec.armature is not None and spec.coordinates[0] in kinematics.freedoms:
+            found[kinematics.freedoms.index(spec.coordinates[0])] = spec.armature
+    return found

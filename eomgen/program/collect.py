@@ -164,6 +164,13 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "initial": _numbers(kinematics, "initial"),
         "guess": _numbers(kinematics, "guess"),
         "length_scale": mobility.length_scale,
+        "limits": {
+            name: dict(limits)
+            for j in m.joints
+            for name, limits in zip(j.coordinates, j.limits, strict=False)
+            if limits
+        },
+        "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,

@@ -76,6 +76,7 @@ class Layout:
         self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in loop_kinds])
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
+        self.limits: dict[str, dict[str, float]] = data.get("limits", {})
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)

@@ -49,6 +49,8 @@ class Module(Momenta):
         Sizes; n_c counts the independent constraint rows, n_rows all of them.
     p, u : arrays
         The parameters and inputs bound.
+    limits : dict
+        Coordinate -> lower, upper, velocity and effort, those that the model gives; data only.
     rhs : callable
         ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
     jacobian : callable
@@ -102,7 +104,7 @@ class Module(Momenta):
     def _setup(self, core: Core, layout: Layout, p: Any, u: Any) -> None:
         self.kernels = kernels = Kernels(core, layout, p, u)
         self.metadata = layout.metadata
-        self.name, self.doc = layout.name, str(layout.metadata.get("doc") or "")
+        self.name, self.doc, self.limits = layout.name, str(layout.metadata.get("doc") or ""), layout.limits
         self.q_names, self.v_names, self.x_names = layout.q, layout.v, layout.x
         self.u_names, self.p_names, self.y_names = layout.u, layout.p, layout.y
         self.body_names, self.loop_names = layout.bodies, layout.loops

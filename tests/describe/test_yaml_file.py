@@ -77,7 +77,7 @@ def test_load_goes_by_the_suffix(tmp_path: Path, slider_crank_text: str) -> None
     assert load(path).name == load(str(path)).name == "slider_crank"
     with pytest.raises(FileNotFoundError):
         load(tmp_path / "absent.yaml")
-    for name in ("panda.urdf", "model"):
+    for name in ("panda.sdf", "model"):
         with pytest.raises(UsageError, match=r"supported: \.yaml"):
             load(tmp_path / name)
 

@@ -1,0 +1,108 @@
+"""Robots of PyPI packages: operations, differences from Pinocchio and MuJoCo, and time a call beside Pinocchio's."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from .report import Limit, Report, Table
+from .tasks import METHODS
+
+TITLE = "robots from URDF and MJCF against Pinocchio and MuJoCo"
+TESTS = Path(__file__).parents[1] / "tests"
+
+
+def compare(model: Any, judge: Any, states: int) -> dict[str, dict[str, Any]]:
+    """By method: operations, largest relative difference in C and in the evaluator, seconds to derive and compile."""
+    from robots.comparison import Compiled, Evaluated, largest_differences
+
+    found: dict[str, dict[str, Any]] = {}
+    for method in METHODS:
+        start = perf_counter()
+        equations = model.derive(method)
+        derived = perf_counter()
+        compiled = Compiled(equations)
+        done = perf_counter()
+        drawn = judge.states(equations.kinematics.names, states, seed=1)
+        found[method] = {
+            "n": len(equations.kinematics.names),
+            "operations": equations.operations["mass_matrix and bias"].total,
+            "differences": largest_differences(model, compiled, drawn),
+            "evaluator": max(largest_differences(model, Evaluated(equations), drawn).values()),
+            "derive": derived - start,
+            "compile": done - derived,
+            "forward dynamics": call_time(compiled.module),
+        }
+    return found
+
+
+def call_time(module: Any) -> float:
+    """Nanoseconds of one right-hand side, the best of several rounds."""
+    import numpy as np
+
+    x, out = 0.1 * np.ones(module.n_x), np.empty(module.n_x)
+    rhs = module.rhs
+    best = float("inf")
+    for _ in range(7):
+        start = perf_counter()
+        for _ in range(300):
+            rhs(0.0, x, out=out)
+        best = min(best, (perf_counter() - start) / 300)
+    return 1e9 * best
+
+
+def rows_of(name: str, base: str, found: dict[str, dict[str, Any]]) -> list[list[Any]]:
+    """One line for each method."""
+    rows = []
+    for method, r in found.items():
+        d = r["differences"] | {"poses": max(r["differences"]["frames"], r["differences"]["com"])}
+        row: list[Any] = [f"{name}{base}, {method}", r["n"], r["operations"]]
+        row += [f"{d[key]:.0e}" for key in ("M", "h", "inverse", "forward", "poses")]
+        rows.append([*row, f"{r['evaluator']:.0e}", r["derive"], r["compile"], round(r["forward dynamics"])])
+    return rows
+
+
+def run(quick: bool) -> Report:
+    """Every robot by every method, 20 random states each."""
+    if str(TESTS) not in sys.path:
+        sys.path.insert(0, str(TESTS))
+    import eomgen as eg
+
+    try:
+        from robots import mujoco_judge, pinocchio_judge
+        from robots.shipped import mjcf_models, urdf_robots
+    except ImportError as error:
+        raise SystemExit(f"the robots benchmark needs the test extra (pip install -e '.[test]'): {error}") from None
+
+    states = 3 if quick else 20
+    details: dict[str, Any] = {}
+    urdf, mjcf = list(urdf_robots().items()), list(mjcf_models().items())
+    if quick:
+        urdf, mjcf = urdf[:2], mjcf[:1]
+    tables: list[list[list[Any]]] = [[], []]
+    for name, (path, floating) in urdf:
+        model = eg.load(path, floating=floating, actuate=True)
+        details[name] = compare(model, pinocchio_judge.Judge(path, floating, model), states)
+        tables[0] += rows_of(name, "*" if floating else "", details[name])
+    for name, (path, assets) in mjcf:
+        model = eg.load(path, assets=os.fspath(assets))
+        details[f"{name} (MJCF)"] = compare(model, mujoco_judge.Judge(path, model), states)
+        tables[1] += rows_of(name, "", details[f"{name} (MJCF)"])
+    columns = ("robot", "n", "ops", "M", "bias", "inverse", "forward", "poses", "eval.", "derive", "compile", "rhs ns")
+    worst = max(max(*r["differences"].values(), r["evaluator"]) for found in details.values() for r in found.values())
+    limits = [Limit("largest relative difference from the judges", worst, 1e-9)]
+    if not quick:
+        limits.append(Limit("URDF robots", len(urdf), 25, at_least=True))
+        limits.append(Limit("MJCF models", len(mjcf), 5, at_least=True))
+    notes = (
+        f"Largest relative differences over {states} random states, in C; the evaluator's largest beside them.",
+        "* floats: n counts six for its base (Euler angles); ops: mass matrix and bias, inertias being numbers.",
+        "poses: link frames and centre of mass (m); derive and compile (five kernels, default options) in s.",
+        "rhs: forward dynamics, a call from Python into a given array.",
+    )
+    titles = ("URDF robots against Pinocchio", "MJCF models against MuJoCo")
+    shown = tuple(Table(title, columns, rows) for title, rows in zip(titles, tables, strict=True))
+    return Report(shown, tuple(limits), notes, details)

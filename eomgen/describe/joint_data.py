@@ -1,0 +1,93 @@
+"""Stage describe, data of joints and bodies: limits, dry friction, inertia of drives, and shapes to draw.
+
+Limits, dry friction and shapes travel with the model and enter no equation; the drive's inertia (``armature``) does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..graph.core import Expr
+from .checks import check_keys
+from .description import items
+from .fields import DISPLAY, LIMITS
+from .reading import Reader
+
+Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
+
+
+def read_limits(reader: Reader, path: str, given: Any, coordinates: Sequence[str]) -> tuple[Limits, ...]:
+    """Limits of each coordinate of a joint.
+
+    A mapping of ``lower``, ``upper``, ``velocity`` and ``effort``, each a number, or a list of one for each coordinate.
+    """
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, "limits")
+        return tuple(() for _ in coordinates)
+    check_keys(path, given, LIMITS, reader.faults)
+    result: list[list[tuple[str, float]]] = [[] for _ in coordinates]
+    for key in LIMITS:
+        if key not in given or given[key] is None:
+            continue
+        listed = items(given[key])
+        values = [given[key]] if listed is None else listed
+        if len(values) != len(coordinates):
+            message = f"{len(values)} values for {len(coordinates)} coordinates"
+            reader.faults.add(f"{path}.{key}", message, f"give one for each: {', '.join(coordinates)}")
+            continue
+        for k, value in enumerate(values):
+            place = f"{path}.{key}" if listed is None else f"{path}.{key}[{k}]"
+            number = None if value is None else reader.number(place, value)
+            if number is not None and number < 0 and key in ("velocity", "effort"):
+                reader.faults.add(place, f"is {number:g}", "the largest size, 0 or positive")
+            elif number is not None:
+                result[k].append((key, number))
+    for name, found in zip(coordinates, result, strict=True):
+        limits = dict(found)
+        if limits.get("lower", 0.0) > limits.get("upper", limits.get("lower", 0.0)):
+            message = f"lower {limits['lower']:g} is above upper {limits['upper']:g} for {name!r}"
+            reader.faults.add(path, message, "exchange them")
+    return tuple(tuple(found) for found in result)
+
+
+def read_dry_friction(reader: Reader, path: str, given: Any) -> float:
+    """Coulomb friction of a joint (N m or N), as data."""
+    value = reader.number(path, given)
+    if value is not None and value < 0:
+        reader.faults.add(path, f"is {value:g}", "a friction is 0 or positive")
+    return value or 0.0
+
+
+def read_armature(reader: Reader, path: str, given: Any) -> Expr:
+    """Inertia of a drive, as the coordinate of its joint feels it (kg m^2 or kg)."""
+    value = reader.expression(path, given)
+    if value.value is not None and value.value < 0:
+        reader.faults.add(path, f"is {value.value:g}", "an inertia is 0 or positive")
+    return value
+
+
+def check_display(reader: Reader, path: str, given: Any) -> None:
+    """Note faults of the shapes of a body; the files they name are not looked for."""
+    listed = items(given)
+    if listed is None:
+        reader.wrong(path, given, "display")
+        return
+    for k, shape in enumerate(listed):
+        place = f"{path}[{k}]"
+        if not isinstance(shape, Mapping):
+            reader.wrong(place, shape, "display")
+            continue
+        check_keys(place, shape, DISPLAY, reader.faults)
+        for key, value in shape.items():
+            field = DISPLAY.get(key)
+            if field is None:
+                continue
+            if field.kind == "choice":
+                reader.choice(f"{place}.{key}", value, field)
+            elif field.kind == "vector":
+                reader.vector(f"{place}.{key}", value)
+            elif field.kind == "number":
+                reader.number(f"{place}.{key}", value)
+            else:
+                reader.text(f"{place}.{key}", value)

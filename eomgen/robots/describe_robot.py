@@ -1,0 +1,235 @@
+"""Robots, the end: a Robot -> the Description that a model file would give."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..describe.description import GROUND_NAME, SECTIONS, Description, Values
+from ..describe.placement import TURNS
+from ..errors import UsageError
+from ..joints import JOINTS
+from .names import Names, clean_model_name
+from .placement import Inertia, numbers
+from .robot import Joint, Options, Robot
+from .tree import GROUND, Bodies, Body, build_bodies
+
+_INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
+
+
+def describe_robot(robot: Robot, options: Options) -> Description:
+    """The raw data of a robot.
+
+    Raises
+    ------
+    ModelError
+        The robot has faults.
+    """
+    return _Writer(robot, options, build_bodies(robot, options)).describe()
+
+
+class _Writer:
+    """Fills one Description."""
+
+    def __init__(self, robot: Robot, options: Options, found: Bodies) -> None:
+        self.robot, self.options, self.found = robot, options, found
+        gravity = robot.gravity if options.gravity is None else options.gravity
+        self.out = Description(
+            values={"name": clean_model_name(robot.name), "gravity": gravity}, lines={"": (robot.file, 1)}
+        )
+        self.out.notes = list(robot.notes)
+        self.names = Names()
+        self.joints: dict[str, str] = {}  # the robot's name -> ours
+        self.bodies: dict[str, str] = {}  # body -> ours
+        self.markers: dict[str, str] = {}  # link -> how to refer to its frame
+
+    def describe(self) -> Description:
+        moving = [body for body in self.found.bodies.values() if body.joint is not None]
+        for body in moving:
+            assert body.joint is not None
+            suffixes = [c.suffix for c in JOINTS[body.joint.type].coordinates]
+            self.joints[body.joint.name] = self.names.joint(body.joint.name, suffixes)
+        for body in self.found.bodies.values():
+            self._body(body)
+        for body in moving:
+            self._joint(body)
+        self._loops()
+        self._mimics()
+        self._drives()
+        for section, names in self.names.renamed.items():
+            self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
+        self.out.renamed = self.names.renamed
+        return self.out
+
+    def _add(self, section: str, name: str, values: Values, place: tuple[str, int]) -> None:
+        entry = self.out.add(section, name, values)
+        self.out.lines[entry.path] = place
+
+    # -- bodies ---------------------------------------------------------------------------------------------------
+    def _body(self, body: Body) -> None:
+        name = GROUND_NAME if body.name == GROUND else self.names.link(body.name)
+        self.bodies[body.name] = name
+        values: Values = {} if body.name == GROUND else self._inertia(name, body.inertia())
+        markers: dict[str, Any] = {}
+        display: list[Values] = []
+        for link, frame in body.members:
+            if link.name == body.name:
+                self.markers[link.name] = name
+            else:
+                marker = self.names.link(link.name)
+                markers[marker] = {"at": [0, 0, 0], **frame.placed()}
+                self.markers[link.name] = f"{name}.{marker}"
+            display += [{**shape, **(frame @ at).placed()} for at, shape in link.shapes]
+        if markers:
+            values["markers"] = markers
+        if display:
+            values["display"] = display
+        if values:
+            place = body.members[0][0].place if body.members else (self.robot.file, 1)
+            self._add("bodies", name, values, place)
+
+    def _inertia(self, name: str, inertia: Inertia) -> Values:
+        """mass, com and inertia: numbers, or parameters where they are not zero."""
+        values: Values = {"mass": self._value(f"m_{name}", inertia.mass, "kg")}
+        if inertia.com.any():
+            com = zip("xyz", numbers(inertia.com), strict=True)
+            values["com"] = [self._value(f"c_{name}_{axis}", x, "m") for axis, x in com]
+        if inertia.tensor.any():
+            entries = {key: float(inertia.tensor[i, j]) for key, i, j in _INERTIA if inertia.tensor[i, j] != 0.0}
+            values["inertia"] = {k: self._value(f"I_{name}_{k}", x, "kg*m**2") for k, x in entries.items()}
+        return values
+
+    def _value(self, name: str, value: float, unit: str) -> Any:
+        if not self.options.symbolic or value == 0.0:
+            return float(value)
+        given = self.names.symbol(name)
+        self.out.add("parameters", given, {"value": float(value), "unit": unit})
+        return given
+
+    # -- joints ---------------------------------------------------------------------------------------------------
+    def _joint(self, body: Body) -> None:
+        joint = body.joint
+        assert joint is not None
+        name = self.joints[joint.name]
+        home, frame = self.found.home[joint.parent] if joint.parent else (GROUND, joint.outer)
+        outer = frame @ joint.outer if joint.parent else joint.outer
+        between = [outer.reference(self.bodies[home]), joint.inner.reference(self.bodies[body.name])]
+        values: Values = {"type": joint.type, "between": between}
+        kind = JOINTS[joint.type]
+        if kind.has_axis:
+            values["axis"] = _axis(joint.axis)
+        if joint.type in ("free", "spherical") and self.options.rotation != "euler_angles":
+            values["rotation"] = self.options.rotation
+        names = [name + c.suffix for c in kind.coordinates]
+        if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
+            values |= {"coordinate": names[0]} if len(names) == 1 else {"coordinates": names}
+        if joint.limits:
+            values["limits"] = dict(joint.limits)
+        if joint.dry_friction:
+            values["dry_friction"] = joint.dry_friction
+        if joint.armature:
+            values["armature"] = joint.armature
+        self._add("joints", name, values, joint.place)
+        if joint.damping:
+            self._force("friction", joint, "damping", {"viscous": joint.damping})
+        if joint.stiffness:
+            self._spring(joint)
+        if joint.initial:
+            start = self.out.values.setdefault("initial", {})
+            start.update({c: x for c, x in zip(names, joint.initial, strict=True) if x})
+        chosen = self.options.actuate
+        if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
+            force = self.names.symbol(f"tau_{name}")
+            unit = "N" if joint.type == "prismatic" else "N*m"
+            self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
+            self._force("actuator", joint, "drive", {"value": force})
+
+    def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
+        name = self.joints[joint.name]
+        self._add("forces", self.names.link(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
+
+    def _spring(self, joint: Joint) -> None:
+        if joint.type == "revolute":
+            rest = {"angle": joint.rest} if joint.rest else {}
+            self._force("torsional_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
+            return
+        q = self.joints[joint.name]
+        stretch = f"({q} - {joint.rest!r})" if joint.rest else q
+        self._force("actuator", joint, "spring", {"value": f"-{joint.stiffness!r}*{stretch}"})
+
+    # -- what ties joints together --------------------------------------------------------------------------------
+    def _loops(self) -> None:
+        for loop in self.robot.loops:
+            pair = []
+            for link, frame in (loop.first, loop.second):
+                body, at = self.found.home[link]
+                pair.append((at @ frame).reference(self.bodies[body]))
+            suffixes = [c.suffix for c in JOINTS[loop.type].coordinates]
+            name = self.names.joint(loop.name, suffixes)
+            self._add("joints", name, {"type": loop.type, "between": pair}, loop.place)
+
+    def _mimics(self) -> None:
+        ties = list(self.robot.couplings)
+        loose = []
+        for joint in self.robot.joints.values():
+            if joint.mimic is None or joint.type == "weld":
+                continue
+            if self.options.mimic == "coupling":
+                ties.append((f"{joint.name}_mimic", joint.name, joint.mimic, joint.place))
+            else:
+                loose.append(f"{joint.name} = {joint.mimic.factor:g} {joint.mimic.joint} + {joint.mimic.offset:g}")
+        if loose:
+            remedy = "mimic='coupling' ties them"
+            self.out.notes.append(
+                f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}"
+            )
+        if ties and "constraints" not in SECTIONS:
+            if self.options.mimic == "coupling":
+                raise UsageError("couplings of joints need the model section constraints, which this version has not")
+            self.out.notes.append(f"left out: couplings of joints ({', '.join(name for name, *_ in ties)})")
+            ties = []
+        for name, joint_name, law, place in ties:
+            self._coupling(name, joint_name, law, place)
+
+    def _coupling(self, name: str, joint: str, law: Any, place: tuple[str, int]) -> None:
+        first, second = self.joints.get(joint), self.joints.get(law.joint)
+        locked = self.options.locked
+        coordinates: dict[str, float] = {}
+        offset = law.offset
+        if first is not None:
+            coordinates[first] = 1.0
+        else:
+            offset -= locked.get(joint, 0.0)
+        if second is not None and law.factor != 0.0:
+            coordinates[second] = -law.factor
+        else:
+            offset += law.factor * locked.get(law.joint, 0.0)
+        values: Values = {"type": "coupling", "coordinates": coordinates}
+        if offset:
+            values["offset"] = offset
+        self._add("constraints", self.names.link(name), values, place)
+
+    def _drives(self) -> None:
+        for k, drive in enumerate(self.robot.drives):
+            parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
+            fixed = sum(c * self.options.locked.get(joint, 0.0) for joint, c in drive.parts)
+            b0, b1, b2 = drive.bias
+            terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
+            name = f"tendon_{k}"
+            if drive.name:
+                name = self.names.symbol(drive.name)
+                self._add("inputs", name, {"value": 0.0}, drive.place)
+                terms.insert(0, (drive.gain, name))
+            law = " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
+            for q, c in parts if law else ():
+                force = self.names.link(f"{name}_drive")
+                self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
+
+
+def _axis(axis: tuple[float, float, float]) -> Any:
+    """A word for an axis along a coordinate axis, else its three numbers."""
+    for word, columns in TURNS.items():
+        if np.array_equal(columns[2], axis):
+            return word
+    return [float(x) for x in axis]

@@ -1,0 +1,75 @@
+"""Robots, loading: a path and options -> Description, by the root element of the file."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from typing import Any
+
+from ..describe.description import Description
+from ..describe.names import nearest
+from ..errors import ModelError, UsageError
+from .describe_robot import describe_robot
+from .robot import Options
+from .urdf import read_urdf
+from .xml_text import read_xml
+
+MIMIC = ("independent", "coupling")
+ROTATIONS = ("euler_angles", "euler_parameters")
+
+
+def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
+    """The raw data of a URDF or MJCF file.
+
+    Parameters
+    ----------
+    path : str or path
+    **given
+        Fields of :class:`~eomgen.robots.robot.Options`.
+
+    Returns
+    -------
+    Description
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    UsageError
+        An option that is not there, or not a value it takes.
+    ModelError
+        The file is no robot: every fault found, with its line.
+    MissingDependencyError
+        A package is needed.
+    """
+    options = make_options(given)
+    root = read_xml(path)
+    if root.tag == "robot":
+        robot = read_urdf(root, options)
+    elif root.tag in ("mujoco", "mujocoinclude"):
+        from .mjcf import read_mjcf
+
+        robot = read_mjcf(root, options)
+    else:
+        problem = root.problem(
+            root.tag, "is not a robot", "a URDF file begins with <robot>, an MJCF file with <mujoco>"
+        )
+        raise ModelError([problem])
+    return describe_robot(robot, options)
+
+
+def make_options(given: dict[str, Any]) -> Options:
+    """Checked options.
+
+    Raises
+    ------
+    UsageError
+    """
+    known = [field.name for field in fields(Options)]
+    for key in given:
+        if key not in known:
+            raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
+    for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS)):
+        if key in given and given[key] not in allowed:
+            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}")
+    return Options(**given)

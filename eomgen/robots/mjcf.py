@@ -1,0 +1,179 @@
+"""Robots, MJCF: a file, compiled by MuJoCo -> a Robot.
+
+MuJoCo's own compiler (package mujoco) resolves defaults, orientations and the inertia of geoms; what it makes is read:
+bodies, their joints in order (several joints of a body become links without mass between them), springs, dampers,
+inertias of drives, equality constraints, and actuators on joints.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import MissingDependencyError, ModelError, UsageError
+from .mjcf_actuators import read_actuators
+from .mjcf_equalities import read_equalities
+from .mjcf_files import Lines, scan_files
+from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
+from .robot import Joint, Link, Options, Place, Robot
+from .xml_text import Element
+
+_TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
+_LINE = re.compile(r"line (\d+)")
+
+
+def read_mjcf(root: Element, options: Options) -> Robot:
+    """The robot of an MJCF file.
+
+    Raises
+    ------
+    MissingDependencyError
+        mujoco is not installed.
+    ModelError
+        The file names others outside its folder, or MuJoCo refuses it; with the line where it says one.
+    """
+    if options.floating:
+        raise UsageError(f"{root.file}: an MJCF file says itself which bodies float; leave floating out")
+    lines = scan_files(root, options.assets)
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingDependencyError("MJCF files need mujoco: pip install 'eomgen[robots]'") from None
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else MuJoCo writes a file MUJOCO_LOG.TXT into the current folder
+    try:
+        compiled = mujoco.MjModel.from_xml_path(root.file)
+    except ValueError as error:
+        text = " ".join(str(error).split())
+        found = _LINE.findall(text)
+        place = root.problem("mujoco", f"MuJoCo refuses it: {text}")
+        raise ModelError([place._replace(line=int(found[-1]) if found else root.line)]) from None
+    finally:
+        mujoco.set_mju_user_warning(before)
+    robot = _Reader(compiled, root, lines).read()
+    robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in warnings]
+    return robot
+
+
+class _Reader:
+    """Reads a compiled model into a Robot."""
+
+    def __init__(self, m: Any, root: Element, lines: Lines) -> None:
+        self.m, self.root, self.lines = m, root, lines
+        self.robot = Robot(root.attributes.get("model") or "robot", root.file)
+        self.names = {kind: self._names(kind, count) for kind, count in (("body", m.nbody), ("joint", m.njnt))}
+
+    def _names(self, kind: str, count: int) -> list[str]:
+        access = getattr(self.m, kind)
+        return [access(k).name or f"{kind}{k}" for k in range(count)]
+
+    def place(self, name: str, *tags: str) -> Place:
+        """Where an element of a name is; the model's first line if it has none."""
+        for tag in tags:
+            if (tag, name) in self.lines:
+                return self.lines[tag, name]
+        return self.root.file, self.root.line
+
+    def read(self) -> Robot:
+        m, robot = self.m, self.robot
+        import mujoco
+
+        off = bool(m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
+        gravity = np.zeros(3) if off else m.opt.gravity
+        robot.gravity = tuple(numbers(gravity))  # type: ignore[assignment]
+        world = self.names["body"][0]
+        robot.links[world] = Link(world, (self.root.file, self.root.line))
+        for k in range(1, m.nbody):
+            self._body(k)
+        read_equalities(self)
+        read_actuators(self)
+        self._note_the_rest()
+        return robot
+
+    # -- bodies and joints ----------------------------------------------------------------------------------------
+    def _body(self, k: int) -> None:
+        m, robot = self.m, self.robot
+        name, parent = self.names["body"][k], self.names["body"][m.body_parentid[k]]
+        place = self.place(name, "body")
+        rotation = from_quaternion(*m.body_iquat[k])
+        tensor = rotation @ np.diag(m.body_inertia[k]) @ rotation.T
+        inertia = Inertia(float(m.body_mass[k]), np.array(m.body_ipos[k]), (tensor + tensor.T) / 2)
+        at = Placement(from_quaternion(*m.body_quat[k]), np.array(m.body_pos[k]))
+        joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
+        if not joints:
+            robot.joints[f"{name} weld"] = Joint(f"{name} weld", "weld", parent, name, place, outer=at)
+        for j in joints:
+            last = j == joints[-1]
+            child = name if last else f"{name}.{self.names['joint'][j]}"
+            if not last:
+                robot.links[child] = Link(child, place)
+            joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY)
+            robot.joints[joint.name] = joint
+            parent = child
+        robot.links[name] = Link(name, place, inertia)
+
+    def _joint(self, j: int, parent: str, child: str, at: Placement) -> Joint:
+        m, name = self.m, self.names["joint"][j]
+        kind = _TYPES[m.jnt_type[j]]
+        dof, start = m.jnt_dofadr[j], m.jnt_qposadr[j]
+        place = self.place(name, "joint", "freejoint")
+        anchor = moved(m.jnt_pos[j])
+        joint = Joint(name, kind, parent, child, place, outer=at @ anchor, inner=anchor)
+        size = {"free": 6, "spherical": 3}.get(kind, 1)
+        if size > 1:
+            if m.dof_armature[dof : dof + size].any():
+                message = f"armature on a {kind} joint, which adds inertia that is not a body's"
+                self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
+            if m.dof_damping[dof : dof + size].any() or m.jnt_stiffness[j]:
+                self.robot.notes.append(f"left out: damping and stiffness of the {kind} joint {name}")
+            if kind == "spherical":
+                return joint
+            pose = Placement(from_quaternion(*m.qpos0[start + 3 : start + 7]), m.qpos0[start : start + 3])
+            return replace(joint, outer=IDENTITY, inner=IDENTITY, initial=_start(pose))
+        axis = numbers(m.jnt_axis[j])
+        q0 = float(m.qpos0[start])
+        back = Placement(about(axis, -q0), np.zeros(3)) if kind == "revolute" else moved(-q0 * np.array(axis))
+        limits: dict[str, float] = {}
+        if m.jnt_limited[j]:
+            limits |= dict(zip(("lower", "upper"), numbers(m.jnt_range[j]), strict=True))
+        if m.jnt_actfrclimited[j]:
+            limits["effort"] = float(np.abs(m.jnt_actfrcrange[j]).max())
+        return replace(
+            joint,
+            outer=joint.outer @ back,
+            axis=(axis[0], axis[1], axis[2]),
+            limits=limits,
+            damping=float(m.dof_damping[dof]),
+            dry_friction=float(m.dof_frictionloss[dof]),
+            armature=float(m.dof_armature[dof]),
+            stiffness=float(m.jnt_stiffness[j]),
+            rest=float(m.qpos_spring[start]),
+            initial=(q0,),
+        )
+
+    # -- what has no counterpart ----------------------------------------------------------------------------------
+    def _note_the_rest(self) -> None:
+        m, notes = self.m, self.robot.notes
+        if m.opt.density or m.opt.viscosity:
+            notes.append("left out: the forces of the medium (density, viscosity)")
+        if m.body_gravcomp.any():
+            notes.append("left out: gravity compensation of bodies (gravcomp)")
+        if getattr(m, "nflex", 0):
+            notes.append(f"left out: {m.nflex} deformable bodies (flex)")
+        if (m.body_mocapid >= 0).any():
+            notes.append("bodies moved by motion capture (mocap) stand still")
+        for key in ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield"):
+            values = getattr(m, key, None)
+            if values is not None and np.any(values):
+                notes.append(f"left out: {key}, the parts of springs and dampers that are not linear")
+
+
+def _start(pose: Placement) -> tuple[float, ...]:
+    """Position and intrinsic x-y'-z'' angles of a free joint at the start."""
+    R = pose.rotation
+    angles = (np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(np.clip(R[0, 2], -1, 1)), np.arctan2(-R[0, 1], R[0, 0]))
+    return tuple(numbers(pose.position)) + tuple(numbers(angles))

@@ -1,0 +1,150 @@
+"""Robots, the data between a robot file and a model: links, joints, loops and drives in numbers, with their lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import Problem
+from .placement import IDENTITY, NOTHING, Inertia, Placement
+
+Place = tuple[str, int]  # file, line
+
+
+@dataclass(frozen=True)
+class Options:
+    """What ``eomgen.load`` and the command line may say about a robot file.
+
+    Attributes
+    ----------
+    floating : bool
+        The root link moves freely (a joint ``base`` of type free) instead of standing on the ground.
+    rotation : str
+        How free and ball joints turn: ``euler_angles`` or ``euler_parameters``.
+    gravity : three numbers, optional
+        In ground axes (m/s^2); (0, 0, -9.81) for URDF, the file's own for MJCF.
+    mimic : {'independent', 'coupling'}
+        Whether a joint that mimics another keeps a coordinate of its own, or is tied to it by a constraint.
+    lock : names, or mapping of names to values
+        Joints held at a value (0 unless given): they become welds.
+    merge : bool
+        Whether links welded together make one body, their frames its markers; else each link is a body.
+    symbolic : bool
+        Whether masses, centres of mass and inertias become parameters; else they are numbers, which fold.
+    actuate : bool or names
+        Inputs ``tau_<joint>`` on all joints of one degree, or on these.
+    snap : float
+        Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
+    assets : str, optional
+        Folder within which an MJCF file may read other files; its own folder by default.
+    """
+
+    floating: bool = False
+    rotation: str = "euler_angles"
+    gravity: Any = None
+    mimic: str = "independent"
+    lock: Any = ()
+    merge: bool = True
+    symbolic: bool = False
+    actuate: Any = False
+    snap: float = 1e-11
+    assets: str | None = None
+
+    @property
+    def locked(self) -> dict[str, float]:
+        """Names of locked joints and their values."""
+        if isinstance(self.lock, Mapping):
+            return {str(name): float(value) for name, value in self.lock.items()}
+        return dict.fromkeys([self.lock] if isinstance(self.lock, str) else map(str, self.lock), 0.0)
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """q = factor q(joint) + offset."""
+
+    joint: str
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link: its inertia in its own frame, and shapes to draw as (placement, data)."""
+
+    name: str
+    place: Place
+    inertia: Inertia = NOTHING
+    shapes: tuple[tuple[Placement, dict[str, Any]], ...] = ()
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the tree; ``outer`` is its frame on the parent, ``inner`` on the child.
+
+    ``type`` is a word of eomgen's; the coordinate's law (damping, spring, drive's inertia) is that of a joint of one
+    degree.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    place: Place
+    outer: Placement = IDENTITY
+    inner: Placement = IDENTITY
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    limits: Mapping[str, float] = field(default_factory=dict)
+    damping: float = 0.0
+    dry_friction: float = 0.0
+    armature: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    mimic: Mimic | None = None
+    initial: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A joint that closes a loop; it has no coordinate of interest."""
+
+    name: str
+    type: str
+    first: tuple[str, Placement]  #: link and frame in it
+    second: tuple[str, Placement]
+    place: Place
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive along L = sum c_j q_j: the force f = gain u + b0 + b1 L + b2 L' pushes c_j f along q_j.
+
+    ``parts`` holds joints and their c_j; without a name there is no input u.
+    """
+
+    name: str
+    parts: tuple[tuple[str, float], ...]
+    gain: float
+    bias: tuple[float, float, float]
+    place: Place
+
+
+@dataclass
+class Robot:
+    """A robot as its file describes it; ``problems`` are its faults, ``notes`` what was left out."""
+
+    name: str
+    file: str
+    root: str = ""
+    links: dict[str, Link] = field(default_factory=dict)
+    joints: dict[str, Joint] = field(default_factory=dict)
+    loops: list[Loop] = field(default_factory=list)
+    couplings: list[tuple[str, str, Mimic, Place]] = field(default_factory=list)  #: name, joint, law, place
+    drives: list[Drive] = field(default_factory=list)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def problem(self, path: str, message: str, remedy: str, place: Place) -> None:
+        """Note a fault."""
+        self.problems.append(Problem(path, message, remedy, *place))

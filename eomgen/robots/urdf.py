@@ -1,0 +1,251 @@
+"""Robots, URDF: the elements of a file -> a Robot.
+
+The format is that of ROS (wiki.ros.org/urdf/XML): the frame of a link is the frame of the joint that carries it, axes
+are given in that frame (default x), angles are fixed-axis roll, pitch, yaw.  Meshes are named, never read.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError
+from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
+from .robot import Joint, Link, Mimic, Options, Robot
+from .xml_text import Element
+
+#: Type of a joint in URDF -> eomgen's.
+TYPES = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "fixed": "weld",
+    "floating": "free",
+    "planar": "planar",
+}
+#: Elements of a robot without meaning for its motion.
+IGNORED = ("material", "gazebo", "transmission", "ros2_control", "sensor", "mujoco", "drake:collision_filter_group")
+LINKS = 5000  #: links of a robot
+
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.ASCII)
+_SPECIAL = {"inf", "-inf", "+inf", "infinity", "-infinity", "nan", "-nan"}
+
+
+def read_urdf(root: Element, options: Options) -> Robot:
+    """The robot of a URDF file; its faults are in ``problems``."""
+    return _Reader(root, options).read()
+
+
+class _Reader:
+    """Reads elements into a Robot, noting faults as it goes."""
+
+    def __init__(self, root: Element, options: Options) -> None:
+        self.root, self.options = root, options
+        self.robot = Robot(root.attributes.get("name") or "robot", root.file)
+
+    def read(self) -> Robot:
+        robot = self.robot
+        if any(element.tag.startswith("xacro:") for element in self.root.children):
+            problem = self.root.problem("robot", "is a xacro file", "expand it first: xacro FILE.xacro > FILE.urdf")
+            raise ModelError([problem])
+        if len(self.root.children) > 20 * LINKS:
+            raise ModelError([self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}")])
+        skipped: Counter[str] = Counter()
+        for element in self.root.children:
+            if element.tag == "link":
+                self._link(element)
+            elif element.tag == "joint":
+                self._joint(element)
+            elif element.tag not in IGNORED:
+                skipped[element.tag] += 1
+        if skipped:
+            robot.notes.append(f"left out: {', '.join(f'{n} <{tag}>' for tag, n in skipped.items())}")
+        if not robot.links:
+            robot.problems.append(self.root.problem("robot", "has no links", "a URDF file has <link> elements"))
+        if len(robot.links) > LINKS:
+            raise ModelError([self.root.problem("robot", f"has {len(robot.links)} links", f"at most {LINKS}")])
+        return robot
+
+    # -- values ---------------------------------------------------------------------------------------------------
+    def fault(self, element: Element, path: str, message: str, remedy: str = "") -> None:
+        self.robot.problems.append(element.problem(path, message, remedy))
+
+    def number(self, element: Element, key: str, path: str, default: float | None = None) -> float:
+        """A finite number in an attribute."""
+        text = element.attributes.get(key)
+        where = f"{path}.{key}"
+        if text is None:
+            if default is None:
+                self.fault(element, where, "is missing", f'give {key}="..." in <{element.tag}>')
+            return default or 0.0
+        return self._finite(element, where, text)
+
+    def _finite(self, element: Element, path: str, text: str) -> float:
+        value = float(text) if _NUMBER.match(text.strip()) else math.nan
+        if not math.isfinite(value):
+            shown = text if len(text) <= 40 else text[:37] + "..."
+            what = "not finite" if text.strip().lower() in _SPECIAL else "not a number"
+            self.fault(element, path, f"{shown!r} is {what}", "give a finite number")
+            return 0.0
+        return value
+
+    def triple(self, element: Element, key: str, path: str, default: tuple[float, ...]) -> tuple[float, float, float]:
+        """Three numbers in an attribute."""
+        text = element.attributes.get(key)
+        if text is None:
+            return default  # type: ignore[return-value]
+        parts = text.split()
+        if len(parts) != 3:
+            self.fault(element, f"{path}.{key}", f"{text[:40]!r} is not three numbers", 'write "x y z"')
+            return default  # type: ignore[return-value]
+        x, y, z = (self._finite(element, f"{path}.{key}", part) for part in parts)
+        return (x, y, z)
+
+    def origin(self, element: Element, path: str) -> Placement:
+        """The placement that ``<origin xyz rpy>`` gives."""
+        origin = element.find("origin")
+        if origin is None:
+            return IDENTITY
+        o = (0.0, 0.0, 0.0)
+        position = self.triple(origin, "xyz", f"{path}.origin", o)
+        return placed(position, self.triple(origin, "rpy", f"{path}.origin", o), self.options.snap)
+
+    def name(self, element: Element) -> str | None:
+        """The name of a link or joint, if it is given and new."""
+        name = element.attributes.get("name")
+        known = self.robot.links if element.tag == "link" else self.robot.joints
+        if not name:
+            self.fault(element, element.tag, "has no name", f'give <{element.tag} name="...">')
+            return None
+        if name in known:
+            first = known[name].place[1]
+            self.fault(
+                element, f"{element.tag}.{name}", f"the name is given twice, first in line {first}", "rename one"
+            )
+            return None
+        return name
+
+    # -- elements -------------------------------------------------------------------------------------------------
+    def _link(self, element: Element) -> None:
+        name = self.name(element)
+        if name is None:
+            return
+        path = f"link.{name}"
+        inertial = element.find("inertial")
+        inertia = NOTHING if inertial is None else self._inertial(inertial, f"{path}.inertial")
+        shapes = [self._shape(visual, f"{path}.visual") for visual in element.all("visual")]
+        self.robot.links[name] = Link(
+            name, (element.file, element.line), inertia, tuple(shape for shape in shapes if shape is not None)
+        )
+
+    def _inertial(self, element: Element, path: str) -> Inertia:
+        frame = self.origin(element, path)
+        weight, tensor = element.find("mass"), element.find("inertia")
+        mass = 0.0
+        if weight is None:
+            self.fault(element, f"{path}.mass", "is missing", 'give <mass value="..."/>')
+        else:
+            mass = self.number(weight, "value", f"{path}.mass")
+            if mass < 0.0:
+                self.fault(weight, f"{path}.mass", f"is {mass:g}", "a mass is 0 or positive")
+        if tensor is None:
+            return Inertia(mass, np.zeros(3), np.zeros((3, 3))).seen(frame)
+        xx, xy, xz, yy, yz, zz = (
+            self.number(tensor, key, f"{path}.inertia", 0.0) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        )
+        matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return Inertia(mass, np.zeros(3), matrix).seen(frame)
+
+    def _shape(self, element: Element, path: str) -> tuple[Placement, dict[str, Any]] | None:
+        """A visual: what it looks like, as data that is never read."""
+        geometry = element.find("geometry")
+        given = geometry.children[0] if geometry is not None and geometry.children else None
+        if given is None:
+            return None
+        shape: dict[str, Any] = {"shape": given.tag}
+        where = f"{path}.{given.tag}"
+        if given.tag == "mesh":
+            shape["file"] = given.attributes.get("filename", "")
+            scale = given.attributes.get("scale", "").split()
+            if len(scale) == 3:  # some files give four, which no reader of theirs minds
+                shape["scale"] = [self._finite(given, f"{where}.scale", part) for part in scale]
+        elif given.tag == "box":
+            shape["size"] = list(self.triple(given, "size", where, (0.0, 0.0, 0.0)))
+        elif given.tag in ("cylinder", "capsule"):
+            shape |= {key: self.number(given, key, where) for key in ("radius", "length")}
+        elif given.tag == "sphere":
+            shape["radius"] = self.number(given, "radius", where)
+        else:
+            return None
+        return self.origin(element, path), shape
+
+    def _joint(self, element: Element) -> None:
+        name = self.name(element)
+        if name is None:
+            return
+        path = f"joint.{name}"
+        given = element.attributes.get("type", "")
+        kind = TYPES.get(given)
+        if kind is None:
+            message = f"no joint of type {given!r}" if given else "is missing"
+            self.fault(element, f"{path}.type", message, f"types: {', '.join(TYPES)}")
+        ends = {}
+        for end in ("parent", "child"):
+            found = element.find(end)
+            link = found.attributes.get("link") if found is not None else None
+            if not link:
+                self.fault(found or element, f"{path}.{end}", "is missing", f'give <{end} link="..."/>')
+            ends[end] = link or ""
+        axis = element.find("axis")
+        direction = (1.0, 0.0, 0.0) if axis is None else self.triple(axis, "xyz", f"{path}.axis", (1.0, 0.0, 0.0))
+        if kind in ("revolute", "prismatic", "planar") and not any(direction):
+            self.fault(axis or element, f"{path}.axis", "the axis has no length", "give three numbers, not all zero")
+            direction = (1.0, 0.0, 0.0)
+        dynamics = element.find("dynamics")
+        self.robot.joints[name] = Joint(
+            name=name,
+            type=kind or "weld",
+            parent=ends["parent"],
+            child=ends["child"],
+            place=(element.file, element.line),
+            outer=self.origin(element, path),
+            axis=direction,
+            limits=self._limits(element, path, given) if kind in ("revolute", "prismatic") else {},
+            damping=0.0 if dynamics is None else self.number(dynamics, "damping", f"{path}.dynamics", 0.0),
+            dry_friction=0.0 if dynamics is None else self.number(dynamics, "friction", f"{path}.dynamics", 0.0),
+            mimic=self._mimic(element, path),
+        )
+
+    def _limits(self, element: Element, path: str, kind: str) -> dict[str, float]:
+        limit = element.find("limit")
+        result: dict[str, float] = {}
+        for key in ("lower", "upper", "velocity", "effort") if limit is not None else ():
+            text = limit.attributes.get(key)  # type: ignore[union-attr]
+            if text is None or text.strip().lower() in _SPECIAL - {"nan", "-nan"}:
+                continue  # no limit
+            if key in ("lower", "upper") and kind == "continuous":
+                continue  # they mean nothing there
+            result[key] = self.number(limit, key, f"{path}.limit")  # type: ignore[arg-type]
+        if kind in ("revolute", "prismatic") and limit is not None:
+            for key in ("lower", "upper"):
+                if key not in limit.attributes and any(k in limit.attributes for k in ("lower", "upper")):
+                    result[key] = 0.0  # the format's default
+        if result.get("lower", 0.0) > result.get("upper", math.inf):
+            lower, upper = result.pop("lower"), result.pop("upper")
+            self.robot.notes.append(f"{path}.limit: lower {lower:g} is above upper {upper:g}; taken as no limit")
+        return result
+
+    def _mimic(self, element: Element, path: str) -> Mimic | None:
+        mimic = element.find("mimic")
+        if mimic is None:
+            return None
+        joint = mimic.attributes.get("joint")
+        if not joint:
+            self.fault(mimic, f"{path}.mimic", "names no joint", 'give <mimic joint="..."/>')
+            return None
+        factor = self.number(mimic, "multiplier", f"{path}.mimic", 1.0)
+        return Mimic(joint, factor, self.number(mimic, "offset", f"{path}.mimic", 0.0))

@@ -1,0 +1,233 @@
+"""Robot files that are wrong or hostile: one clear error with the line, exit code 1, nothing expanded, nothing read."""
+
+from __future__ import annotations
+
+import builtins
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import eomgen as eg
+from eomgen.cli import main
+from eomgen.robots import xml_text
+
+ARM = """<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="2"/>
+    <inertia ixx="0.1" iyy="0.1" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="tip"><inertial><mass value="0.5"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" velocity="2" effort="30"/></joint>
+  <joint name="slide" type="prismatic"><parent link="upper"/><child link="tip"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 0 1"/></joint>
+</robot>
+"""
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE robot [
+  <!ENTITY a "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa">
+  <!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
+  <!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">
+]>
+"""
+OUTSIDE = '<!DOCTYPE robot [<!ENTITY secret SYSTEM "file://{secret}">]>\n'
+
+#: What was changed in the arm, and what the error must say.
+BROKEN = {
+    "two roots": (
+        '<link name="base"/>',
+        '<link name="base"/>\n<link name="lost"/>',
+        r"arm.urdf:3: link.lost: has no parent",
+    ),
+    "missing link": (
+        '<child link="tip"/>',
+        '<child link="tp"/>',
+        r"urdf:8: joint.slide.child: no link 'tp'; did you mean 'tip'",
+    ),
+    "no child": ('<child link="tip"/>', "", r"urdf:8: joint.slide.child: is missing"),
+    "unknown joint": (
+        'type="prismatic"',
+        'type="sliding"',
+        r"urdf:8: joint.slide.type: no joint of type 'sliding'; types: rev",
+    ),
+    "massless leaf": (
+        '<mass value="0.5"/>',
+        '<mass value="0"/>',
+        r"urdf:8: joint.slide: the link 'tip' that it moves has no mass",
+    ),
+    "negative mass": ('value="2"', 'value="-2"', r"urdf:3: link.upper.inertial.mass: is -2"),
+    "not finite": ('value="2"', 'value="nan"', r"urdf:3: link.upper.inertial.mass.value: 'nan' is not finite"),
+    "infinite": ('xyz="0 0 0.4"', 'xyz="0 0 1e999"', r"urdf:8: joint.slide.origin.xyz: '1e999' is not"),
+    "no number": ('ixx="0.1"', 'ixx="a lot"', r"urdf:4: link.upper.inertial.inertia.ixx: 'a lot' is not a number"),
+    "impossible": ('izz="0.01"', 'izz="9"', r"urdf:3: bodies.upper.inertia: principal moments .* one exceeds"),
+    "two numbers": ('xyz="0 0 0.4"', 'xyz="0 0.4"', r"urdf:8: joint.slide.origin.xyz: '0 0.4' is not three numbers"),
+    "no axis": ('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>', r"urdf:6: joint.shoulder.axis: the axis has no length"),
+    "twice": ('name="tip"', 'name="upper"', r"urdf:5: link.upper: the name is given twice, first in line 3"),
+    "ring": ('<parent link="base"/>', '<parent link="tip"/>', r"'base'|ring"),
+    "two parents": (
+        '<parent link="upper"/><child link="tip"/>',
+        '<parent link="base"/><child link="upper"/>',
+        r"also the child of",
+    ),
+    "no end": ("</robot>", "", r"urdf:11: file: not XML: no element found"),
+    "xacro": ('<link name="base"/>', '<xacro:include filename="a"/>', r"is a xacro file; expand it first"),
+    "bomb": ('<robot name="arm">', BOMB + '<robot name="&c;">', r"urdf:2: file: declares a document type or an entity"),
+    "other": ("robot", "machine", r"urdf:1: machine: is not a robot"),
+}
+
+
+def exit_code(*words: object) -> object:
+    with pytest.raises(SystemExit) as left:
+        main([str(word) for word in words])
+    return left.value.code
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Any:
+    def write(old: str = "", new: str = "", name: str = "arm.urdf") -> Path:
+        assert old in ARM
+        path = tmp_path / name
+        path.write_text(ARM.replace(old, new) if old else ARM)
+        return path
+
+    return write
+
+
+def test_the_arm_is_fine(arm: Any) -> None:
+    assert eg.load(arm()).check().coordinates == ["shoulder", "slide"]
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_fault_is_told_with_its_line(fault: str, arm: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new, said = BROKEN[fault]
+    path = arm(old, new)
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path).check()
+    assert exit_code("check", path) == 1
+    assert str(path) in capsys.readouterr().err
+
+
+def test_all_faults_are_told_at_once(arm: Any) -> None:
+    path = arm('value="2"', 'value="nan"')
+    path.write_text(path.read_text().replace("prismatic", "sliding").replace('"0.5"', '"-1"'))
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(path)
+    assert [p.line for p in caught.value.problems] == [3, 5, 8]
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_no_entity_reads_a_file(suffix: str, arm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("hidden")
+    path = arm('<robot name="arm">', OUTSIDE.format(secret=secret) + '<robot name="arm">&secret;', f"arm{suffix}")
+    opened: list[str] = []
+    real = builtins.open
+
+    def noting(file: Any, *args: Any, **keys: Any) -> Any:
+        opened.append(os.fspath(file) if not isinstance(file, int) else "")
+        return real(file, *args, **keys)
+
+    monkeypatch.setattr(builtins, "open", noting)
+    with pytest.raises(eg.ModelError, match="entities are never expanded") as caught:
+        eg.load(path)
+    assert "hidden" not in str(caught.value)
+    assert str(secret) not in opened
+    assert str(path) in opened
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '<asset><mesh name="m" file="{secret}"/></asset>',
+        '<asset><texture name="m" type="2d" file="../secret"/></asset>',
+        '<asset><hfield name="m" file="link/secret"/></asset>',
+        '<include file="../secret"/>',
+        '<compiler meshdir=".."/><asset><mesh name="m" file="secret"/></asset>',
+        '<asset><model name="m" file="../secret"/></asset>',
+    ],
+)
+def test_mujoco_reads_nothing_outside(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import mujoco
+
+    def never(path: str) -> None:
+        raise AssertionError("MuJoCo was asked to read the model")
+
+    monkeypatch.setattr(mujoco.MjModel, "from_xml_path", never)
+    (tmp_path / "model").mkdir()
+    (tmp_path / "secret").write_text("hidden")
+    os.symlink(tmp_path, tmp_path / "model" / "link")
+    path = tmp_path / "model" / "model.xml"
+    path.write_text(f"<mujoco>\n{line.format(secret=tmp_path / 'secret')}\n</mujoco>")
+    with pytest.raises(
+        eg.ModelError, match=r"model.xml:2: .*is outside the folder .*; it is not read; .*assets="
+    ) as caught:
+        eg.load(path)
+    assert "hidden" not in str(caught.value)
+
+
+def test_included_files_pass_the_same_parser(tmp_path: Path) -> None:
+    (tmp_path / "part.xml").write_text(BOMB + "<mujocoinclude/>")
+    path = tmp_path / "model.xml"
+    path.write_text('<mujoco><include file="part.xml"/></mujoco>')
+    with pytest.raises(eg.ModelError, match=r"part.xml:2: file: declares a document type"):
+        eg.load(path)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            '<worldbody><replicate count="2000"><replicate count="2000"/></replicate></worldbody>',
+            "makes too many bodies",
+        ),
+        (
+            '<asset><texture name="a" builtin="flat" width="999999" height="9"/></asset>',
+            "texture.width: 999999 is too large",
+        ),
+        ('<worldbody><body><joint type="screw"/></body></worldbody>', r"xml:2: mujoco: MuJoCo refuses it: .*'screw'"),
+        ("<worldbody><body><joint/></body></worldbody>", r"xml:2: mujoco: MuJoCo refuses it: .*mass and inertia"),
+        ('<worldbody><body name="a"/>', r"xml:3: file: not XML: mismatched tag"),
+        ('<worldbody><geom size="1"/></worldbody>', "no link can move"),
+    ],
+)
+def test_mjcf_faults(line: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(f"<mujoco>\n{line}\n</mujoco>")
+    with pytest.raises(eg.ModelError, match=said):
+        eg.load(path)
+    assert exit_code("check", path) == 1
+
+
+def test_sizes_are_bounded(arm: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = arm()
+    for name, value, said in (
+        ("SIZE", 100, "is too large"),
+        ("ELEMENTS", 10, "too many elements"),
+        ("DEPTH", 3, "nested too deeply"),
+        ("LONGEST", 3, "an attribute that is too long"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(xml_text, name, value)
+            with pytest.raises(eg.ModelError, match=said):
+                eg.load(path)
+
+
+def test_deep_nesting_is_no_recursion(tmp_path: Path) -> None:
+    path = tmp_path / "deep.urdf"
+    path.write_text("<robot>" + "<a>" * 100_000)
+    with pytest.raises(eg.ModelError, match="nested too deeply"):
+        eg.load(path)
+
+
+def test_options_are_checked(arm: Any, tmp_path: Path) -> None:
+    with pytest.raises(eg.UsageError, match="no option 'floting' for a robot file; did you mean 'floating'"):
+        eg.load(arm(), floting=True)
+    with pytest.raises(eg.UsageError, match="mimic='x': allowed: independent, coupling"):
+        eg.load(arm(), mimic="x")
+    with pytest.raises(eg.ModelError, match="lock.shulder: no such joint; did you mean 'shoulder'"):
+        eg.load(arm(), lock=["shulder"])
+    model = tmp_path / "model.yaml"
+    eg.load(arm()).save(model)
+    with pytest.raises(eg.UsageError, match="floating: options of robot files"):
+        eg.load(model, floating=True)
