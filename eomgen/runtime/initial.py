@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError
+from ..errors import AssemblyError, UsageError
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
 from ..numeric.closure import Equations, System, close, closed
 from ..numeric.continuation import follow
@@ -24,6 +24,9 @@ from ..numeric.scales import Array
 from ..numeric.space import settle
 from .kernels import Kernels
 from .names import UnknownNameError, unknown
+
+if TYPE_CHECKING:
+    from .module import Module
 
 INDEPENDENT = 1e-6  #: a further row counts when it keeps this part of its length after the others are taken out
 SAME = 1e-6  #: scaled distance below which two positions are one
@@ -319,3 +322,18 @@ class Initial:
             if name in self.layout.q:
                 result[self.layout.q.index(name)] = value
         return result
+
+
+def start_from(module: Module, t: float, p: Any, u: Any) -> Initial:
+    """The assembly of a module with other parameters and inputs, if given.
+
+    Raises
+    ------
+    UsageError
+        A number where parameters or inputs are meant, since a coordinate bears the name p or u.
+    """
+    for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
+        scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
+        if scalar and name in module.layout.q + module.layout.loops:
+            raise UsageError(f"{name}= gives the {what}; the coordinate {name!r} goes in a dict: {{{name!r}: ...}}")
+    return Initial((module if p is None and u is None else module.bind(p, u)).kernels, t)

@@ -269,14 +269,9 @@ class Module(Momenta):
         return 0 if abs(here) < 1e-8 else int(np.sign(here * (np.sign(there) or 1.0)))
 
     def _initial(self, t: float, p: Any, u: Any) -> Initial:
-        from .initial import Initial
+        from .initial import start_from
 
-        for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
-            scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
-            if scalar and name in self.layout.q + self.layout.loops:
-                raise UsageError(f"{name}= gives the {what}; the coordinate {name!r} goes in a dict: {{{name!r}: ...}}")
-        module = self if p is None and u is None else self.bind(p, u)
-        return Initial(module.kernels, t)
+        return start_from(self, t, p, u)
 
     # kinematics
 

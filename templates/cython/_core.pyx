@@ -388,10 +388,7 @@ context, timed, state, motion = Context, Timed, State, Motion
 
 
 def address(str name not None):
-    """Address of a kernel's C function, for ctypes, Numba or another extension.
-
-    Its type is ``int (double t, const double *x, const double *u, const double *c, double *out, double *w)``.
-    """
+    """Address of a kernel's C function (its type is in eomgen.h), for ctypes, Numba or another extension."""
     return <uintptr_t>MODEL.kernels[find(name, KeyError)].call
 
 
