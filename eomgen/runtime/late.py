@@ -88,3 +88,8 @@ class LateKernel:
     def __call__(self, *args: Any, **options: Any) -> Any:
         """Evaluate."""
         return self.kernel(*args, **options)
+
+
+def eager(core: Any) -> Any:
+    """The core that was there from the beginning, which has the right-hand side and the steppers."""
+    return core.core if isinstance(core, LateCore) else core

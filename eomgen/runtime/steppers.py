@@ -9,6 +9,7 @@ import numpy as np
 
 from ..numeric.scales import Array
 from .compiled import stepper_options
+from .late import eager
 from .names import require
 
 if TYPE_CHECKING:
@@ -17,8 +18,9 @@ if TYPE_CHECKING:
 
 def find_solver(module: Module, name: str) -> Any:
     """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
-    if name in getattr(module.core, "methods", ()):
-        return solver_class(module.core, name)
+    core = eager(module.core)
+    if name in getattr(core, "methods", ()):
+        return solver_class(core, name)
     return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import eomgen as eg
 from eomgen.errors import UsageError
@@ -35,3 +36,14 @@ def test_a_rare_kernel_is_made_when_first_called(target: str) -> None:
     assert np.abs(other - centre).max() > 1e-3
     with pytest.raises(UsageError, match="q must have shape"):
         module.centre_of_mass(q[:1])
+
+
+def test_plain_solve_ivp_takes_the_compiled_stepper() -> None:
+    module = eg.load(EXAMPLE).compile()
+    x = module.x0()
+    solver = module.DOP853(module.rhs, 0.0, x, 1.0)
+    assert type(solver) is module.DOP853
+    assert type(solver) is module.bind({"r": 0.2}).DOP853
+    ours = solve_ivp(module.rhs, (0.0, 0.5), x, method=module.DOP853, rtol=1e-9)
+    theirs = solve_ivp(module.rhs, (0.0, 0.5), x, method="DOP853", rtol=1e-9)
+    np.testing.assert_allclose(ours.t, theirs.t, rtol=1e-6)
