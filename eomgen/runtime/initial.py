@@ -258,7 +258,7 @@ class Initial:
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
             row = self._row(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
-            if still and abs(value / scale - row @ driven) > 1e-8:
+            if still and abs(row @ driven) < 1e-12 and abs(value / scale) > 1e-8:
                 moves = np.linalg.norm(basis, axis=0)
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
