@@ -63,7 +63,7 @@ def _tolerance(name: str, given: Any, n: int) -> Any:
     if values.shape not in ((), (n,)):
         raise UsageError(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise UsageError(f"{name} must be finite and not negative, not {given}")
+        raise UsageError(f"{name} must not be negative and must be finite, not {given}")
     return values if values.ndim else float(values)
 
 

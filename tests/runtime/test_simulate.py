@@ -208,9 +208,9 @@ def test_wrong_options_are_told(pendulum):
 @pytest.mark.parametrize("method", METHODS)
 def test_tolerances_and_steps_that_cannot_be_are_told_alike_for_every_method(pendulum, method):
     for options, words in [
-        ({"rtol": -1}, "rtol must be finite and not negative, not -1"),
-        ({"atol": -1}, "atol must be finite and not negative, not -1"),
-        ({"atol": float("nan")}, "atol must be finite"),
+        ({"rtol": -1}, "rtol must not be negative and must be finite, not -1"),
+        ({"atol": -1}, "atol must not be negative and must be finite, not -1"),
+        ({"atol": float("nan")}, "atol must not be negative and must be finite, not nan"),
         ({"atol": "small"}, "atol must be a number, or one for each of the 2 states, not 'small'"),
         ({"atol": [1e-9]}, r"atol must be a number or have shape \(2,\)"),
         ({"max_step": -1}, "max_step must be greater than 0 s, not -1"),
