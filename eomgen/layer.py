@@ -9,6 +9,7 @@ from pathlib import Path
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
+    "_batches.pxi": ("cython/_batches.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.arms import ARMS, arm
 from benchmarks.growth import operations
-from benchmarks.models import humanoid, numeric_arm, panda, spatial_chain
+from benchmarks.models import ARMS, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
 from eomgen import pipeline
 from eomgen.emit import emit_c
 from eomgen.equations import METHODS
@@ -47,7 +46,7 @@ def test_panda_takes_few_operations() -> None:
 
 def inverse_dynamics(name: str) -> Operations:
     """Operations of the inverse dynamics of an arm, work that depends on parameters only included."""
-    return count(METHODS["embedding"](analyse(arm(name))).inverse_dynamics)
+    return count(METHODS["embedding"](analyse(symbolic_arm(name).mechanism())).inverse_dynamics)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -61,7 +60,7 @@ def test_arms_with_symbolic_parameters(name: str) -> None:
 @pytest.mark.parametrize("name", ARMS)
 def test_arms_move_as_an_independent_sum_over_bodies_says(name: str) -> None:
     """Inverse dynamics of arms given by first moments against Lagrange's equations of masses and centres of mass."""
-    mechanism = arm(name)
+    mechanism = symbolic_arm(name).mechanism()
     kinematics = analyse(mechanism)
     one, other = METHODS["embedding"](kinematics), METHODS["lagrange"](kinematics)
     random = np.random.default_rng(5)

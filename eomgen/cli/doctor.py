@@ -19,13 +19,14 @@ from .options import json_option
 from .screen import print_json, readable_size
 
 CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml")
-#: package -> (extra, what it is for)
-OPTIONAL = {
-    "matplotlib": ("plot", "plots"),
-    "pandas": ("results", "tables of results"),
-    "ziglang": ("compiler", "a C compiler from pip"),
-    "mujoco": ("robots", "MJCF files"),
-    "ipykernel": ("notebook", "Jupyter notebooks"),
+#: extra -> (what it is for, its packages besides those that are always needed)
+EXTRAS = {
+    "robots": ("robots in MJCF files", ("mujoco",)),
+    "mesh": ("mass and inertia from a mesh", ("trimesh",)),
+    "plot": ("plots", ("matplotlib",)),
+    "results": ("tables of results", ("pandas",)),
+    "compiler": ("a C compiler from pip", ("ziglang",)),
+    "notebook": ("Jupyter notebooks", ("jupyterlab", "matplotlib", "pandas")),
 }
 
 
@@ -72,10 +73,12 @@ def _packages() -> Iterator[Finding]:
     for name in CORE:
         version = _version(name)
         yield Finding(name, version is not None, version or "missing", f"pip install {name}")
-    for name, (extra, purpose) in OPTIONAL.items():
-        version = _version(name)
+    for extra, (purpose, packages) in EXTRAS.items():
+        versions = {name: _version(name) for name in packages}
+        missing = [name for name, version in versions.items() if version is None]
+        detail = f"without {', '.join(missing)}" if missing else ", ".join(f"{n} {v}" for n, v in versions.items())
         remedy = f'pip install "eomgen[{extra}]"'
-        yield Finding(name, version is not None, version or f"missing, for {purpose}", remedy, needed=False)
+        yield Finding(f"[{extra}]", not missing, f"{purpose}: {detail}", remedy, needed=False)
 
 
 def _version(name: str) -> str | None:

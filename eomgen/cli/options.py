@@ -24,8 +24,44 @@ method_option = click.option(
     default="auto",
     show_default=True,
     metavar="M",
-    help="Method of derivation: auto, embedding, lagrange, recursive (the integrator stands in the model file).",
+    help="Method of derivation: auto, embedding, lagrange, recursive (for the integrator see --solver of run).",
 )
+
+
+def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The integrator of a name, in whatever letters, before the work begins."""
+    if value is None:
+        return None
+    from ..describe.fields import SOLVERS
+
+    for solver in SOLVERS:
+        if solver.lower() == value.lower():
+            return solver
+    raise click.BadParameter(f"no integrator {value!r}; there are {', '.join(SOLVERS)} (derivation: --method)")
+
+
+_TOLERANCE = click.FloatRange(min=0, min_open=True)
+_SOLVER = (
+    click.option(
+        "--solver", metavar="NAME", callback=_find_solver, help="Integrator: DOP853, RK45, RK23, Radau, BDF or LSODA."
+    ),
+    click.option("--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
+    click.option("--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
+)
+
+
+def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """``--solver``, ``--rtol`` and ``--atol``, handed to the verb as one mapping ``solver`` for ``simulate``."""
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        names = {"solver": "method", "rtol": "rtol", "atol": "atol"}
+        given = {name: value for key, name in names.items() if (value := kwargs.pop(key)) is not None}
+        return verb(*args, solver=given, **kwargs)
+
+    for option in reversed(_SOLVER):
+        wrapped = option(wrapped)
+    return wrapped
 
 
 def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -162,7 +198,10 @@ def require_folder(option: str, file: Path | None) -> None:
         return
     if file.is_dir():
         raise UsageError(f"{option} {file}: is a folder; name a file in it")
-    folder = next(parent for parent in file.absolute().parents if parent.exists())
+    above = file.absolute().parents
+    folder = next(parent for parent in above if parent.exists())
+    if folder == Path(file.absolute().anchor) != above[0]:  # rather a slip than a wish for a new folder there
+        raise UsageError(f"{option} {file}: there is no folder {above[-2]}")
     if not folder.is_dir():
         raise UsageError(f"{option} {file}: {folder} is a file, not a folder")
     if not os.access(folder, os.W_OK | os.X_OK):

@@ -22,6 +22,7 @@ from .options import (
     parse_settings,
     require_folder,
     robot_options,
+    solver_options,
     target_option,
 )
 from .screen import finite, print_heading, print_json, print_rows, stage
@@ -52,6 +53,7 @@ TABLES = (".npz", ".csv")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @json_option
+@solver_options
 @robot_options
 @reports_failures
 def run(
@@ -66,10 +68,11 @@ def run(
     plot: Path | None,
     as_json: bool,
     robot: dict[str, Any],
+    solver: dict[str, Any],
 ) -> None:
     """Derive, compile and simulate a model, and report it.
 
-    Integrator, tolerances, end time and initial values are those of the model file.
+    Integrator, tolerances, end time and initial values are those of the model file where no option gives others.
     """
     chosen = parse_settings(settings)
     if out is not None and out.suffix not in TABLES:
@@ -95,7 +98,12 @@ def run(
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
-            end, initial=initial or None, parameters=parameters or None, inputs=inputs or None, dense_output=True
+            end,
+            initial=initial or None,
+            parameters=parameters or None,
+            inputs=inputs or None,
+            dense_output=True,
+            **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     from .energy import balance_energy

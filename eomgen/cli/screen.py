@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
@@ -38,23 +40,32 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> None:
-    """A table on stdout; the columns in ``right`` are aligned to the right."""
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+    """A table on stdout; the columns in ``right`` are aligned to the right, the last one wraps on a narrow terminal."""
+    columns = list(zip(header, *rows, strict=True))
+    widths = [max(map(len, column)) for column in columns]
+    room = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
+    last = len(header) - 1
+    if last not in right:
+        widths[last] = max(min(widths[last], room - sum(widths[:last]) - 2 * last - 1), 20)
 
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for k, name in enumerate(header):
-        table.add_column(name, justify="right" if k in right else "left")
+    def line(cells: Sequence[str]) -> str:
+        placed = [
+            f"{c:>{w}}" if k in right else f"{c:<{w}}" for k, (c, w) in enumerate(zip(cells, widths, strict=True))
+        ]
+        return f" {'  '.join(placed)}".rstrip()
+
+    click.echo("\n" + click.style(line(header), bold=True))
+    click.echo(" " + "─" * (sum(widths) + 2 * last))
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    Console(width=None if sys.stdout.isatty() else WIDTH).print(table)
+        folded = textwrap.wrap(row[last], widths[last]) or [""]
+        click.echo(line([*row[:last], folded[0]]))
+        for more in folded[1:]:
+            click.echo(line([*[""] * last, more]))
 
 
 @contextmanager
 def stage(name: str) -> Iterator[dict[str, float]]:
-    """Show on stderr that a stage runs and how long it took; on a terminal with a moving sign meanwhile.
+    """Show on stderr that a stage runs and how long it took.
 
     Yields
     ------
@@ -64,12 +75,12 @@ def stage(name: str) -> Iterator[dict[str, float]]:
     start = perf_counter()
     parts: dict[str, float] = {}
     if sys.stderr.isatty():
-        from rich.console import Console
-
-        with Console(stderr=True).status(name):
-            yield parts
-    else:
+        click.echo(f"{name} ...\r", nl=False, err=True)
+    try:
         yield parts
+    finally:
+        if sys.stderr.isatty():
+            click.echo("\r\x1b[K", nl=False, err=True)
     detail = ", ".join(f"{part} {seconds:.3f}" for part, seconds in parts.items())
     click.echo(f"{name:<10}{perf_counter() - start:8.3f} s" + (f"   {detail}" if detail else ""), err=True)
 

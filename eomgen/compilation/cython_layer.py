@@ -84,22 +84,29 @@ def build_layer(
     key = compute_key({**describe_layer(texts, header, compiler), "cython": version})
     if (entry := cache.find(key)) is not None:
         return _objects(entry)
+    from concurrent.futures import ThreadPoolExecutor  # slow to import
+
     includes = [f"-I{find_python_headers()}", f"-I{np.get_include()}"]
     if progress is not None:
         progress("building the Cython layer (once)")
     with cache.attempt(key) as directory:
         for name, text in {**texts, HEADER: header}.items():
             (directory / name).write_text(text, encoding="utf-8")
-        _run_cython(directory / SOURCE)
-        flags = {"_core.c": [*layer_flags(compiler), "-I.", *includes], STEPPERS: [*stepper_flags(compiler), "-I."]}
         commands = [
-            [*compiler.command, *flags[source], "-c", source, "-o", made]
-            for source, made in zip(flags, _OBJECTS, strict=True)
+            [*compiler.command, *stepper_flags(compiler), "-I.", "-c", STEPPERS, "-o", _OBJECTS[1]],
+            [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECTS[0]],
         ]
-        for command in commands:
+
+        def compile_one(command: list[str]) -> None:
             result = run(command, directory)
             if result.returncode != 0:
                 raise_failure(f"compiling the Cython layer {directory / command[-3]}", result, directory)
+
+        with ThreadPoolExecutor(1) as pool:  # the steppers while Cython translates
+            steppers = pool.submit(compile_one, commands[0])
+            _run_cython(directory / SOURCE)
+            compile_one(commands[1])
+            steppers.result()
         (directory / "_core.c").unlink()
         recipe = {"commands": commands, "cython": version}
         return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))

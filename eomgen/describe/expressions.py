@@ -2,7 +2,7 @@
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
 :data:`~eomgen.describe.names.FUNCTIONS`, functions that the graph declares and, where markers can be resolved (in
-outputs), ``x y z vx vy vz ax ay az`` of a marker written ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
+outputs), ``x``, ``vx``, ``wx`` and the like of a marker, ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
 Length, depth, size, numbers and exponents are bounded, so hostile text costs no more than honest text.
 """
 

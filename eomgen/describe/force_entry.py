@@ -14,13 +14,13 @@ from ..graph.vectors import Vec3
 from .build_joints import Declared
 from .build_paths import read_via
 from .checks import check_keys
+from .coordinates import find_coordinate
 from .description import Entry
 from .field import Field
 from .force_fields import FORCE, ONE_OF, force_fields
 from .mechanism import Body
 from .names import nearest
 from .reading import Reader
-from .sympy_face import name_of
 
 
 class Context(NamedTuple):
@@ -135,26 +135,10 @@ class ForceEntry:
         path, faults = f"{self.entry.path}.joint", self.reader.faults
         if "joint" not in self.values:
             return None
-        given = name_of(self.values["joint"])
-        own = next((j for j in self.joints if j.entry.name == given), None)
-        home = next((j for j in self.joints if given in j.coordinates), None)
-        if own is not None and home is not None and own is not home:
-            faults.add(path, f"{given!r} is a joint, and a coordinate of {home.entry.name!r}", "rename one of them")
+        found = find_coordinate(self.reader, self.joints, path, self.values["joint"])
+        if found is None:
             return None
-        if own is not None and home is None and len(own.coordinates) != 1:
-            names = ", ".join(own.coordinates) or "none"
-            faults.add(path, f"joint {given!r} has {len(own.coordinates)} coordinates", f"name one of them: {names}")
-            return None
-        joint = home or own
-        if joint is None:
-            known = [j.entry.name for j in self.joints]
-            known += [c for j in self.joints for c in j.coordinates if c not in known]
-            if self.reader.faults.under(f"joints.{given}"):
-                return None  # the joint itself is at fault, which is told already
-            faults.add(path, f"no joint {given!r}", nearest(str(given), known, "joints and coordinates"))
-            return None
-        name = str(given) if home is not None else joint.coordinates[0]
-        kind = joint.joint.coordinates[joint.coordinates.index(name)].kind
+        name, kind, _ = found
         if kind == "parameter":
             remedy = "give the torque as a vector on the body: body: <body>, value: [x, y, z]"
             faults.add(path, f"{name!r} is an Euler parameter, which takes no torque", remedy)

@@ -55,6 +55,26 @@ class MarkerHandle:
         return self._motion("a")
 
     @property
+    def angular_velocity(self) -> Triple:
+        """Angular velocity of the body in ground axes (rad/s), as SymPy symbols for use in outputs."""
+        return self._motion("w")
+
+    @property
+    def angular_acceleration(self) -> Triple:
+        """Angular acceleration of the body in ground axes (rad/s^2), as SymPy symbols for use in outputs."""
+        return self._motion("w", "_dot")
+
+    @property
+    def body_angular_velocity(self) -> Triple:
+        """Angular velocity of the body in the marker's own axes (rad/s), as SymPy symbols for use in outputs."""
+        return self._motion("w", "_body")
+
+    @property
+    def body_angular_acceleration(self) -> Triple:
+        """Angular acceleration of the body in the marker's own axes (rad/s^2), as SymPy symbols for use in outputs."""
+        return self._motion("w", "_body_dot")
+
+    @property
     def angle(self) -> Any:
         """Turn of the marker about the z axis of ground (rad), as a SymPy symbol for use in outputs."""
         self.note()
@@ -65,9 +85,9 @@ class MarkerHandle:
         if not isinstance(self.reference, str):
             self.model.description.motions[self.label] = self.reference
 
-    def _motion(self, prefix: str) -> Triple:
+    def _motion(self, prefix: str, suffix: str = "") -> Triple:
         self.note()
-        x, y, z = (symbol(f"{prefix}{axis}({self.label})") for axis in "xyz")
+        x, y, z = (symbol(f"{prefix}{axis}{suffix}({self.label})") for axis in "xyz")
         return (x, y, z)
 
 

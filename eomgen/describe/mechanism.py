@@ -95,12 +95,15 @@ def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
 
 
 @dataclass(frozen=True)
 class Quantity:
     """Motion of a marker in ground axes: ``level`` 0 position, 1 velocity, 2 acceleration; ``axis`` 0, 1, 2,
     or 3 for its angle about the z axis of ground.
+
+    Levels of :data:`TURNING` are the angular velocity and acceleration of the marker's body.
 
     Sums over all bodies: ``level`` :data:`ANGULAR_MOMENTUM` or :data:`INERTIA` (``axis`` 0 to 5: xx yy zz xy xz yz)
     about the marker's origin, :data:`MOMENTUM` and :data:`MASS` without a marker.  The marker None stands for the

@@ -36,6 +36,12 @@ QUANTITIES: dict[str, tuple[int, int]] = {
     prefix + axis: (level, k) for level, prefix in enumerate(("", "v", "a")) for k, axis in enumerate("xyz")
 }
 QUANTITIES["angle"] = (0, 3)  # turn about the z axis of ground
+# angular velocity and acceleration of the marker's body, in ground axes and in the marker's own
+QUANTITIES |= {
+    f"w{axis}{suffix}": (level, k)
+    for level, suffix in zip((7, 8, 9, 10), ("", "_body", "_dot", "_body_dot"), strict=True)
+    for k, axis in enumerate("xyz")
+}
 # sums over all bodies about the marker's origin, ground axes: angular momentum, inertia (levels of mechanism.Quantity)
 QUANTITIES |= {f"angular_momentum_{axis}": (3, k) for k, axis in enumerate("xyz")}
 QUANTITIES |= {f"inertia_{entry}": (4, k) for k, entry in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}

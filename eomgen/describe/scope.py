@@ -11,7 +11,7 @@ from ..frames import Marker
 from ..graph.core import Expr, Graph
 from .description import Faults
 from .fields import CONSTANT, MOTION, NUMBER, OUTPUT
-from .mechanism import Quantity
+from .mechanism import TURNING, Quantity
 from .names import COM, QUANTITIES, TOTALS, fault_of_name, nearest
 
 #: Kind of name -> the least level of a field in which it may stand.
@@ -171,8 +171,8 @@ class Scope:
         except ExpressionError:
             if marker != COM:
                 raise
-        if quantity == "angle":
-            raise ExpressionError("the centre of mass of all bodies has no angle", 0, "give a marker")
+        if quantity == "angle" or QUANTITIES[quantity][0] in TURNING:
+            raise ExpressionError("the centre of mass of all bodies does not turn", 0, "give a marker")
         return None
 
     def _refuse(self, name: str, kind: str) -> None:

@@ -16,6 +16,7 @@ from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
+from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.inertia import SpatialInertia, Wrench
 from ..kinematics.loads import applied_wrenches, coordinate_forces
 from ..kinematics.rates import JointRates, joint_rates, slide_accelerations
@@ -33,17 +34,14 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     plain = _sweep(kinematics, given, rates, kinematics.a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
         inertias, inverse = given, plain
-    kinetic = graph.zero
-    for inertia, twist in zip(given, kinematics.twists, strict=True):
-        kinetic = kinetic + _project(twist, inertia.times(*twist))
     rest = tuple(graph.zero for _ in kinematics.v)
     return TreeEquations(
         method="embedding",
         mass_matrix=_composite_mass_matrix(kinematics, inertias),
         bias=_sweep(kinematics, inertias, rates, rest),
         inverse_dynamics=inverse,
-        kinetic_energy=0.5 * kinetic,
-        potential_energy=_potential(kinematics),
+        kinetic_energy=kinetic_energy(kinematics),
+        potential_energy=potential_energy(kinematics),
     )
 
 
@@ -146,17 +144,3 @@ def _composite_mass_matrix(kinematics: Kinematics, inertias: list[SpatialInertia
                     rows[i][outer.first + d] = rows[outer.first + d][i] = _project(other, wrench)
                 at = outer.parent
     return tuple(tuple(row) for row in rows)
-
-
-def _potential(kinematics: Kinematics) -> Expr:
-    """Gravity on the centres of mass in ground axes, and the springs."""
-    total = kinematics.graph.zero
-    for k, link in enumerate(kinematics.links):
-        pose = kinematics.poses.link(k)
-        inertia = link.spatial
-        moment = vec.add(vec.scale(inertia.mass, pose.position), vec.times(pose.rotation, inertia.moment))
-        total = total - vec.dot(kinematics.mechanism.gravity, moment)
-    for terms in kinematics.forces:
-        if terms.potential is not None:
-            total = total + terms.potential
-    return total

@@ -15,8 +15,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.differentiate import jacobian
-from ..graph.vectors import Mat3, Vec3
+from ..graph.vectors import Mat3
 from ..kinematics import Kinematics, Link, Twist
+from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.rates import JointRates, joint_rates
@@ -115,8 +116,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         mass_matrix=lambda: _mass_matrix(kinematics, inverse),
         bias=_newton_euler(kinematics, inertias, products, loads, rest),
         inverse_dynamics=inverse,
-        kinetic_energy=_kinetic(kinematics),
-        potential_energy=_potential(kinematics),
+        kinetic_energy=kinetic_energy(kinematics),
+        potential_energy=potential_energy(kinematics),
         accelerations=accelerations,
         pivots=pivots,
     )
@@ -257,26 +258,3 @@ def _mass_matrix(kinematics: Kinematics, inverse: tuple[Expr, ...]) -> Rows:
     entries = jacobian(list(inverse), list(kinematics.a))
     zero, n = kinematics.graph.zero, len(kinematics.v)
     return tuple(tuple(entries.get((max(i, j), min(i, j)), zero) for j in range(n)) for i in range(n))
-
-
-def _kinetic(kinematics: Kinematics) -> Expr:
-    total = kinematics.graph.zero
-    for link, twist in zip(kinematics.links, kinematics.twists, strict=True):
-        total = total + _dot(twist, link.spatial.times(*twist))
-    return 0.5 * total
-
-
-def _potential(kinematics: Kinematics) -> Expr:
-    """Gravity on the first moments, g in link axes carried outwards, and the springs."""
-    graph = kinematics.graph
-    total = graph.zero
-    heights: list[tuple[Expr, Vec3]] = []
-    for link in kinematics.links:
-        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
-        height, pull = height + vec.dot(pull, link.position), link.down(pull)
-        heights.append((height, pull))
-        total = total - (link.spatial.mass * height + vec.dot(pull, link.spatial.moment))
-    for terms in kinematics.forces:
-        if terms.potential is not None:
-            total = total + terms.potential
-    return total

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
 
-from .core import Expr, Graph, Node
+from .core import Expr, Graph
+from .nodes import Node
 
 LEAVES = frozenset({"const", "sym"})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
-from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, Mechanism, Quantity
+from ..describe.mechanism import ANGULAR_MOMENTUM, INERTIA, MASS, MOMENTUM, TURNING, Mechanism, Quantity
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
@@ -62,10 +62,7 @@ class Motion:
 
     def angular_velocity(self, marker: Marker) -> Vec3:
         """Angular velocity of the marker's body, ground axes (rad/s)."""
-        if marker.body == GROUND:
-            return vec.zero(self.graph)
-        link = self.poses.link_of[marker.body]
-        return vec.times(self.poses.link(link).rotation, self.twists[link][0])
+        return self.turning_of(marker, own_axes=False, rate=False)
 
     def velocity(self, marker: Marker) -> Vec3:
         """Velocity of the marker's origin, ground axes (m/s)."""
@@ -80,6 +77,21 @@ class Motion:
         """Acceleration of the marker's origin, ground axes (m/s^2)."""
         x, y, z = jvp(list(self.velocity(marker)), self.state.along)
         return (x, y, z)
+
+    def turning_of(self, marker: Marker, own_axes: bool, rate: bool) -> Vec3:
+        """Angular velocity (rad/s) of the marker's body or, with ``rate``, its angular acceleration (rad/s^2).
+
+        The rate of the components is the same vector in either axes, since the axes turn with it or not at all.
+        """
+        if marker.body == GROUND:
+            return vec.zero(self.graph)
+        link = self.poses.link_of[marker.body]
+        x, y, z = self.twists[link][0]
+        if rate:
+            x, y, z = jvp([x, y, z], self.state.along)
+        if own_axes:
+            return vec.transpose_times(self.poses.marker_in_link(marker).rotation, (x, y, z))
+        return vec.times(self.poses.link(link).rotation, (x, y, z))
 
     def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
         """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap.
@@ -146,13 +158,19 @@ class Motion:
                 value = vec.transpose_times(self.rotation(end), relative)[axis]
                 mapping[self.graph.symbol(name)] = value
                 mapping[self.graph.symbol(f"{name}_dot")] = jvp([value], self.state.along)[0]
-        look = (self.position, self.velocity, self.acceleration)
         for name, quantity in mechanism.quantities.items():
             if name in used:
-                marker = quantity.marker
-                if marker is None or quantity.level > 2:
-                    value = self._sum(quantity)
-                else:
-                    value = self._angle(marker) if quantity.axis == 3 else look[quantity.level](marker)[quantity.axis]
-                mapping[self.graph.symbol(name)] = value
+                mapping[self.graph.symbol(name)] = self._quantity(quantity)
         return mapping
+
+    def _quantity(self, quantity: Quantity) -> Expr:
+        """Motion of a marker, or a sum over all bodies."""
+        marker, level = quantity.marker, quantity.level
+        if marker is not None and level in TURNING:
+            own_axes, rate = level in TURNING[1::2], level in TURNING[2:]
+            return self.turning_of(marker, own_axes, rate)[quantity.axis]
+        if marker is None or level > 2:
+            return self._sum(quantity)
+        if quantity.axis == 3:
+            return self._angle(marker)
+        return (self.position, self.velocity, self.acceleration)[level](marker)[quantity.axis]

@@ -15,9 +15,9 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .integrate import Joined, Solution
-from .layout import number
-from .names import unknown
+from .names import check_names
 from .signals import Forcing, Table
+from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
@@ -33,7 +33,7 @@ def can_run(module: Module, method: Any, forcing: Forcing, events: Sequence[Any]
     return method in getattr(module.core, "methods", ()) and not forcing.feedback and not events
 
 
-def stepper_options(n: int, span: float, options: Mapping[str, Any], own: Sequence[str] = ()) -> dict[str, Any]:
+def stepper_options(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
     """Tolerances and step limits as steppers take them.
 
     Parameters
@@ -44,33 +44,18 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], own: Sequen
         Length of the run (s), the longest first step.
     options : mapping
         rtol, atol (a number or n of them), max_step, first_step.
-    own : sequence of str
-        Further options of the caller, to suggest.
 
     Raises
     ------
     UsageError
         An unknown option or a value that cannot be.
     """
-    for name in options:
-        if name not in OPTIONS:
-            raise unknown("option of simulate", name, [*own, *OPTIONS])
-    rtol = number("rtol", options.get("rtol", 1e-3))
-    atol = np.asarray(options.get("atol", 1e-6), dtype=float)
-    if atol.shape not in ((), (n,)):
-        raise UsageError(f"atol must be a number or have shape ({n},), one for each state, not {atol.shape}")
-    if not (np.isfinite(atol).all() and (atol >= 0.0).all() and np.isfinite(rtol) and rtol >= 0.0):
-        raise UsageError(f"rtol and atol must not be negative, not {rtol} and {atol}")
-    limits = {}
-    for name, default in (("max_step", np.inf), ("first_step", 0.0)):
-        given = options.get(name)
-        limits[name] = default if given is None or given == np.inf else number(name, given)
-        if given is not None and not limits[name] > 0.0:
-            raise UsageError(f"{name} must be greater than 0 s, not {given}")
-    if limits["first_step"] > span:
-        raise UsageError(f"first_step must not exceed the span of {span:.6g} s, not {limits['first_step']:.6g}")
-    least = 100.0 * np.finfo(float).eps  # SciPy's: nothing smaller can be kept
-    return {"rtol": max(rtol, least), "atol": np.broadcast_to(atol, (n,)).copy(), **limits}
+    check_names("option of simulate", options, OPTIONS)
+    checked = check_tolerances(n, span, {"rtol": 1e-3, "atol": 1e-6, **options})
+    if not isinstance(checked["rtol"], float):
+        raise UsageError(f"rtol must be one number for a compiled method, not of shape {checked['rtol'].shape}")
+    limits = {"max_step": checked.get("max_step", np.inf), "first_step": checked.get("first_step", 0.0)}
+    return {"rtol": checked["rtol"], "atol": np.broadcast_to(checked["atol"], (n,)).copy(), **limits}
 
 
 def integrate_compiled(

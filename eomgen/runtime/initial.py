@@ -22,6 +22,7 @@ from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
 from ..numeric.space import settle
+from .failure import place
 from .kernels import Kernels
 from .names import UnknownNameError, unknown
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from .module import Module
 
 INDEPENDENT = 1e-6  #: a further row counts when it keeps this part of its length after the others are taken out
+STILL = 3e-5  #: share of a motion below which a coordinate stands still; closed positions are known to its square
 SAME = 1e-6  #: scaled distance below which two positions are one
 
 
@@ -234,8 +236,39 @@ class Initial:
         declared = self.sort(self.layout.initial).rates
         if given is None:
             return self._solve_rates(q, declared).v
+        self._require_motion(q, given)
         rest = {name: value for name, value in declared.items() if name not in given}
         return self._solve_rates(q, {**given, **self.compatible(q, given, rest, positions=False)}).v
+
+    def _require_motion(self, q: Array, given: Mapping[str, float]) -> None:
+        """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.
+
+        Raises
+        ------
+        AssemblyError
+        """
+        layout = self.layout
+        if not layout.n_c:
+            return
+        J = self.scales.jacobian(self._C_q(q, t=self.t))
+        basis = np.linalg.svd(J)[2][rank(J).rank :]
+        driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
+        for name, value in given.items():
+            scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
+            scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
+            row = self._row(q, name)[0]
+            still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
+            if still and abs(row @ driven) < 1e-12 and abs(value / scale) > 1e-8:
+                moves = np.linalg.norm(basis, axis=0)
+                ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
+                others = [layout.v[i] for i in ordered if moves[i] > 0.1]
+                remedy = (
+                    f"give {' or '.join(others[:2])} instead, or another position" if others else "nothing can move"
+                )
+                raise AssemblyError(
+                    f"{name} = {value:.6g} cannot be reached where that coordinate stands still, "
+                    f"as at this dead centre{place(layout.q, q)}; {remedy}"
+                )
 
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
         layout = self.layout

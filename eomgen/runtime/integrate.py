@@ -131,8 +131,18 @@ def integrate(
     for k in range(len(nodes) - 1):
         span, last = (nodes[k], nodes[k + 1]), k == len(nodes) - 2
         asked = None if t_eval is None else _between(t_eval, span, last)
+        first = (
+            {} if "first_step" not in options else {"first_step": min(options["first_step"], abs(span[1] - span[0]))}
+        )
         part = scipy.solve_ivp(
-            rhs, span, x, method=solver, t_eval=asked, events=list(events) or None, dense_output=dense, **options
+            rhs,
+            span,
+            x,
+            method=solver,
+            t_eval=asked,
+            events=list(events) or None,
+            dense_output=dense,
+            **options | first,
         )
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)

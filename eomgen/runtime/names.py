@@ -31,11 +31,13 @@ def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError
     return UnknownNameError(f"no {what} {name!r}; {hint}")
 
 
-def check_names(what: str, given: Mapping[str, object], allowed: Collection[str]) -> None:
-    """Raise :class:`UnknownNameError` for the first name of `given` that is not allowed."""
+def check_names(
+    what: str, given: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()
+) -> None:
+    """Raise :class:`UnknownNameError` for the first name not allowed; `further` ones are suggested too."""
     for name in given:
         if name not in allowed:
-            raise unknown(what, name, allowed)
+            raise unknown(what, name, [*allowed, *further])
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:

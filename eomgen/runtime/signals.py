@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,20 @@ class Table:
         return np.asarray(self.times[np.abs(np.diff(slopes)) > 1e-9 * size])
 
 
+class Lapse(NamedTuple):
+    """A value of an input that is not finite."""
+
+    name: str
+    time: float
+    value: float
+
+    def __str__(self) -> str:
+        return (
+            f"input {self.name} is {self.value} at t = {self.time:.6g} s; "
+            "its function must return a finite number at every time and state"
+        )
+
+
 class Forcing:
     """The inputs of one run.
 
@@ -65,6 +80,8 @@ class Forcing:
     constants : dict of str to float
     varying : dict of int to callable
         f(t, x) by the index of the input.
+    lapse : Lapse or None
+        The last value that was not finite at a finite state.  Inside an integration it only shortens the step.
     """
 
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
@@ -87,6 +104,12 @@ class Forcing:
                 raise UsageError(f"input {name} must be a number, (times, values) or a function f(t, x), not {value!r}")
         self.base = np.zeros(layout.n_u)
         self.names = layout.u
+        self.lapse: Lapse | None = None
+
+    def require_finite(self) -> None:
+        """Raise UsageError if a value was not finite."""
+        if self.lapse is not None:
+            raise UsageError(str(self.lapse))
 
     def __bool__(self) -> bool:
         """Whether anything varies."""
@@ -96,12 +119,28 @@ class Forcing:
         """u (n_u,) at time t and state x."""
         u = self.base.copy()
         for index, signal in self.varying.items():
-            value = signal(t, x)
             try:
-                u[index] = value
-            except (TypeError, ValueError):
-                raise UsageError(f"input {self.names[index]} must be one number at each time, not {value!r}") from None
+                value = signal(t, x)
+            except Exception as error:
+                error.add_note(f"raised by the function of input {self.names[index]}, called as f({t:.6g}, x)")
+                raise
+            u[index] = one = value if type(value) is float else self._one_number(index, t, value)
+            if not isfinite(one) and np.isfinite(x).all():
+                self.lapse = Lapse(self.names[index], t, one)
         return u
+
+    def _one_number(self, index: int, t: float, value: Any) -> float:
+        """What is no float as one, if it is a number: an integer, a NumPy scalar, an array of shape ()."""
+        if value is not None and not isinstance(value, str) and np.shape(value) == ():
+            try:
+                return float(value)
+            except (TypeError, ValueError):
+                pass
+        shown = f"an array of shape {np.shape(value)}" if isinstance(value, np.ndarray) and value.ndim else repr(value)
+        raise UsageError(
+            f"input {self.names[index]} must be one number at each time, but its function returned {shown} "
+            f"at t = {t:.6g} s"
+        )
 
     def sample(self, t: Array, x: Array) -> Array:
         """u (n_u, k) at times (k,) and states (n_x, k)."""

@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
-from .compiled import can_run, integrate_compiled, stepper_options
+from .compiled import can_run, integrate_compiled
 from .failure import rotation_trouble
 from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
+from .names import check_names
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
+from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
@@ -99,7 +101,7 @@ def simulate(
     compiled = can_run(module, method, forcing, listed)
     if compiled:
         solver, title = None, str(method)
-        stepper_options(module.n_x, np.inf, options, OPTIONS)
+        check_names("option of simulate", options, (), OPTIONS)
     else:
         solver = choose_solver(method)
         title = solver.__name__
@@ -108,7 +110,9 @@ def simulate(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
     x0 = _initial_state(bound, initial, start)
-    bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
+    u0 = forcing(start, x0)
+    forcing.require_finite()
+    bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     run = _Run(bound, forcing)
     tolerances = {
         "rtol": declared["rtol"] if rtol is None else rtol,
@@ -116,6 +120,8 @@ def simulate(
     }
     steps = {key: value for key, value in (("max_step", max_step), ("first_step", first_step)) if value is not None}
     options = {**tolerances, **steps, **options}
+    if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
+        options = check_tolerances(module.n_x, abs(end - start), options)
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
@@ -208,6 +214,8 @@ class _Run:
         trouble = None if x is None else rotation_trouble(self.module.layout, x)
         if trouble is not None:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
+        if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):
+            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {self.forcing.lapse}")
         if cause is None:
             return SimulationError(
                 f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "

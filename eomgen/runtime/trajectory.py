@@ -119,6 +119,13 @@ class Trajectory:
         span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, " if len(self.t) else ""
         return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
+        from .storage import Stored
+
+        columns = Stored(self.names, self.to_numpy(), self.energies)
+        return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
+
     def at(self, t: ArrayLike) -> Trajectory:
         """The trajectory at other times, from the dense output of the run.
 

@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, embedsignature=True
+# cython: auto_pickle=False, emit_code_comments=False
 # distutils: define_macros=NPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION
 """Cython layer: the C table of one model (eomgen_model_table) -> Python callables on NumPy arrays.
 
@@ -120,60 +121,7 @@ cdef class Context:
             array.flags.writeable = False
 
 
-cdef struct Piece:  # one input of a kernel: n numbers `row` bytes apart, states `column` bytes apart
-    char *data
-    cnp.npy_intp n, row, column
-
-
-cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u belong to this call
-    eomgen_function call
-    Piece[3] pieces
-    Piece time, inputs
-    int n_pieces, n_out
-    cnp.npy_intp columns
-    bint nan
-    const double *c
-    double *w
-    double *x
-    double *y
-    double *u
-
-
-cdef inline void gather(const Piece *piece, cnp.npy_intp column, double *target) noexcept nogil:
-    cdef char *data = piece.data + column * piece.column
-    cdef cnp.npy_intp i
-    for i in range(piece.n):
-        target[i] = (<double *>data)[0]
-        data += piece.row
-
-
-cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
-    """Gather the state and the inputs of one column; returns its time."""
-    cdef double *x = batch.x
-    cdef double t
-    for i in range(batch.n_pieces):
-        gather(&batch.pieces[i], column, x)
-        x += batch.pieces[i].n
-    gather(&batch.inputs, column, batch.u)
-    gather(&batch.time, column, &t)
-    return t
-
-
-cdef cnp.npy_intp sweep(const Batch *batch, double *result, int *status) noexcept nogil:
-    """Evaluate all columns into the (n_out, columns) result; returns the first column that failed, or -1."""
-    cdef cnp.npy_intp failed = -1, i, j
-    cdef int code
-    cdef double t
-    for j in range(batch.columns):
-        t = load(batch, j)
-        code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
-        for i in range(batch.n_out):
-            result[i * batch.columns + j] = batch.y[i] if code == 0 else NAN
-        if code != 0 and (failed < 0 or code < 0):
-            failed, status[0] = j, code
-        if code < 0 or (code != 0 and not batch.nan):
-            break
-    return failed
+include "_batches.pxi"
 
 
 cdef class Kernel:

@@ -51,6 +51,20 @@ def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
     assert run["energy"]["power_balance"] < 1e-7
 
 
+def test_the_integrator_and_its_tolerances_can_be_chosen(call: Call) -> None:
+    path = EXAMPLES / "slider_crank.yaml"
+    declared = call("run", path, "--end", "0.5", "--json").json
+    words = ["--solver", "radau", "--rtol", "1e-4", "--atol", "1e-6"]
+    chosen = call("run", path, "--end", "0.5", *words, "--json").json
+    assert {key: chosen["integration"][key] for key in ("method", "rtol", "atol")} == {
+        "method": "Radau", "rtol": 1e-4, "atol": 1e-6,
+    }  # fmt: skip
+    assert chosen["integration"]["jacobians"] > 0
+    assert declared["integration"]["method"] == "DOP853"
+    gap = abs(chosen["final"]["theta"] - declared["final"]["theta"])
+    assert 1e-9 < gap < 1e-2  # the tolerance reaches the integrator
+
+
 def test_out_npz_and_set(call: Call, tmp_path: Path) -> None:
     result = call(
         "run", EXAMPLES / "pendulum.yaml", "--set", "theta=0.1", "--set", "l=2", "--end", "0.5", "--out", "r.npz"

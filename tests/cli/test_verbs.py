@@ -156,7 +156,38 @@ def test_doctor(call: Call) -> None:
     assert result.json["ok"] is True
     checks = {check["name"]: check for check in result.json["checks"]}
     assert {frozenset(check) for check in checks.values()} == {frozenset({"name", "ok", "detail", "remedy", "needed"})}
-    assert {"python", "numpy", "matplotlib", "compiler", "small model", "cache"} <= set(checks)
+    assert {"python", "numpy", "[robots]", "[mesh]", "[plot]", "[results]", "compiler", "small model", "cache"} <= set(
+        checks
+    )
+
+
+def test_doctor_tells_which_extras_are_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    from eomgen.cli import doctor
+
+    def version(name: str) -> str | None:
+        return None if name == "mujoco" else "1.2"
+
+    monkeypatch.setattr(doctor, "_version", version)
+    monkeypatch.setenv("CC", "no-such-compiler")  # quick
+    checks = {check["name"]: check for check in call("doctor", "--json").json["checks"]}
+    assert not checks["[robots]"]["ok"]
+    assert not checks["[robots]"]["needed"]
+    assert checks["[robots]"]["remedy"] == 'pip install "eomgen[robots]"'
+    assert checks["[mesh]"]["ok"]
+
+
+def test_every_extra_for_users_is_known_to_doctor() -> None:
+    import tomllib
+
+    from eomgen.cli.doctor import CORE, EXTRAS
+
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"]
+    bare = {name: {text.partition(">")[0] for text in texts} for name, texts in extras.items()}
+    assert {name: set(packages) for name, (_, packages) in EXTRAS.items()} == {
+        name: packages for name, packages in bare.items() if name not in ("test", "dev", "all")
+    }
+    assert set(CORE) == {text.partition(">")[0] for text in project["dependencies"]}
 
 
 def test_doctor_without_a_compiler_says_what_to_do(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,22 @@ def test_a_model_file_needs_no_sympy(words: list[str], tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr
 
 
+def test_a_warm_run_loads_nothing_heavy() -> None:
+    model = ROOT / "examples" / "slider_crank.yaml"
+    loaded = (
+        "import sys; from eomgen.cli.command import run_command\n"
+        "code = run_command(['run', '--end', '0.2', sys.argv[1]])\n"
+        "print('loaded', *sorted({name.partition('.')[0] for name in sys.modules}))\n"
+        "sys.exit(code)"
+    )
+    for _ in range(2):  # the first may have to compile
+        result = python(loaded, model)
+        assert result.returncode == 0, result.stderr
+    names = set(result.stdout.rpartition("loaded ")[2].split())
+    assert "numpy" in names
+    assert not names & {"scipy", "sympy", "rich", "Cython", "pandas", "matplotlib", "mujoco", "trimesh"}
+
+
 def test_the_hook_of_that_test_works() -> None:
     blocked = python(WITHOUT_SYMPY.replace("from eomgen.cli import main\nmain(sys.argv[1:])", "import sympy"))
     assert "a model file must not need SymPy" in blocked.stderr

@@ -168,6 +168,20 @@ def test_kinematics_equal_the_closed_form_over_a_full_turn(crank, case):
     np.testing.assert_allclose(q[2], r * np.cos(theta) + np.sqrt(length**2 - (e - r * np.sin(theta)) ** 2), atol=1e-13)
 
 
+@pytest.mark.parametrize("slack", [0.0, 1e-12])
+def test_the_slider_cannot_be_given_a_velocity_at_a_dead_centre(crank, slack):
+    m = crank()
+    r, l = (m.p[m.p_names.index(name)] for name in ("l1", "l2"))
+    with pytest.raises(AssemblyError, match=r"s_dot = 1 cannot .* dead centre.*; give theta_dot"):
+        m.x0(s=r + l - slack, s_dot=1.0)
+    x = m.x0(s=r + l - slack, theta_dot=2.0)
+    assert abs(x[m.x_names.index("s_dot")]) < 1e-4
+    theta = 0.01  # near, and the closed form still holds
+    x = m.x0(theta=theta, s_dot=1.0)
+    speed = -r * np.sin(theta) * (1 + r * np.cos(theta) / np.sqrt(l**2 - (r * np.sin(theta)) ** 2))
+    assert x[m.x_names.index("theta_dot")] == pytest.approx(1.0 / speed, rel=1e-9)
+
+
 def test_kinematics_is_pure(crank):
     m = crank()
     targets = np.array([[5.0, -3.0, 0.2, 5.0, 2.0]])

@@ -193,7 +193,7 @@ def test_the_models_own_names_come_first() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("angle(com)", "no angle"),
+        ("angle(com)", "does not turn"),
         ("x(comm)", "no body 'comm'"),
         ("momentum", "unknown name 'momentum'"),
         ("angular_momentum_x(bob.tip)", "no marker 'tip'"),

@@ -205,6 +205,57 @@ def test_wrong_options_are_told(pendulum):
             pendulum.simulate(**({"span": 1.0} | options))
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_tolerances_and_steps_that_cannot_be_are_told_alike_for_every_method(pendulum, method):
+    for options, words in [
+        ({"rtol": -1}, "rtol must not be negative and must be finite, not -1"),
+        ({"atol": -1}, "atol must not be negative and must be finite, not -1"),
+        ({"atol": float("nan")}, "atol must not be negative and must be finite, not nan"),
+        ({"atol": "small"}, "atol must be a number, or one for each of the 2 states, not 'small'"),
+        ({"atol": [1e-9]}, r"atol must be a number or have shape \(2,\)"),
+        ({"max_step": -1}, "max_step must be greater than 0 s, not -1"),
+        ({"max_step": "long"}, "max_step must be a number of seconds, not 'long'"),
+        ({"first_step": 0}, "first_step must be greater than 0 s and finite, not 0"),
+        ({"first_step": 2}, "first_step must not exceed the span of 1 s, not 2"),
+    ]:
+        with pytest.raises(UsageError, match=words):
+            pendulum.simulate(1.0, method=method, **options)
+    with pytest.raises(UsageError, match="min_step must not be negative"):
+        pendulum.simulate(1.0, method="LSODA", min_step=-1)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "Radau"])
+def test_an_rtol_below_rounding_is_raised_without_a_warning(pendulum, method):
+    traj = pendulum.simulate(0.05, {"theta": 0.1}, method=method, rtol=1e-20, atol=1e-8)
+    assert traj.metadata["rtol"] == 100 * np.finfo(float).eps
+
+
+def test_a_first_step_longer_than_the_way_to_a_corner(pendulum):
+    table = ([0.0, 0.01, 1.0], [0.0, 1.0, 1.0])
+    traj = pendulum.simulate(1.0, inputs={"tau": table}, method="Radau", first_step=0.1)
+    assert traj.t[-1] == 1.0
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+def test_functions_of_inputs_that_return_no_number_are_told_by_name_and_time(pendulum, method):
+    late = 0.25
+    for value, words in [
+        (None, "input tau .* returned None at t = 0.[23]"),
+        (np.zeros(2), r"input tau .* an array of shape \(2,\) at t = 0.[23]"),
+        (1j, "input tau .* returned 1j at t = 0.[23]"),
+    ]:
+        with pytest.raises(UsageError, match=words):
+            pendulum.simulate(1.0, inputs={"tau": lambda t, x, value=value: 0.0 if t < late else value}, method=method)
+    for value in (float("nan"), float("inf")):
+        with pytest.raises(UsageError, match=f"input tau is {value} at t = 0 s"):
+            pendulum.simulate(1.0, inputs={"tau": lambda t, x, value=value: value}, method=method)
+        with pytest.raises(SimulationError, match=rf"stopped near .*input tau is {value} at t = 0.2[5-9]"):
+            pendulum.simulate(1.0, inputs={"tau": lambda t, x, value=value: 0.0 if t < late else value}, method=method)
+    with pytest.raises(ZeroDivisionError) as caught:
+        pendulum.simulate(1.0, inputs={"tau": lambda t, x: 1 / 0}, method=method)
+    assert caught.value.__notes__ == ["raised by the function of input tau, called as f(0, x)"]
+
+
 def test_parameters_change_a_run_and_defaults_come_from_the_model(pendulum):
     traj = pendulum.simulate()
     assert traj.t[-1] == 5.0

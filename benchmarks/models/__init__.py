@@ -1,18 +1,23 @@
-"""The measured models, described through the public interface."""
+"""The measured models, described through the public interface; those of files stand beside this one."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import eomgen as eg
 
-from .measure import ROOT
+from ..measure import ROOT
 
+HERE = Path(__file__).parent
 EXAMPLES = ROOT / "examples"
 REFERENCE = ROOT / "tests" / "reference"
+
+#: Arms of which every parameter is a symbol, as papers on the dynamics of robots count their operations.
+ARMS = ("puma560", "stanford", "rx90", "panda", "iiwa")
 
 
 def chain_values(n: int) -> dict[str, float]:
@@ -98,6 +103,11 @@ def numeric_arm(name: str, driven: bool = False) -> eg.Model:
     return m
 
 
+def symbolic_arm(name: str) -> eg.Model:
+    """One of :data:`ARMS`."""
+    return eg.load(HERE / f"{name}.yaml")
+
+
 def panda() -> eg.Model:
     """The arm of Franka's Panda, seven revolute joints, all parameters numbers."""
     return numeric_arm("panda")
@@ -105,4 +115,4 @@ def panda() -> eg.Model:
 
 def humanoid() -> eg.Model:
     """A floating trunk with arms, legs, waist and neck, 30 joints in all, every parameter a number."""
-    return eg.load(ROOT / "benchmarks" / "humanoid.yaml")
+    return eg.load(HERE / "humanoid.yaml")

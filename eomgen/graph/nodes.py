@@ -1,0 +1,247 @@
+"""Stage graph, nodes: an operation on node ids -> the id of its node, simplified and made once.
+
+The rules are those of arithmetic on constants, signs, zeros and ones; they are exact up to rounding order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from .operations import COMMUTATIVE, EVEN, FOLD, ODD
+
+if TYPE_CHECKING:
+    from .functions import Function
+
+Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
+
+
+class Nodes:
+    """A table of interned nodes by id; see :class:`~.core.Graph`, which adds handles and functions."""
+
+    __slots__ = ("_ids", "calls", "nodes")
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self._ids: dict[Node, int] = {}
+        self.calls: dict[str, tuple[Function, tuple[int, ...]]] = {}
+
+    def _const(self, value: float) -> int:
+        if not math.isfinite(value):
+            raise OverflowError(f"constant {value!r} is not a finite number")
+        return self._node(("const", value + 0.0))
+
+    def _node(self, key: Node) -> int:
+        found = self._ids.get(key)
+        if found is None:
+            found = self._ids[key] = len(self.nodes)
+            self.nodes.append(key)
+        return found
+
+    def make(self, operation: str, *ids: int) -> int:
+        """The id of ``operation`` on operand ids, simplified.  The rules are exact up to rounding order."""
+        if operation == "add":
+            return self.add(*ids)
+        if operation == "sub":
+            return self.sub(*ids)
+        if operation == "mul":
+            return self.mul(*ids)
+        if operation == "div":
+            return self.div(*ids)
+        if operation == "neg":
+            return self.neg(*ids)
+        if operation in self.calls:
+            return self._node((operation, *ids))
+        if operation not in FOLD:
+            raise ValueError(f"unknown operation {operation!r}")
+        nodes = self.nodes
+        if all(nodes[i][0] == "const" for i in ids):
+            folded = self._fold(operation, ids)
+            if folded is not None:
+                return folded
+        if operation == "pow":
+            return self._power(*ids)
+        head = nodes[ids[0]]
+        if operation == "select":
+            if head[0] == "const":
+                return ids[1] if head[1] else ids[2]
+            if ids[1] == ids[2]:
+                return ids[1]
+        elif operation in ("min", "max", "and", "or") and ids[0] == ids[1]:
+            return ids[0] if operation in ("min", "max") else self._node((operation, *ids))
+        elif head[0] == "neg" and operation in ODD:
+            return self.neg(self._node((operation, head[1])))
+        elif head[0] == "neg" and operation in EVEN:
+            return self._node((operation, head[1]))
+        elif operation == "sqrt" and head[0] == "mul" and head[1] == head[2]:
+            return self._node(("abs", head[1]))
+        if operation in COMMUTATIVE and ids[0] > ids[1]:
+            ids = (ids[1], ids[0])
+        return self._node((operation, *ids))
+
+    def _fold(self, operation: str, ids: Iterable[int]) -> int | None:
+        try:
+            value = FOLD[operation](*(self.nodes[i][1] for i in ids))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            return None  # outside the domain: keep the node, the error belongs to evaluation
+        if isinstance(value, complex) or not math.isfinite(value):
+            return None
+        return self._const(value)
+
+    def _folded(self, operation: str, value: float, a: int, b: int) -> int:
+        """The constant ``value``; if it overflowed, the node that overflows when it is evaluated."""
+        if math.isfinite(value):
+            return self._const(value)
+        return self._node((operation, b, a) if operation in COMMUTATIVE and a > b else (operation, a, b))
+
+    def neg(self, a: int) -> int:
+        """-a"""
+        node = self.nodes[a]
+        kind = node[0]
+        if kind == "const":
+            return self._const(-node[1])
+        if kind == "neg":
+            return int(node[1])
+        if kind == "sub":
+            return self.sub(node[2], node[1])
+        if kind == "mul" and self.nodes[node[1]][0] == "const":
+            return self._node(("mul", *sorted((self._const(-self.nodes[node[1]][1]), node[2]))))
+        if kind == "mul" and self.nodes[node[2]][0] == "const":
+            return self._node(("mul", *sorted((self._const(-self.nodes[node[2]][1]), node[1]))))
+        return self._node(("neg", a))
+
+    def add(self, a: int, b: int) -> int:
+        """a + b"""
+        nodes = self.nodes
+        x, y = nodes[a], nodes[b]
+        if x[0] == "const":
+            if x[1] == 0.0:
+                return b
+            if y[0] == "const":
+                return self._folded("add", x[1] + y[1], a, b)
+        elif y[0] == "const" and y[1] == 0.0:
+            return a
+        if y[0] == "neg":
+            return self.sub(a, y[1])
+        if x[0] == "neg":
+            return self.sub(b, x[1])
+        if a == b:
+            return self.mul(self._const(2.0), a)
+        if x[0] == "sub" and x[2] == b:  # (u - b) + b
+            return int(x[1])
+        if y[0] == "sub" and y[2] == a:
+            return int(y[1])
+        return self._node(("add", a, b) if a < b else ("add", b, a))
+
+    def sub(self, a: int, b: int) -> int:
+        """a - b"""
+        if a == b:
+            return self._const(0.0)
+        nodes = self.nodes
+        x, y = nodes[a], nodes[b]
+        if y[0] == "const":
+            if y[1] == 0.0:
+                return a
+            if x[0] == "const":
+                return self._folded("sub", x[1] - y[1], a, b)
+        elif x[0] == "const" and x[1] == 0.0:
+            return self.neg(b)
+        if y[0] == "neg":
+            return self.add(a, y[1])
+        if x[0] == "neg":
+            return self.neg(self.add(x[1], b))
+        if x[0] == "add":  # (b + u) - b
+            if x[1] == b:
+                return int(x[2])
+            if x[2] == b:
+                return int(x[1])
+        elif x[0] == "sub" and x[1] == b:  # (b - u) - b
+            return self.neg(x[2])
+        if y[0] == "sub" and y[1] == a:  # a - (a - u)
+            return int(y[2])
+        if y[0] == "add" and a in (y[1], y[2]):  # a - (a + u)
+            return self.neg(y[2] if y[1] == a else y[1])
+        if ("sub", b, a) in self._ids:  # share one difference with both signs
+            return self._node(("neg", self._ids[("sub", b, a)]))
+        return self._node(("sub", a, b))
+
+    def mul(self, a: int, b: int) -> int:
+        """a * b"""
+        nodes = self.nodes
+        x, y = nodes[a], nodes[b]
+        if y[0] == "const":
+            a, b, x, y = b, a, y, x
+        if x[0] == "const":
+            value = x[1]
+            if value == 0.0:
+                return a
+            if value == 1.0:
+                return b
+            if y[0] == "const":
+                return self._folded("mul", value * y[1], a, b)
+            if value == -1.0:
+                return self.neg(b)
+            if y[0] == "neg":
+                return self.mul(self._const(-value), y[1])
+            if y[0] == "mul":  # merge constant factors, unless that would overflow or lose digits
+                u, rest = (y[1], y[2]) if nodes[y[1]][0] == "const" else (y[2], y[1])
+                if nodes[u][0] == "const" and 1e-290 < abs(value * nodes[u][1]) < math.inf:
+                    return self.mul(self._const(value * nodes[u][1]), rest)
+            return self._node(("mul", a, b) if a < b else ("mul", b, a))
+        if x[0] == "neg":
+            return self.mul(x[1], y[1]) if y[0] == "neg" else self.neg(self.mul(x[1], b))
+        if y[0] == "neg":
+            return self.neg(self.mul(a, y[1]))
+        if a == b and x[0] == "sqrt":
+            return int(x[1])
+        return self._node(("mul", a, b) if a < b else ("mul", b, a))
+
+    def div(self, a: int, b: int) -> int:
+        """a / b; division by a constant becomes a product only when that is exact."""
+        nodes = self.nodes
+        x, y = nodes[a], nodes[b]
+        if y[0] == "const" and y[1] != 0.0:
+            if y[1] == 1.0:
+                return a
+            if x[0] == "const" and math.isfinite(x[1] / y[1]):
+                return self._const(x[1] / y[1])
+            if math.frexp(y[1])[0] in (0.5, -0.5) and abs(y[1]) > 1e-300:
+                return self.mul(self._const(1.0 / y[1]), a)
+        if x[0] == "const" and x[1] == 0.0 and not (y[0] == "const" and y[1] == 0.0):
+            return a
+        if a == b and y[0] != "const":
+            return self._const(1.0)
+        if x[0] == "neg":
+            return self.neg(self.div(x[1], b))
+        if y[0] == "neg":
+            return self.neg(self.div(a, y[1]))
+        return self._node(("div", a, b))
+
+    def _power(self, a: int, b: int) -> int:
+        """a ** b: integer exponents up to 64 as products, halves through sqrt, the rest as pow."""
+        exponent = self.nodes[b]
+        if exponent[0] != "const":
+            return self._node(("pow", a, b))
+        n = exponent[1]
+        if n == 0.0:
+            return self._const(1.0)
+        if n < 0.0:
+            return self.div(self._const(1.0), self._power(a, self._const(-n)))
+        if n == 0.5:
+            return self.make("sqrt", a)
+        if n == int(n) and n <= 64:
+            return self._product_power(a, int(n))
+        if 2 * n == int(2 * n) and n <= 64:
+            return self.mul(self._product_power(a, int(n)), self.make("sqrt", a))
+        return self._node(("pow", a, b))
+
+    def _product_power(self, a: int, n: int) -> int:
+        result, square = None, a
+        while n:
+            if n & 1:
+                result = square if result is None else self.mul(result, square)
+            n >>= 1
+            if n:
+                square = self.mul(square, square)
+        return self._const(1.0) if result is None else result

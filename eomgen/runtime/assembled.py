@@ -1,0 +1,147 @@
+"""Stage runtime: the calls of a Module that close its loops: values by name -> positions and states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .layout import Layout, number
+
+if TYPE_CHECKING:
+    from .initial import Initial
+
+
+class Assembled:
+    """What a :class:`~.module.Module` can say about the positions that its loops allow."""
+
+    layout: Layout
+    n_q: int
+
+    def x0(
+        self,
+        values: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> Array:
+        """An assembled state.
+
+        Parameters
+        ----------
+        values, **named : float
+            Coordinates and velocities (``theta``, ``theta_dot``) of the tree or of cut joints, held exactly; the rest
+            is solved.  Without any, the declared initial values are held; else they are kept where they leave room.
+        t : float
+            Time (s); matters for driven constraints only.
+        p, u : optional
+            As for :meth:`bind`.
+
+        Returns
+        -------
+        (n_x,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close with these values, or the values contradict each other.
+        UsageError
+            An unknown name.
+        """
+        initial = self._initial(t, p, u)
+        given = initial.sort(_numbers(values, named))
+        q = initial.assembled(given.positions)
+        v = initial.velocities(q, given.rates if given.positions or given.rates else None)
+        return np.concatenate([q, v])
+
+    def assemble(
+        self,
+        guess: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> Array:
+        """Close the loops from a guess.
+
+        Parameters
+        ----------
+        guess, **named : float
+            Coordinates of the tree or of cut joints.  They are kept as far as the loops allow, the independent ones
+            first; the others tell the branches apart.  What is not named starts from the declared initial position.
+        t, p, u
+            As for :meth:`x0`.
+
+        Returns
+        -------
+        (n_q,) array
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close.
+        """
+        initial = self._initial(t, p, u)
+        values = _numbers(guess, named)
+        given = initial.sort(values)
+        if given.rates:
+            raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
+        return initial.from_guess(given.positions) if values else initial.assembled({})
+
+    def branches(
+        self,
+        values: Mapping[str, float] | None = None,
+        /,
+        *,
+        t: float = 0.0,
+        p: Any = None,
+        u: Any = None,
+        **named: float,
+    ) -> list[Array]:
+        """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
+
+        The search is bounded and repeats exactly; it may miss a branch.
+        """
+        initial = self._initial(t, p, u)
+        given = initial.sort(_numbers(values, named)).positions
+        first = initial.assembled(given)
+        return initial.branches(given or initial.sort(self.layout.initial).positions, first)
+
+    def branch(self, x: ArrayLike, t: float = 0.0) -> int:
+        """Which side of the dead centres a state or position lies on.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_q,) array
+
+        Returns
+        -------
+        int
+            1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
+            coordinates.
+        """
+        initial = self._initial(t, None, None)
+        here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
+        there = initial.side(initial.reference())
+        return 0 if abs(here) < 1e-8 else int(np.sign(here * (np.sign(there) or 1.0)))
+
+    def _initial(self, t: float, p: Any, u: Any) -> Initial:
+        from .initial import start_from
+        from .module import Module
+
+        assert isinstance(self, Module)
+        return start_from(self, t, p, u)
+
+
+def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:
+    merged = {**(values or {}), **named}
+    return {name: number(name, value) for name, value in merged.items()}

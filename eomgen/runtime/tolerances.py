@@ -1,0 +1,77 @@
+"""Stage runtime: tolerances and limits of steps as a user gives them -> checked values that every solver takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+from .layout import number
+
+LEAST = 100.0 * np.finfo(float).eps  #: smallest relative tolerance, as in SciPy: nothing smaller can be kept
+
+
+def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options with every tolerance and limit checked.
+
+    Parameters
+    ----------
+    n : int
+        Number of states.
+    span : float
+        Length of the run (s), the longest first step.
+    options : mapping
+        rtol and atol (a number or n of them), max_step, first_step, min_step; others are left as they are.
+
+    Returns
+    -------
+    dict of str to object
+        rtol and atol as a float or an (n,) array, rtol at least 100 times the spacing of floating-point numbers; the
+        steps as floats, without those that are None.
+
+    Raises
+    ------
+    UsageError
+        A value that cannot be.
+    """
+    checked = {name: value for name, value in options.items() if value is not None or not name.endswith("_step")}
+    for name in ("rtol", "atol"):
+        if name in checked:
+            checked[name] = _tolerance(name, checked[name], n)
+    if "rtol" in checked:
+        rtol = checked["rtol"]
+        checked["rtol"] = max(rtol, LEAST) if isinstance(rtol, float) else np.maximum(rtol, LEAST)
+    for name in ("max_step", "first_step"):
+        if name in checked:
+            checked[name] = _step(name, checked[name])
+    if "min_step" in checked:
+        checked["min_step"] = number("min_step", checked["min_step"])
+        if checked["min_step"] < 0.0:
+            raise UsageError(f"min_step must not be negative, not {checked['min_step']:.6g}")
+    if checked.get("first_step", 0.0) > span:
+        raise UsageError(f"first_step must not exceed the span of {span:.6g} s, not {checked['first_step']:.6g}")
+    return checked
+
+
+def _tolerance(name: str, given: Any, n: int) -> Any:
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name} must be a number, or one for each of the {n} states, not {given!r}") from None
+    if values.shape not in ((), (n,)):
+        raise UsageError(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
+    if not (np.isfinite(values).all() and (values >= 0.0).all()):
+        raise UsageError(f"{name} must not be negative and must be finite, not {given}")
+    return values if values.ndim else float(values)
+
+
+def _step(name: str, given: Any) -> float:
+    try:
+        value = float(given)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name} must be a number of seconds, not {given!r}") from None
+    if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
+        raise UsageError(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
+    return value
