@@ -13,11 +13,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ToolchainError
+from ..errors import ToolchainError, UsageError
 from ..numeric.scales import Array
+from .late import LateCore, eager
 
 if TYPE_CHECKING:
     from .module import Module
+
+#: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
+Late = tuple[tuple[str, ...], tuple[str, str] | None]
 
 
 def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
@@ -28,25 +32,40 @@ def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
     TypeError
         The code has no file of its own: a hand-made core, or one that calls Python twins of native functions.
     """
-    core: Any = module.core
+    core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
     if not file or sys.modules.get(name) is not core:
         raise TypeError(
             f"the module of {module.name!r} cannot be pickled: its code is not in a file of its own (a core made by "
             "hand, or the numpy target with native functions); target cython can be pickled"
         )
-    return restore, (type(module), name, str(file), module.p, module.u)
+    late: Late | None = None
+    if isinstance(module.core, LateCore):
+        further: Any = module.core.__dict__.get("further")
+        late = module.core.names, None if further is None else (further.__name__, str(further.__file__))
+    return restore, (type(module), name, str(file), module.p, module.u, late)
 
 
-def restore(kind: type[Module], name: str, file: str, p: Array, u: Array) -> Module:
-    """The module of a pickle.
+def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> Module:
+    """The module of a pickle, with the rarer kernels where they had been made.
 
     Raises
     ------
     ToolchainError
         The file of its code is gone.
     """
-    return kind(_find_core(name, file), p, u)
+    core: Any = _find_core(name, file)
+    if late is None:
+        return kind(core, p, u)
+    names, made = late
+
+    def load() -> Any:
+        if made is None:
+            rare = ", ".join(name for name in names if name not in core.names)
+            raise UsageError(f"the pickled module came without {rare}; call one of them before pickling it")
+        return _find_core(*made)
+
+    return kind(LateCore(core, names, load), p, u)
 
 
 def _find_core(name: str, file: str) -> ModuleType:
