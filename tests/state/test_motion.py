@@ -139,16 +139,6 @@ def test_the_start_at_a_singularity_is_named() -> None:
         module.rhs(0.0, x)
 
 
-@pytest.mark.parametrize("target", ["cython", "numpy"])
-def test_zero_euler_parameters_are_a_named_error(target: str) -> None:
-    module = free_body("euler_parameters", (1, 2, 3)).compile(target=target)
-    x = module.x0(f_wx=1.0)
-    x[3:7] = 0.0
-    for call in (lambda: module.rhs(0.0, x), lambda: module.project(x)):
-        with pytest.raises(eg.EomgenError, match=r"f_e0 .. f_e3 are all zero.*f_e0 = 1"):
-            call()
-
-
 def test_initial_values() -> None:
     module = free_body("euler_parameters", (1, 2, 3)).compile(target="numpy")
     np.testing.assert_array_equal(module.x0()[3:7], [1, 0, 0, 0])
