@@ -6,6 +6,7 @@ of each wrench.  What is computed is the same as the graph's own evaluator compu
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import judges
@@ -91,6 +92,29 @@ def test_methods_equal_newton_and_euler_and_balance_power(trees: Trees) -> None:
             judges.agree(x_dot[n:], first[n:], 1e-11, cond)
             change, parts = energy_rate(module, judge, x, x_dot[n:])
             assert abs(change - judge.power) <= 1e-9 * max(abs(judge.power), parts)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_drives_add_their_inertia(method: str) -> None:
+    """A rotor that turns with a coordinate (gear included in J) adds J v^2 / 2, J on the diagonal of M and no more."""
+    made = tree(("revolute", "prismatic", "screw", "free"), 5, "euler_parameters")
+    m = made.mechanism
+    drives = {s.coordinates[0]: 0.2 + 0.3 * k for k, s in enumerate(m.joints) if len(s.coordinates) == 1}
+    joints = [replace(s, armature=m.graph.constant(drives[s.coordinates[0]])) if s.coordinates[0] in drives else s
+              for s in m.joints]  # fmt: skip
+    equations = derived(replace(made, mechanism=replace(m, joints=tuple(joints))), method)
+    modules = [equations.compile(target="numpy", kernels=KERNELS)]
+    if method == "recursive":
+        modules.append(equations.compile(kernels=KERNELS, optimize=0))
+    for module in modules:
+        x = module.project(np.random.default_rng(8).uniform(-1, 1, module.n_x))
+        judge, q, v = Judge(module, made, x), x[: module.n_q], x[module.n_q :]
+        J = np.array([drives.get(name.removesuffix("_dot"), 0.0) for name in module.v_names])
+        assert (J > 0.0).sum() == len(drives) >= 3
+        M = judge.M + np.diag(J)
+        np.testing.assert_allclose(module.mass_matrix(q), M, rtol=0, atol=1e-10 * np.abs(M).max())
+        judges.agree(module.rhs(0.0, x)[module.n_q :], np.linalg.solve(M, -judge.h), 1e-9, float(np.linalg.cond(M)))
+        assert module.energy(x)[0] == pytest.approx(0.5 * v @ M @ v, rel=1e-9)
 
 
 def test_velocities_are_the_rates_of_poses(trees: Trees) -> None:
