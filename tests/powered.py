@@ -58,6 +58,23 @@ def basis(module: Any, q: np.ndarray) -> np.ndarray:
     return np.array([rotations.coordinate_rates(module.metadata, q, e) for e in np.eye(module.n_v)]).T
 
 
+def in_velocities(module: Any, q_dot: np.ndarray, N: np.ndarray, v: np.ndarray, M: np.ndarray, h: np.ndarray) -> Any:
+    """M q'' + h of rates of the coordinates in terms of v': N^T M N, N^T (h + M N' v)."""
+    bent = rotations.coordinate_rates(module.metadata, q_dot, v)  # N' v, linear in the Euler parameters ...
+    bent[[name[-3:-1] != "_e" for name in module.q_names]] = 0.0  # ... and zero elsewhere
+    return N.T @ M @ N, N.T @ (h + M @ bent)
+
+
+def gamma(module: Any, x: np.ndarray, q_dot: np.ndarray) -> np.ndarray:
+    """C_q' v by differences of the constraint Jacobian."""
+    v = x[module.n_q :]
+
+    def rates(columns: np.ndarray) -> np.ndarray:
+        return np.einsum("ijk,j->ik", module.constraint_jacobian(columns, rows="all"), v)
+
+    return judges.first(rates, x[: module.n_q], q_dot)
+
+
 @dataclass
 class Judge:
     """What the bodies do at a state, from differences of poses alone, and what the forces then are.
@@ -77,8 +94,6 @@ class Judge:
         self.bodies = bodies = judges.Bodies(module, q, self.q_dot)
         rigid = judges.RigidBodies(made.masses, made.centers, made.inertias, made.gravity)
         M, h = bodies.newton_euler(rigid)
-        bent = rotations.coordinate_rates(module.metadata, self.q_dot, v)  # N' v, linear in the Euler parameters
-        bent[[name[-3:-1] != "_e" for name in module.q_names]] = 0.0
         last = len(made.masses) - 1
         tip, tip_rate, tip_J = bodies.point(last, TIP)
         _, corner_rate, corner_J = bodies.point(0, CORNER)
@@ -90,17 +105,17 @@ class Judge:
         self.power = float(drag @ tip_rate + push @ corner_rate + twist @ bodies.w[last // 2])
         pull = drag - STIFFNESS * (length - LENGTH) * along
         Q = tip_J.T @ pull + corner_J.T @ push + bodies.J_w[last // 2].T @ twist
-        self.M, self.h = N.T @ M @ N, N.T @ (h + M @ bent - Q)
+        self.M, self.h = in_velocities(module, self.q_dot, N, v, M, h - Q)
 
 
-def energy_rate(module: Any, judge: Judge, x: np.ndarray, a: np.ndarray) -> tuple[float, float]:
+def energy_rate(module: Any, q_dot: np.ndarray, x: np.ndarray, a: np.ndarray) -> tuple[float, float]:
     """(T + V)' along a motion by differences of the energies, and the size of its parts."""
     n, v = module.n_q, x[module.n_q :]
-    moving = np.concatenate([judge.q_dot, np.zeros(len(v))])
+    moving = np.concatenate([q_dot, np.zeros(len(v))])
     pushed = np.concatenate([np.zeros(n), a])
     speed = max(float(np.abs(v).max()), 1e-3)
     parts = [
-        judges.first(module.energy, x, moving, size=max(1.0, np.abs(judge.q_dot).max())).sum(),
+        judges.first(module.energy, x, moving, size=max(1.0, np.abs(q_dot).max())).sum(),
         judges.first(module.energy, x, pushed, size=np.abs(a).max() / speed)[0],
     ]
     return sum(parts), max(map(abs, parts))
