@@ -14,7 +14,9 @@ from .projection import ACCEPTED, EXACT, SETTLED, TIKHONOV, largest
 from .scales import Array, Position, Scales
 
 STEPS = 80  #: damped steps at most
+DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
 LONGEST = 0.5  #: largest scaled step
+STEEP = 10.0  #: length of a row's scaled gradient above which the row counts less, lest it drown the others
 
 
 class Equations(NamedTuple):
@@ -52,8 +54,10 @@ class System(NamedTuple):
         return e, J * self.free
 
 
-def close(system: System, q: Array, steps: int = STEPS) -> tuple[Array, float]:
+def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING) -> tuple[Array, float]:
     """Minimise the scaled residual from q.
+
+    Damping at first: none where q is near a closed position, so that directions that hardly count do not creep.
 
     Returns
     -------
@@ -63,23 +67,26 @@ def close(system: System, q: Array, steps: int = STEPS) -> tuple[Array, float]:
         Largest scaled residual there; closed when it is not above 1e-10.
     """
     e, J = system.evaluate(q)
-    damping = 1e-3
     for _ in range(steps):
         size = largest(e)
         if size <= EXACT or not np.isfinite(size):
             break
-        G = J @ J.T
+        steepness = np.sqrt((J * J).sum(axis=1))
+        weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
+        K, f = J * weights[:, None], e * weights
+        G = K @ K.T
         top = float(G.diagonal().max())
-        if top == 0.0 or largest(J.T @ e) <= 1e-15 * top:
+        if top == 0.0 or largest(K.T @ f) <= 1e-15 * top:
             break  # nothing that may move makes a difference
         G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
-        dz = -J.T @ np.linalg.solve(G, e)
+        dz = -K.T @ np.linalg.solve(G, f)
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest
         trial = system.scales.move(q, dz)
         e_trial, J_trial = system.evaluate(trial)
-        gained = float(e @ e - e_trial @ e_trial)
+        f_trial = e_trial * weights
+        gained = float(f @ f - f_trial @ f_trial)
         if not gained > 0.0:  # NaN included
             if size <= SETTLED:
                 break

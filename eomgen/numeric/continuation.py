@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import AssemblyError
-from .closure import Equations, System, close, closed
+from .closure import DAMPING, Equations, System, close, closed
 from .projection import largest
 from .scales import Array, Indices, Position, Scales
 
@@ -16,6 +16,7 @@ STEP = 0.1  #: largest scaled change of a held value in one step
 JUMP = 0.6  #: largest scaled change of any coordinate in one step
 SMALLEST = 2.0**-10  #: of STEP, before giving up
 LONGEST = 200.0  #: scaled distance too long to walk
+TRIALS = 5000  #: steps at most, those taken back included
 
 
 def follow(
@@ -48,7 +49,8 @@ def follow(
     Raises
     ------
     AssemblyError
-        The way is blocked (a dead centre of a led coordinate), or longer than 200 rad or length scales.
+        The way is blocked (a dead centre of a led coordinate), longer than 200 rad or length scales, or too winding
+        for the number of steps allowed, as the many turns of a fine thread are.
     """
     q, target = np.array(start), np.array(start)
     target[held] = values
@@ -59,17 +61,24 @@ def follow(
     gap = equations.difference(equations.evaluate(q)[0]) if equations else np.empty(0)
     length = max(largest(way), largest(gap / equations.scales) if equations else 0.0)
     if not length <= LONGEST:
-        raise AssemblyError(f"the way from the reference position is too long ({length:.3g})")
+        raise AssemblyError(f"the way from the reference position is too long ({length:.3g} rad or length scales)")
     done, step = 0.0, min(1.0, STEP / length) if length else 1.0
-    usual = step
+    usual, trials = step, 0
     while done < 1.0:
+        trials += 1
+        if trials > TRIALS:
+            raise AssemblyError(f"the way is too winding: {TRIALS} steps lead through {100 * done:.0f} % of it")
         reached = min(1.0, done + step)
         trial = np.array(q)
         trial[held] = values if reached == 1.0 else scales.move(start, reached * way)[held]
         part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
-        trial, residual = close(System(position, scales, free, part), trial, steps=15)
-        if closed(residual) and largest(scales.distance(trial, q)) <= JUMP:
-            q, done = trial, reached
+        system = System(position, scales, free, part)
+        for damping in (0.0, DAMPING):
+            moved, residual = close(system, trial, steps=15, damping=damping)
+            if closed(residual):
+                break
+        if closed(residual) and largest(scales.distance(moved, q)) <= JUMP:
+            q, done = moved, reached
             step = min(2.0 * step, usual)
         else:
             step *= 0.5

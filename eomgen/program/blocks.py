@@ -62,10 +62,11 @@ class BlockMaker:
             pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
-            return list(terms.accelerations), one if len(pivots) == 1 else exceeding(pivots, pivots)
+            checks = one if len(pivots) == 1 else exceeding(pivots, pivots)
+            return list(terms.accelerations), [*self._turned, *checks]
         factor = factorize(terms.mass_matrix, terms.parent)
         checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
-        return solve(factor, [-h for h in terms.bias]), checks
+        return solve(factor, [-h for h in terms.bias]), [*self._turned, *checks]
 
     def _symbols(self, names: Sequence[str]) -> list[Expr]:
         return [self.terms.graph.symbol(name) for name in names]
@@ -91,13 +92,24 @@ class BlockMaker:
             r2.append(r)
         return r2
 
+    @cached_property
+    def _squares(self) -> list[Expr]:
+        """|e|^2 of each set of Euler parameters, as rotations have it."""
+        sets = (self._symbols(self.terms.q[i : i + 4]) for i, _ in self.terms.balls)
+        return [e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3] for e in sets]
+
+    @property
+    def _turned(self) -> list[Expr]:
+        """Conditions: no set of Euler parameters is zero, which no result need show where no rotation matters."""
+        graph = self.terms.graph
+        return [graph.apply("lt", graph.zero, square) for square in self._squares]
+
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
         q = self._symbols(self.terms.q)
-        for i, _ in self.terms.balls:
-            e = q[i : i + 4]
-            length = self.terms.graph.apply("sqrt", e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
-            q[i : i + 4] = [x / length for x in e]
+        for (i, _), square in zip(self.terms.balls, self._squares, strict=True):
+            length = self.terms.graph.apply("sqrt", square)
+            q[i : i + 4] = [x / length for x in q[i : i + 4]]
         return q
 
     # -- blocks ---------------------------------------------------------------------------------------------------
@@ -153,6 +165,7 @@ class BlockMaker:
             return None
         if name in always:
             outputs = always[name]()
+            checks = self._turned if name == "bias" else []  # drivers of large trees go by it
         elif name in trees and not self.has_loops:
             outputs = trees[name]()
         elif name == "rhs" and self.unrolled:
@@ -197,9 +210,8 @@ class BlockMaker:
         match name:
             case "terms":  # M lower packed, h, C_q, gamma
                 lower = [terms.mass_matrix[i][k] for i in range(n) for k in range(i + 1)]
-                return self._internal(
-                    name, "q v", [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
-                )
+                every = [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
+                return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
                 return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
             case "rate":  # C_t

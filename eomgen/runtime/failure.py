@@ -58,6 +58,9 @@ class Fail:
                 f": {', '.join(bad)} already {'is' if len(bad) == 1 else 'are'} not",
                 "check the state given",
             )
+        elif names and (trouble := no_rotation(self.layout, x)):
+            what, remedy = trouble
+            status = 1
         elif status in (1, 2) and names and (trouble := rotation_trouble(self.layout, x)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif self.culprit is not None and names:
@@ -71,12 +74,19 @@ class Fail:
         return {"x": self.layout.x, "q": self.layout.q, "motion": self.layout.x + self.layout.a}.get(kind, ())
 
 
-def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
-    """What is wrong with how a rotation is described at a state, and the remedy; None if nothing is."""
+def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
+    """Euler parameters whose squares are all zero at a state, and the remedy; None if there are none."""
     for i, _ in layout.balls:
         if not np.abs(x[i : i + 4]).max() > 1e-150:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
             return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
+    return None
+
+
+def rotation_trouble(layout: Layout, x: Array) -> tuple[str, str] | None:
+    """What is wrong with how a rotation is described at a state, and the remedy; None if nothing is."""
+    if trouble := no_rotation(layout, x):
+        return trouble
     for joint, k, vanishing in layout.metadata.get("euler_angles", ()):
         if abs(np.cos(x[k]) if vanishing == "cos" else np.sin(x[k])) < LOCKED:
             what = f"the Euler angles of joint {joint!r} are singular here ({layout.q[k]} = {np.degrees(x[k]):.6g} deg)"

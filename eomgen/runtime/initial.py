@@ -156,7 +156,7 @@ class Initial:
         """Position with the given values exact, and the declared ones where they leave room."""
         layout = self.layout
         declared = self.sort(layout.initial).positions
-        if not layout.n_h:
+        if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
             return self._with(self._with(layout.q_reference, declared), given)
         if not given:
             return self.close(layout.q_reference, declared).q

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import eomgen as eg
 from eomgen.errors import ModelError
@@ -78,6 +79,39 @@ def test_bolt_falls_down_its_thread() -> None:
     assert found == pytest.approx(-2 * 9.81 * h / (2 * h * h + 0.003), rel=1e-13)
 
 
+def thread_turns(q: np.ndarray, pose: np.ndarray, pitch: float) -> float:
+    """Angle of the fine screw below by its advance, from a pose."""
+    base, end = (np.eye(4) for _ in range(2))
+    for place, turn, at in ((base, BASE[1], BASE[0]), (end, END[1], END[0])):
+        place[:3, :3], place[:3, 3] = Rotation.from_euler("xyz", turn).as_matrix(), at
+    relative = np.linalg.inv(base) @ pose @ end
+    angle = relative[2, 3] / (pitch / (2 * np.pi))
+    assert relative[:2, 3] == pytest.approx([0, 0], abs=1e-10)
+    assert np.arctan2(relative[1, 0], relative[0, 0]) == pytest.approx(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
+    return float(angle)
+
+
+BASE = (0.2, -0.1, 0.4), (0.3, -0.4, 0.5)
+END = (-0.1, 0.05, 0.2), (-0.2, 0.3, 0.6)
+
+
+def test_a_fine_thread_that_is_cut_is_turned_in_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundredth of a metre a turn: the angle is 628 times as steep as the other rows."""
+    pitch = 0.01
+    m = eg.Model("pair", gravity=(0.5, -9.81, 0.7))
+    body = m.body("body", mass=1.3, com=(0.1, 0.2, -0.1), inertia=(0.2, 0.3, 0.25))
+    m.free("f", m.ground, body, coordinates=["x", "y", "z", "a", "b", "c"])
+    m.screw("j", m.ground.at(*BASE[0], rpy=BASE[1]), body.at(*END[0], rpy=END[1]), pitch=pitch)
+    assert m.check().loop_joints == ["j"]
+    module = m.compile(target="numpy")
+    q = module.x0()[: module.n_q]
+    start = thread_turns(q, module.poses(q)[0], pitch)
+    monkeypatch.setattr("eomgen.numeric.continuation.TRIALS", 200)
+    q = module.x0(j=start + 3.0)[: module.n_q]
+    assert np.abs(module.constraints(q, rows="all")).max() < 1e-12
+    assert thread_turns(q, module.poses(q)[0], pitch) == pytest.approx(start + 3.0, abs=1e-9)
+
+
 def test_bodies_held_by_rods_alone_are_told() -> None:
     m = eg.Model("rods")
     m.distance("rod", m.ground, m.body("ball", mass=1, inertia=(1, 1, 1)).at(0, 1, 0), length=1)
@@ -103,7 +137,6 @@ def test_loop_of_guides_alone_cannot_be_cut() -> None:
         ("curve_slider", {"curve": [0, 1]}, r"joints\.j\.curve: \[0, 1\] is not three numbers"),
         ("curve_slider", {"curve": [0, 1, 2]}, r"joints\.j\.curve: does not depend on j"),
         ("curve_slider", {"curve": ["j", "t", 0]}, r"joints\.j\.curve: the time 't' cannot stand here"),
-        ("revolute", {"pitch": 1}, r"a revolute joint has no 'pitch'"),
     ],
 )
 def test_bad_options(kind: str, keys: dict[str, object], message: str) -> None:
@@ -111,6 +144,12 @@ def test_bad_options(kind: str, keys: dict[str, object], message: str) -> None:
     m.joint(kind, "j", m.ground, m.body("b", mass=1), **keys)
     with pytest.raises(ModelError, match=message):
         m.mechanism()
+
+
+def test_an_option_of_another_joint_is_refused_where_it_is_written() -> None:
+    m = eg.Model("bad")
+    with pytest.raises(eg.UsageError, match=r"revolute has no argument 'pitch'"):
+        m.joint("revolute", "j", m.ground, m.body("b", mass=1), pitch=1)
 
 
 def test_options_round_trip_through_a_file(tmp_path: Path) -> None:

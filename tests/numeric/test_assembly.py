@@ -109,6 +109,13 @@ def test_following_a_held_value_stays_on_the_branch(crank):
         follow(c.position, start, c.scales, np.array([2]), np.array([0.6]))
 
 
+def test_a_way_of_too_many_steps_is_given_up(crank, monkeypatch):
+    c = crank()
+    monkeypatch.setattr("eomgen.numeric.continuation.TRIALS", 20)
+    with pytest.raises(AssemblyError, match=r"too winding: 20 steps lead through 22 % of it"):
+        follow(c.position, c.closed(0.1), c.scales, np.array([0]), np.array([9.0]))
+
+
 def test_velocities_given_are_exact_and_contradictions_are_told(crank):
     c = crank(t=0.1, a=0.02, w=5.0)
     q = c.closed(0.7)

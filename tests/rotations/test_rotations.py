@@ -21,6 +21,7 @@ HALF_TURNS = [np.pi * np.array(n) / np.linalg.norm(n) for n in ([1, 0, 0], [0, 1
 SPECIAL = [np.zeros(3), np.array([1e-9, -2e-9, 0]), np.array([3e-3, 4e-3, 8e-3]), *HALF_TURNS]
 GENERAL = list(Rotation.random(12, random_state=3).as_rotvec())
 Way = Callable[..., np.ndarray]
+LAMBDIFIED: dict[Any, Any] = {}
 
 
 def numbers(function: Callable[..., Any], *arguments: Any) -> np.ndarray:
@@ -63,10 +64,14 @@ def algebra(function: Callable[..., Any], *arguments: Any) -> np.ndarray:
 def symbols(function: Callable[..., Any], *arguments: Any) -> np.ndarray:
     """In SymPy, with the numbers put in afterwards."""
     made, values = _replaced(arguments, lambda name: sympy.Symbol(name, real=True))
-    result = function(*made)
-    known = [sympy.Symbol(name, real=True) for name in values]
-    found = np.array(sympy.lambdify(known, list(result), "math", cse=True)(*values.values()), dtype=float)
-    return found if result.shape[1] == 1 else found.reshape(result.shape)
+    key = (function, repr(made))
+    if key not in LAMBDIFIED:  # made once, however many numbers are put in
+        result = function(*made)
+        known = [sympy.Symbol(name, real=True) for name in values]
+        LAMBDIFIED[key] = sympy.lambdify(known, list(result), "math", cse=True), result.shape
+    call, shape = LAMBDIFIED[key]
+    found = np.array(call(*values.values()), dtype=float)
+    return found if shape[1] == 1 else found.reshape(shape)
 
 
 WAYS = pytest.mark.parametrize("way", [numbers, algebra, symbols], ids=["numbers", "algebra", "symbols"])
