@@ -97,7 +97,7 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
         choice: Choice | None = None
         if chosen != "auto":
             tree = METHODS[chosen](kinematics)
-        elif kinematics.constraints.values:
+        elif kinematics.constraints.labels:
             tree = METHODS["embedding"](kinematics)
         else:
             tree, choice = choose(kinematics)

@@ -129,16 +129,20 @@ def random_mechanism(
         specs.append(JointSpec(f"q{k}", joint, *((b, a) if turned else (a, b)), names, False))
     elements: list[Force] = []
     if forces:
-        coordinates = [c for s in specs for c in s.coordinates if s.coordinates and not s.joint.balls]
+        named = [pair for s in specs for pair in zip(s.coordinates, s.joint.coordinates, strict=True)]
+        coordinates = [name for name, coordinate in named if coordinate.kind != "parameter"]
         here = Marker(bodies - 1, frame(graph, _placement(random, planar, "", False)), "here")
         there = Marker(GROUND, Frame(vectors.identity(graph), vectors.vector(graph, (3.0, 2.0, 0.0))), "there")
-        line, along = Line(there, here), JointCoordinate(coordinates[0])
-        elements = [
+        line = Line(there, here)
+        for along in map(JointCoordinate, coordinates[:1]):
+            elements += [
+                Spring("t", along, graph.constant(3.0), graph.constant(0.2)),
+                Damper("f", along, graph.constant(0.4)),
+                Actuator("a", along, graph.symbol("t") * 2.0 + 0.3),
+            ]
+        elements += [
             Spring("s", line, graph.constant(20.0), graph.constant(1.0)),
             Damper("d", line, graph.constant(1.5)),
-            Spring("t", along, graph.constant(3.0), graph.constant(0.2)),
-            Damper("f", along, graph.constant(0.4)),
-            Actuator("a", along, graph.symbol("t") * 2.0 + 0.3),
             PointForce("p", here, vectors.vector(graph, (1.0, -2.0, 0.0)), "body"),
         ]
     mechanism = Mechanism(

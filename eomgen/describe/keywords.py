@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from ..errors import UsageError
@@ -29,9 +29,14 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(method)
     def checked(*args: Any, **keys: Any) -> Any:
-        for key in keys:
-            if key not in allowed:
-                raise UsageError(f"{method.__name__} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")
+        check_keywords(method.__name__, keys, allowed)
         return method(*args, **keys)
 
     return checked
+
+
+def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> None:
+    """Raise UsageError for the first keyword that a method does not have."""
+    for key in given:
+        if key not in allowed:
+            raise UsageError(f"{name} has no argument {key!r}; {nearest(key, allowed, 'it takes')}")

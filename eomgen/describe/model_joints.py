@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..joints import JOINTS
 from .description import Description
+from .fields import joint_fields
 from .handles import JointHandle
-from .keywords import names_keywords
+from .keywords import check_keywords, names_keywords
 from .references import marker_reference
 
 if TYPE_CHECKING:
@@ -40,12 +41,14 @@ class JointMethods:
             Bodies or markers.
         **keys
             Whatever the type knows: axis, coordinate, coordinates, sequence, rotation, pitch, length, curve, surface;
-            limits, dry_friction, armature.
+            and data: limits, dry_friction, armature.
 
         Returns
         -------
         JointHandle
         """
+        if type in JOINTS:
+            check_keywords(type, keys, [key for key in joint_fields(type) if key not in ("type", "between")])
         model = cast("Model", self)
         between = [marker_reference(model, predecessor), marker_reference(model, successor)]
         given = {key: value for key, value in keys.items() if value is not None}
@@ -53,34 +56,36 @@ class JointMethods:
         return JointHandle(model, entry)
 
     def revolute(
-        self,
-        name: str,
-        predecessor: Any,
-        successor: Any,
-        axis: Axis = "z",
-        coordinate: Any = None,
-        limits: Any = None,
-        dry_friction: Any = None,
-        armature: Any = None,
+        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
     ) -> JointHandle:
         """Add a joint that turns about an axis; see :meth:`joint`."""
-        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
         return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
+    def continuous(
+        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
+    ) -> JointHandle:
+        """Add a revolute joint that turns on and on; see :meth:`joint`."""
+        return self.joint("continuous", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+
     def prismatic(
+        self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
+    ) -> JointHandle:
+        """Add a joint that slides along an axis; see :meth:`joint`."""
+        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+
+    def screw(
         self,
         name: str,
         predecessor: Any,
         successor: Any,
+        pitch: Any,
         axis: Axis = "z",
         coordinate: Any = None,
-        limits: Any = None,
-        dry_friction: Any = None,
-        armature: Any = None,
+        **data: Any,
     ) -> JointHandle:
-        """Add a joint that slides along an axis; see :meth:`joint`."""
-        data = {"limits": limits, "dry_friction": dry_friction, "armature": armature}
-        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+        """Add a joint that turns about an axis and slides along it by ``pitch`` (m) a turn; see :meth:`joint`."""
+        keys = {"pitch": pitch, "axis": axis, "coordinate": coordinate}
+        return self.joint("screw", name, predecessor, successor, **keys, **data)
 
     def cylindrical(
         self,
@@ -89,12 +94,38 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
-        limits: Any = None,
+        **data: Any,
     ) -> JointHandle:
         """Add a joint that slides along an axis and turns about it; see :meth:`joint`."""
-        return self.joint(
-            "cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits
-        )
+        return self.joint("cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
+
+    def universal(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinates: Sequence[Any] | None = None,
+        **data: Any,
+    ) -> JointHandle:
+        """Add a Cardan joint between shafts along the axis.
+
+        With the default axis its cross turns about x of the predecessor and y of the successor; see :meth:`joint`.
+        """
+        return self.joint("universal", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
+
+    def constant_velocity(
+        self,
+        name: str,
+        predecessor: Any,
+        successor: Any,
+        axis: Axis = "z",
+        coordinates: Sequence[Any] | None = None,
+        **data: Any,
+    ) -> JointHandle:
+        """Add a joint that bends across the axis and passes turning about it on evenly; see :meth:`joint`."""
+        keys = {"axis": axis, "coordinates": coordinates}
+        return self.joint("constant_velocity", name, predecessor, successor, **keys, **data)
 
     def spherical(
         self,
@@ -104,11 +135,11 @@ class JointMethods:
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
         rotation: str | None = None,
-        limits: Any = None,
+        **data: Any,
     ) -> JointHandle:
         """Add a ball joint, in Euler angles (``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
-        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation, "limits": limits}
-        return self.joint("spherical", name, predecessor, successor, **keys)
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        return self.joint("spherical", name, predecessor, successor, **keys, **data)
 
     def planar(
         self,
@@ -117,10 +148,10 @@ class JointMethods:
         successor: Any,
         axis: Axis = "z",
         coordinates: Sequence[Any] | None = None,
-        limits: Any = None,
+        **data: Any,
     ) -> JointHandle:
         """Add a joint that moves in a plane and turns about its normal, the axis; see :meth:`joint`."""
-        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, limits=limits)
+        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
 
     def free(
         self,
@@ -130,107 +161,61 @@ class JointMethods:
         sequence: str | None = None,
         coordinates: Sequence[Any] | None = None,
         rotation: str | None = None,
-        limits: Any = None,
+        **data: Any,
     ) -> JointHandle:
         """Add six degrees of freedom: position, then rotation as for a spherical joint; see :meth:`joint`."""
-        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation, "limits": limits}
-        return self.joint("free", name, predecessor, successor, **keys)
+        keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
+        return self.joint("free", name, predecessor, successor, **keys, **data)
 
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Fix two bodies to each other; see :meth:`joint`."""
         return self.joint("weld", name, predecessor, successor)
-
-    def screw(
-        self, name: str, predecessor: Any, successor: Any, pitch: Any, axis: Axis = "z", coordinate: Any = None
-    ) -> JointHandle:
-        """Add a joint that turns about an axis and slides along it by ``pitch`` (m) a turn; see :meth:`joint`."""
-        return self.joint("screw", name, predecessor, successor, pitch=pitch, axis=axis, coordinate=coordinate)
-
-    def universal(
-        self,
-        name: str,
-        predecessor: Any,
-        successor: Any,
-        axis: Axis = "z",
-        coordinates: Sequence[Any] | None = None,
-    ) -> JointHandle:
-        """Add a Cardan joint between shafts along the axis.
-
-        With the default axis its cross turns about x of the predecessor and y of the successor; see :meth:`joint`.
-        """
-        return self.joint("universal", name, predecessor, successor, axis=axis, coordinates=coordinates)
-
-    def constant_velocity(
-        self,
-        name: str,
-        predecessor: Any,
-        successor: Any,
-        axis: Axis = "z",
-        coordinates: Sequence[Any] | None = None,
-    ) -> JointHandle:
-        """Add a joint that bends across the axis and passes turning about it on evenly; see :meth:`joint`."""
-        return self.joint("constant_velocity", name, predecessor, successor, axis=axis, coordinates=coordinates)
 
     def distance(self, name: str, predecessor: Any, successor: Any, length: Any) -> JointHandle:
         """Hold two points ``length`` (m) apart by a massless rod: a pure constraint; see :meth:`joint`."""
         return self.joint("distance", name, predecessor, successor, length=length)
 
     def point_on_curve(
+        self, name: str, predecessor: Any, successor: Any, curve: Sequence[Any], **keys: Any
+    ) -> JointHandle:
+        """Guide the successor's origin along a curve of the predecessor; it turns freely.
+
+        ``curve`` is a point [x, y, z] (m) by the joint's first coordinate, ``<name>_s`` unless named; further keys are
+        those of a spherical joint; see :meth:`joint`, and :meth:`curve_slider` for a successor that does not turn.
+        """
+        return self.joint("point_on_curve", name, predecessor, successor, curve=curve, **keys)
+
+    def curve_slider(
         self,
         name: str,
         predecessor: Any,
         successor: Any,
         curve: Sequence[Any],
-        sequence: str | None = None,
-        coordinates: Sequence[Any] | None = None,
-    ) -> JointHandle:
-        """Guide the successor's origin along a curve of the predecessor; it turns freely.
-
-        ``curve`` is a point [x, y, z] (m) by the joint's first coordinate, ``<name>_s`` unless named; see
-        :meth:`joint`, and :meth:`curve_slider` for a successor that does not turn.
-        """
-        return self.joint(
-            "point_on_curve",
-            name,
-            predecessor,
-            successor,
-            curve=curve,
-            sequence=sequence,
-            coordinates=coordinates,
-        )
-
-    def curve_slider(
-        self, name: str, predecessor: Any, successor: Any, curve: Sequence[Any], coordinate: Any = None
+        coordinate: Any = None,
+        **data: Any,
     ) -> JointHandle:
         """Guide the successor's origin along a curve of the predecessor, without turning: a bead on a wire.
 
         ``curve`` is a point [x, y, z] (m) by the joint's coordinate; see :meth:`joint`.
         """
-        return self.joint("curve_slider", name, predecessor, successor, curve=curve, coordinate=coordinate)
+        return self.joint("curve_slider", name, predecessor, successor, curve=curve, coordinate=coordinate, **data)
 
     def point_on_surface(
-        self,
-        name: str,
-        predecessor: Any,
-        successor: Any,
-        surface: Sequence[Any],
-        sequence: str | None = None,
-        coordinates: Sequence[Any] | None = None,
+        self, name: str, predecessor: Any, successor: Any, surface: Sequence[Any], **keys: Any
     ) -> JointHandle:
         """Guide the successor's origin on a surface of the predecessor; it turns freely.
 
         ``surface`` is a point [x, y, z] (m) by the joint's first two coordinates, ``<name>_u`` and ``<name>_v`` unless
-        named; see :meth:`joint`, and the type ``surface_slider`` for a successor that does not turn.
+        named; further keys are those of a spherical joint; see :meth:`joint`, and :meth:`surface_slider` for a
+        successor that does not turn.
         """
-        return self.joint(
-            "point_on_surface",
-            name,
-            predecessor,
-            successor,
-            surface=surface,
-            sequence=sequence,
-            coordinates=coordinates,
-        )
+        return self.joint("point_on_surface", name, predecessor, successor, surface=surface, **keys)
+
+    def surface_slider(
+        self, name: str, predecessor: Any, successor: Any, surface: Sequence[Any], **keys: Any
+    ) -> JointHandle:
+        """Guide the successor's origin on a surface of the predecessor, without turning; see :meth:`joint`."""
+        return self.joint("surface_slider", name, predecessor, successor, surface=surface, **keys)
 
     def _joint_method(self, type_name: str) -> Callable[..., JointHandle] | None:
         """A method for a type of joint that has none written out here."""

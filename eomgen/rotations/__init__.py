@@ -8,8 +8,8 @@ Numbers and graph expressions are right everywhere, at no rotation and half turn
 form, as textbooks do: it assumes e0 > 0 and an angle that is not 0, and may give angles a full turn off.
 
 >>> from eomgen import rotations
->>> rotations.euler_angles_from_matrix("zxz", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(6) + 0
-array([1.570796, 0.      , 0.      ])
+>>> rotations.euler_angles_from_matrix("xyz", [[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(6) + 0
+array([0.      , 0.      , 1.570796])
 """
 
 from .euler import (

@@ -26,7 +26,7 @@ from eomgen.errors import ModelError
 METHODS = ["embedding", "lagrange"]
 MORE = ["offset_slider_crank", "spatial_loop", "powered_slider_crank", "powered_arm", "skewed_four_bar", "three_cranks"]
 DIGITS = 1e-11
-SEED = 2560  # a branched tree of hinges and slides only
+SEED = 2  # a branched tree
 
 
 def embedded_condition(module: Any, q: np.ndarray) -> float:
@@ -221,7 +221,7 @@ def mujoco_text(made: Random) -> str:
 def test_an_arm_of_hinges_and_slides_equals_mujoco(method: str) -> None:
     import mujoco
 
-    made = random_mechanism(SEED, bodies=5, forces=False)
+    made = random_mechanism(SEED, bodies=5, forces=False, types=("revolute", "prismatic"))
     assert set(made.kinds) == {"revolute", "prismatic"}
     assert len(set(made.parents)) > 3
     mod = derived(made, method).compile(target="numpy")

@@ -94,7 +94,7 @@ def test_tree_equals_pinocchio(seed: int, planar: bool, method: str) -> None:
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("seed", range(30))
 def test_articulated_bodies_equal_pinocchio(seed: int, planar: bool) -> None:
-    made = random_mechanism(seed, bodies=1 + seed % 8, planar=planar, forces=False)
+    made = random_mechanism(seed, bodies=1 + seed % 8, planar=planar, forces=False, types=tuple(STEPS))
     kinematics = analyse(made.mechanism)
     tree = METHODS["recursive"](kinematics)
     assert tree.accelerations is not None

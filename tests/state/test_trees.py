@@ -43,7 +43,9 @@ def random_state(module: Any, seed: int) -> tuple[np.ndarray, np.ndarray, np.nda
 def seeds_with_balls(count: int, **options: Any) -> list[int]:
     found = []
     for seed in range(200):
-        made = random_mechanism(seed, bodies=1 + seed % 5, forces=False, rotation="euler_parameters", **options)
+        made = random_mechanism(
+            seed, bodies=1 + seed % 5, forces=False, types=tuple(STEPS), rotation="euler_parameters", **options
+        )
         if any(spec.joint.balls for spec in made.mechanism.joints):
             found.append(seed)
         if len(found) == count:
@@ -54,7 +56,7 @@ def seeds_with_balls(count: int, **options: Any) -> list[int]:
 @pytest.mark.parametrize("method", sorted(METHODS))
 @pytest.mark.parametrize("seed", seeds_with_balls(8))
 def test_tree_equals_pinocchio(seed: int, method: str) -> None:
-    made = random_mechanism(seed, bodies=1 + seed % 5, forces=False, rotation="euler_parameters")
+    made = random_mechanism(seed, bodies=1 + seed % 5, forces=False, types=tuple(STEPS), rotation="euler_parameters")
     module = module_of(made, method)
     model = pin.Model()
     model.gravity.linear = made.gravity
@@ -94,7 +96,9 @@ def test_tree_equals_pinocchio(seed: int, method: str) -> None:
 @pytest.mark.parametrize("method", sorted(METHODS))
 @pytest.mark.parametrize("seed", seeds_with_balls(8, reverse=True))
 def test_reversed_joints_equal_newton_and_euler_from_poses_alone(seed: int, method: str) -> None:
-    made = random_mechanism(seed, bodies=1 + seed % 5, forces=False, reverse=True, rotation="euler_parameters")
+    made = random_mechanism(
+        seed, bodies=1 + seed % 5, forces=False, reverse=True, types=tuple(STEPS), rotation="euler_parameters"
+    )
     module = module_of(made, method)
     q, v, _ = random_state(module, seed)
     q = module.project(np.concatenate([q, v]))[: module.n_q]
@@ -140,7 +144,7 @@ def test_motion_of_a_free_body_and_a_ball_joint_equals_mujoco() -> None:
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_targets_methods_jacobian_and_identities(target: str) -> None:
     seed = seeds_with_balls(5)[-1]
-    made = random_mechanism(seed, bodies=1 + seed % 5, forces=True, rotation="euler_parameters")
+    made = random_mechanism(seed, bodies=1 + seed % 5, forces=True, types=tuple(STEPS), rotation="euler_parameters")
     module, other = module_of(made, "embedding", target), module_of(made, "lagrange", "numpy")
     for trial in range(3):
         q, v, _ = random_state(module, trial)
