@@ -10,8 +10,9 @@ from ..describe.description import GROUND_NAME, SECTIONS, Description, Values
 from ..describe.placement import TURNS
 from ..errors import UsageError
 from ..joints import JOINTS
+from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .names import Names, clean_model_name
-from .placement import Inertia, numbers
+from .placement import Inertia, Placement, numbers
 from .robot import Joint, Options, Robot
 from .tree import GROUND, Bodies, Body, build_bodies
 
@@ -48,8 +49,8 @@ class _Writer:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
         for body in moving:
             assert body.joint is not None
-            suffixes = [c.suffix for c in JOINTS[body.joint.type].coordinates]
-            self.joints[body.joint.name] = self.names.joint(body.joint.name, suffixes)
+            rates = ("_wx", "_wy", "_wz") if self._in_parameters(body.joint.type) else ()
+            self.joints[body.joint.name] = self.names.joint(body.joint.name, [*self._suffixes(body.joint.type), *rates])
         for body in self.found.bodies.values():
             self._body(body)
         for body in moving:
@@ -108,6 +109,15 @@ class _Writer:
         return given
 
     # -- joints ---------------------------------------------------------------------------------------------------
+    def _in_parameters(self, joint_type: str) -> bool:
+        return self.options.rotation == "euler_parameters" and joint_type in ("free", "spherical")
+
+    def _suffixes(self, joint_type: str) -> list[str]:
+        """Of the coordinates of a joint of the tree, as the options have them turn."""
+        kind = JOINTS[joint_type]
+        turning = {"rotation": self.options.rotation} if "rotation" in kind.options else {}
+        return [c.suffix for c in (kind(**turning) if turning else kind).coordinates]
+
     def _joint(self, body: Body) -> None:
         joint = body.joint
         assert joint is not None
@@ -119,9 +129,9 @@ class _Writer:
         kind = JOINTS[joint.type]
         if kind.has_axis:
             values["axis"] = _axis(joint.axis)
-        if joint.type in ("free", "spherical") and self.options.rotation != "euler_angles":
+        if self._in_parameters(joint.type):
             values["rotation"] = self.options.rotation
-        names = [name + c.suffix for c in kind.coordinates]
+        names = [name + suffix for suffix in self._suffixes(joint.type)]
         if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
             values |= {"coordinate": names[0]} if len(names) == 1 else {"coordinates": names}
         if joint.limits:
@@ -135,15 +145,25 @@ class _Writer:
             self._force("friction", joint, "damping", {"viscous": joint.damping})
         if joint.stiffness:
             self._spring(joint)
-        if joint.initial:
-            start = self.out.values.setdefault("initial", {})
-            start.update({c: x for c, x in zip(names, joint.initial, strict=True) if x})
+        if joint.initial or joint.start:
+            start = [joint.initial] if joint.start is None else self._start(joint.start)
+            reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
+            known = self.out.values.setdefault("initial", {})
+            known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
         chosen = self.options.actuate
         if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
             force = self.names.symbol(f"tau_{name}")
             unit = "N" if joint.type == "prismatic" else "N*m"
             self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
             self._force("actuator", joint, "drive", {"value": force})
+
+    def _start(self, pose: Placement) -> list[float]:
+        """Coordinates of a free joint."""
+        if self.options.rotation == "euler_parameters":
+            turn = euler_parameters_from_matrix(pose.rotation)
+        else:
+            turn = euler_angles_from_matrix("xyz", pose.rotation)
+        return [*numbers(pose.position), *numbers(turn)]
 
     def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
         name = self.joints[joint.name]

@@ -101,7 +101,8 @@ class Joint:
     stiffness: float = 0.0
     rest: float = 0.0
     mimic: Mimic | None = None
-    initial: tuple[float, ...] = ()
+    initial: float = 0.0
+    start: Placement | None = None  #: of a free joint
 
 
 @dataclass(frozen=True)

@@ -111,3 +111,11 @@ class Judge:
         tau = J.T @ data.qfrc_actuator - rest
         forward = np.linalg.solve(J, data.qacc_smooth - drift)
         return State(q, v, a, tau, mass, bias, bias + mass @ a, forward, poses, com, u)
+
+    def reference_pose(self, body: str) -> np.ndarray:
+        """(4, 4) of a body where the file places it."""
+        mujoco.mj_resetData(self.mj, self.data)
+        mujoco.mj_kinematics(self.mj, self.data)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self.data.body(body).xmat.reshape(3, 3), self.data.body(body).xpos
+        return pose

@@ -62,13 +62,26 @@ class Judge:
         return [self._state(names, velocities, random) for _ in range(count)]
 
     def _state(self, names: tuple[str, ...], velocities: tuple[str, ...], random: np.random.Generator) -> State:
-        model, data = self.pin, self.data
         q = random.uniform(-1, 1, len(names))
         if self.flyer:
             q[[names.index(f"base_e{k}") for k in range(4)]] = draw_parameters(random)
         v, a, tau = random.uniform(-1, 1, (3, len(velocities))) * np.array([[3.0], [5.0], [10.0]])
         driven = {f"{name}_dot": name for name in self.actuated}
         tau = np.where([name in driven for name in velocities], tau, 0.0)
+        return self.at(names, velocities, q, v, a, tau)
+
+    def at(
+        self,
+        names: tuple[str, ...],
+        velocities: tuple[str, ...],
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        tau: np.ndarray,
+    ) -> State:
+        """What Pinocchio says of one state given in our names; ``tau`` (n_v,) in their order."""
+        model, data = self.pin, self.data
+        driven = {f"{name}_dot": name for name in self.actuated}
         u = {f"tau_{driven[n]}": float(x) for n, x in zip(velocities, tau, strict=True) if n in driven}
         theirs = self.position(names, q)
         order = [self.velocities[name] for name in velocities]

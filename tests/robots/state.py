@@ -1,4 +1,4 @@
-"""What a judge says of one state, in the coordinates of our model; and how equations in other velocities become ours."""
+"""What a judge says of one state, in our coordinates; and how equations in other velocities become ours."""
 
 from __future__ import annotations
 
