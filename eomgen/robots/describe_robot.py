@@ -141,8 +141,11 @@ class _Writer:
         if joint.armature:
             values["armature"] = joint.armature
         self._add("joints", name, values, joint.place)
-        if joint.damping:
-            self._force("friction", joint, "damping", {"viscous": joint.damping})
+        rubbing = {"viscous": joint.damping} if joint.damping else {}
+        if self.options.smoothing and joint.dry_friction:
+            rubbing |= {"coulomb": joint.dry_friction, "smoothing": self.options.smoothing}
+        if rubbing:
+            self._force("friction", joint, "friction" if "coulomb" in rubbing else "damping", rubbing)
         if joint.stiffness:
             self._spring(joint)
         if joint.initial or joint.start:

@@ -34,6 +34,9 @@ class Options:
         Whether masses, centres of mass and inertias become parameters; else they are numbers, which fold.
     actuate : bool or names
         Inputs ``tau_<joint>`` on all joints of one degree, or on these.
+    friction : bool or float
+        Whether the dry friction of joints acts, smoothed below this velocity (rad/s or m/s; True: 0.01); else it is
+        data only.
     snap : float
         Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
     assets : str, optional
@@ -48,8 +51,14 @@ class Options:
     merge: bool = True
     symbolic: bool = False
     actuate: Any = False
+    friction: Any = False
     snap: float = 1e-11
     assets: str | None = None
+
+    @property
+    def smoothing(self) -> float:
+        """The velocity below which dry friction is smoothed; 0 where it does not act."""
+        return 0.01 if self.friction is True else float(self.friction)
 
     @property
     def locked(self) -> dict[str, float]:

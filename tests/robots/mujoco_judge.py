@@ -57,6 +57,10 @@ class Judge:
             self.joints.append((j, [name + s for s in coordinates], [name + s for s in velocities]))
         actuators = [self.mj.actuator(k).name or f"actuator{k}" for k in range(self.mj.nu)]
         self.inputs = {inputs.get(name, name): k for k, name in enumerate(actuators)}
+        known = {entry.name for entry in model.description.sections["inputs"]}
+        for name in self.inputs.keys() - known:  # those with states of their own, which a note names
+            assert any("actuators" in note and name in note for note in model.notes), name
+            self.mj.actuator_gainprm[self.inputs[name]] = self.mj.actuator_biasprm[self.inputs[name]] = 0.0
 
     def states(self, kinematics: Any, count: int, seed: int) -> list[State]:
         """Random states in the order of our coordinates and velocities, each with values of our inputs."""

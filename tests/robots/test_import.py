@@ -217,3 +217,25 @@ def test_the_drive_of_a_cut_joint_counts(tmp_path: Path) -> None:
 
 def values_coordinate(joints: dict[str, Any], name: str) -> str:
     return str(joints[name].get("coordinate", name))
+
+
+def test_dry_friction_acts_where_it_is_asked_for() -> None:
+    q, v = np.array([0.1, 0.2, -0.3, 0.01, 0.02]), np.array([1.0, -2.0, 0.015, 0.1, 0.0])
+    modules = [
+        eg.load(ARM, **friction).compile(target="numpy", kernels=["bias"])
+        for friction in ({}, {"friction": True}, {"friction": 0.05})
+    ]
+    elbow = modules[0].q_names.index("elbow")
+    without, hard, soft = (module.bias(0.0, np.concatenate([q, v])) for module in modules)
+    for found, smoothing in ((hard, 0.01), (soft, 0.05)):
+        added = found - without
+        assert added[elbow] == pytest.approx(0.1 * np.tanh(v[elbow] / smoothing), rel=1e-12)
+        assert not np.delete(added, elbow).any()
+    forces = values(eg.load(ARM, friction=0.05), "forces")
+    assert [n for n, d in forces.items() if "coulomb" in d] == ["elbow_friction"]
+
+
+@pytest.mark.parametrize("friction", [-1, "much", float("nan")])
+def test_friction_is_a_velocity(friction: Any) -> None:
+    with pytest.raises(eg.UsageError, match="friction="):
+        eg.load(ARM, friction=friction)
