@@ -104,6 +104,17 @@ def test_springs_drives_tendons_and_joint_chains_equal_mujoco(rotation: str, tmp
     assert all((ours[key] == theirs[key]).all() for key in ours)
 
 
+@pytest.mark.parametrize("rotation", ROTATIONS)
+def test_loops_of_bodies_that_turn_freely_close(rotation: str, tmp_path: Path) -> None:
+    path = tmp_path / "closed.xml"
+    equality = '<equality><connect name="pin" body1="end" body2="loose" anchor="0.1 0.2 0"/></equality>'
+    path.write_text(EVERYTHING.replace("<actuator>", equality + "<actuator>"))
+    report = eg.load(path, rotation=rotation).check()
+    assert report.loop_joints == ["pin"]
+    assert (len(report.coordinates), report.degrees_of_freedom) == (14 if rotation == ROTATIONS[1] else 12, 9)
+    assert report.assembly_restarts == 0
+
+
 LOOPS = {
     "connect": '<connect name="pin" body1="coupler" body2="rocker" anchor="0.4 0 0.1"/>',
     "weld": '<weld name="glue" body1="coupler" body2="rocker" relpose="0.4 0 0 0.9 0.1 0.3 0.2"/>',

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from robots.comparison import Compiled, Evaluated, largest_differences
 from robots.pinocchio_judge import Judge
@@ -23,8 +24,12 @@ LIMIT = 1e-9
 FEW = 8
 FIXED, FLOATING, ANGLES = "fixed", "euler_parameters", "euler_angles"
 OWN = [(name, FLOATING if floating else FIXED) for name, (_, floating) in ROBOTS.items()]
-#: A racecar's chassis and the frame of a drone have nothing that moves on them once they are fixed.
-OTHER = [(name, FIXED if floating else FLOATING) for name, (_, floating) in ROBOTS.items() if name != "iris"]
+MASSLESS = [name for name in ("cart-pole", "pendulum of five") if name in ROBOTS]  #: their roots
+OTHER = [
+    (name, FIXED if floating else FLOATING)
+    for name, (_, floating) in ROBOTS.items()
+    if name not in MASSLESS and name != "iris"  # a drone: nothing moves once it is fixed
+]
 TURNED = [(name, ANGLES) for name in ("panda", "bolt", "solo12", "anymal", "borinot", "talos")]
 
 
@@ -69,6 +74,16 @@ def test_robot_equals_pinocchio(name: str, base: str, method: str, judged: Any) 
     for run in runs:
         worst = largest_differences(model, run, states)
         assert max(worst.values()) <= LIMIT, (type(run).__name__, worst)
+
+
+@pytest.mark.parametrize("name", MASSLESS)
+def test_a_base_without_mass_cannot_float(name: str, judged: Any) -> None:
+    model, states = judged(name, FLOATING)
+    for s in states:
+        sizes = np.linalg.eigvalsh(s.mass_matrix)
+        assert sizes[0] < 1e-12 * sizes[-1]
+    with pytest.raises(eg.ModelError, match="no inertia behind it"):
+        model.compile(target="numpy", kernels=["rhs"])
 
 
 @pytest.mark.parametrize(("name", "base"), [("panda", FIXED), ("solo12", FLOATING)])
