@@ -89,16 +89,26 @@ def _stack(values: Any, count: int) -> np.ndarray:
 
 
 def largest_differences(model: Any, run: Any, states: list[State]) -> dict[str, float]:
-    """Per quantity; accelerations as CONTRACT has it: of max|v'| and max(1, cond(M)/1e3)."""
+    """Per quantity, of the largest entry; of accelerations also by max(1, cond(M)/1e3).
+
+    Those of ``scaled`` names once more with each coordinate measured by the root of its inertia, so that light joints
+    count as much as heavy ones, and the much smaller condition of M in that measure.
+    """
     frames = link_frames(model)
     worst: dict[str, float] = {}
     for s, ours in zip(states, run(states), strict=True):
         condition = max(1.0, np.linalg.cond(s.mass_matrix) / 1e3)
+        size = np.sqrt(s.mass_matrix.diagonal())
+        scaled = s.mass_matrix / np.outer(size, size)
         found = {
             "M": difference(ours["M"], s.mass_matrix),
             "h": difference(ours["h"], s.bias),
             "inverse": difference(ours["inverse"], s.inverse_dynamics),
             "forward": difference(ours["forward"], s.acceleration) / condition,
+            "scaled M": difference(ours["M"] / np.outer(size, size), scaled),
+            "scaled h": difference(ours["h"] / size, s.bias / size),
+            "scaled forward": difference(ours["forward"] * size, s.acceleration * size)
+            / max(1.0, np.linalg.cond(scaled) / 1e3),
             "com": float(np.abs(ours["com"] - s.com).max()),
             "frames": 0.0,
         }
