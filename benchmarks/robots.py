@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -94,7 +93,7 @@ def run(quick: bool) -> Report:
         details[name] = compare(model, pinocchio_judge.Judge(path, floating, model), states)
         tables[0] += rows_of(name, "*" if floating else "", details[name])
     for name, (path, assets) in mjcf:
-        model = eg.load(path, assets=os.fspath(assets), rotation=ROTATION)
+        model = mujoco_judge.load_tree(path, assets, ROTATION)
         details[f"{name} (MJCF)"] = compare(model, mujoco_judge.Judge(path, model), states)
         tables[1] += rows_of(name, "", details[f"{name} (MJCF)"])
     columns = (

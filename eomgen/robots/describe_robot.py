@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..describe.description import GROUND_NAME, SECTIONS, Description, Values
+from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
-from ..errors import UsageError
 from ..joints import JOINTS
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .names import Names, clean_model_name
 from .placement import Inertia, Placement, numbers
 from .robot import Joint, Options, Robot
+from .ties import Sum, Tie, describe_tie
 from .tree import GROUND, Bodies, Body, build_bodies
 
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -193,45 +193,28 @@ class _Writer:
             self._add("joints", name, {"type": loop.type, "between": pair}, loop.place)
 
     def _mimics(self) -> None:
-        ties = list(self.robot.couplings)
+        ties = list(self.robot.ties)
         loose = []
         for joint in self.robot.joints.values():
-            if joint.mimic is None or joint.type == "weld":
+            law = joint.mimic
+            if law is None or joint.type == "weld":
                 continue
             if self.options.mimic == "coupling":
-                ties.append((f"{joint.name}_mimic", joint.name, joint.mimic, joint.place))
+                sums = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
+                ties.append(Tie(f"{joint.name}_mimic", *sums, (law.offset, law.factor), joint.place))
             else:
-                loose.append(f"{joint.name} = {joint.mimic.factor:g} {joint.mimic.joint} + {joint.mimic.offset:g}")
+                loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
         if loose:
             remedy = "mimic='coupling' ties them"
             self.out.notes.append(
                 f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}"
             )
-        if ties and "constraints" not in SECTIONS:
-            if self.options.mimic == "coupling":
-                raise UsageError("couplings of joints need the model section constraints, which this version has not")
-            self.out.notes.append(f"left out: couplings of joints ({', '.join(name for name, *_ in ties)})")
-            ties = []
-        for name, joint_name, law, place in ties:
-            self._coupling(name, joint_name, law, place)
-
-    def _coupling(self, name: str, joint: str, law: Any, place: tuple[str, int]) -> None:
-        first, second = self.joints.get(joint), self.joints.get(law.joint)
-        locked = self.options.locked
-        coordinates: dict[str, float] = {}
-        offset = law.offset
-        if first is not None:
-            coordinates[first] = 1.0
-        else:
-            offset -= locked.get(joint, 0.0)
-        if second is not None and law.factor != 0.0:
-            coordinates[second] = -law.factor
-        else:
-            offset += law.factor * locked.get(law.joint, 0.0)
-        values: Values = {"type": "coupling", "coordinates": coordinates}
-        if offset:
-            values["offset"] = offset
-        self._add("constraints", self.names.link(name), values, place)
+        for tie in ties:
+            values = describe_tie(tie, self.joints, self.options.locked)
+            if values is None:
+                self.out.notes.append(f"left out: the coupling {tie.name}, all of whose joints are locked")
+            else:
+                self._add("constraints", self.names.link(tie.name), values, tie.place)
 
     def _drives(self) -> None:
         for k, drive in enumerate(self.robot.drives):

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import Problem
 from .placement import IDENTITY, NOTHING, Inertia, Placement
+from .ties import Tie
 
 Place = tuple[str, int]  # file, line
 
@@ -149,7 +150,7 @@ class Robot:
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
     loops: list[Loop] = field(default_factory=list)
-    couplings: list[tuple[str, str, Mimic, Place]] = field(default_factory=list)  #: name, joint, law, place
+    ties: list[Tie] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     problems: list[Problem] = field(default_factory=list)
