@@ -185,6 +185,16 @@ def test_equalities_close_loops_as_mujocos_rows_do(kind: str, tmp_path: Path) ->
         assert np.abs(found - expected).max() <= 1e-6 * np.abs(expected).max()  # the rows' rate is by differences
 
 
+def test_a_warning_of_mujoco_is_a_note_and_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # where MuJoCo would write MUJOCO_LOG.TXT
+    path, assets = MODELS["cheetah"]
+    before = mujoco.get_mju_user_warning()
+    model = eg.load(path, assets=str(assets))
+    assert any("settotalmass" in note for note in model.notes)
+    assert mujoco.get_mju_user_warning() is before
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_is_left_out_is_said(tmp_path: Path) -> None:
     path = tmp_path / "left_out.xml"
     text = EVERYTHING.replace('<option gravity="0.5 0 -9"/>', '<option density="1.2"/>')
