@@ -163,7 +163,7 @@ class Equations:
         target : {'cython', 'numpy'}
             ``numpy`` needs no compiler and is slower.
         kernels : names of kernels, optional
-            Only these (see the README's table of calls); all by default.
+            Only these (see the README's table of calls); all by default, the rarer ones when they are first called.
         **options
             Fields of :class:`eomgen.compilation.Options`, such as ``optimize`` or ``native``.
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .program.choice import Choice
     from .program.program import Program
     from .runtime.module import Module
+    from .runtime.protocols import Core
 
 TARGETS = ("cython", "numpy", "c")
 
@@ -200,14 +201,36 @@ def compile_equations(
     equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
 ) -> Module:
     """Generate, compile and load; see :meth:`eomgen.derivation.Equations.compile`."""
-    from .emit import emit_c, emit_numpy
+    from .program import KERNELS
+    from .runtime.late import LateCore
     from .runtime.module import Module
 
-    seconds = equations.seconds
     if target == "c":
         raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")
-    with _timed(seconds, "program"):
-        program = build(equations, target, kernels)
+    if kernels is not None:
+        return Module(_load(equations, build(equations, target, kernels), target, options))
+    with _timed(equations.seconds, "program"):
+        program = build(equations, target, [k.name for k in KERNELS if not k.late])
+    core = _load(equations, program, target, options, equations.seconds)
+    late = [k.name for k in KERNELS if k.late and 0 not in k.shape(program.sizes)]
+
+    def load_late() -> Core:
+        return _load(equations, build(equations, target, late), target, options)
+
+    return Module(LateCore(core, late, load_late))
+
+
+def _load(
+    equations: Equations,
+    program: Program,
+    target: str,
+    options: dict[str, Any],
+    seconds: dict[str, float] | None = None,
+) -> Core:
+    """Emit, compile and load."""
+    from .emit import emit_c, emit_numpy
+
+    seconds = {} if seconds is None else seconds
     if target == "numpy":
         from .compilation.numpy_module import load_numpy
         from .emit.numpy_functions import twins
@@ -217,7 +240,7 @@ def compile_equations(
         with _timed(seconds, "emit"):
             sources = emit_numpy(program)
         with _timed(seconds, "load"):
-            return Module(load_numpy(sources, equations.name, twins(program)))
+            return cast("Core", load_numpy(sources, equations.name, twins(program)))
     from .compilation import Options, compile_sources, load_core
 
     allowed = Options.__dataclass_fields__
@@ -229,7 +252,7 @@ def compile_equations(
     with _timed(seconds, "compile"):
         artifact = compile_sources(sources, equations.name, Options(**options))
     with _timed(seconds, "load"):
-        return Module(load_core(artifact))
+        return cast("Core", load_core(artifact))
 
 
 def generate(

@@ -70,7 +70,7 @@ def examples(name: str | None, force: bool, as_json: bool) -> None:
 
 
 def _copy(name: str, found: dict[str, Traversable], force: bool) -> Path:
-    file = found.get(name) or found.get(name.removesuffix(".yaml"))
+    file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
     if file is None:
         near = difflib.get_close_matches(name, found, 1)
         hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(found)}"

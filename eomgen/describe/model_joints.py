@@ -47,31 +47,34 @@ class JointMethods:
         -------
         JointHandle
         """
-        if type in JOINTS:
-            check_keywords(type, keys, [key for key in joint_fields(type) if key not in ("type", "between")])
         model = cast("Model", self)
         between = [marker_reference(model, predecessor), marker_reference(model, successor)]
         given = {key: value for key, value in keys.items() if value is not None}
         entry = self._description.add("joints", name, {"type": type, "between": between, **given})
         return JointHandle(model, entry)
 
+    def _checked(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
+        """Add a joint by the method of its type, which a misspelt keyword must not pass unseen."""
+        check_keywords(type, keys, [key for key in joint_fields(type) if key not in ("type", "between")])
+        return self.joint(type, name, predecessor, successor, **keys)
+
     def revolute(
         self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
     ) -> JointHandle:
         """Add a joint that turns about an axis; see :meth:`joint`."""
-        return self.joint("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+        return self._checked("revolute", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def continuous(
         self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
     ) -> JointHandle:
         """Add a revolute joint that turns on and on; see :meth:`joint`."""
-        return self.joint("continuous", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+        return self._checked("continuous", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def prismatic(
         self, name: str, predecessor: Any, successor: Any, axis: Axis = "z", coordinate: Any = None, **data: Any
     ) -> JointHandle:
         """Add a joint that slides along an axis; see :meth:`joint`."""
-        return self.joint("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
+        return self._checked("prismatic", name, predecessor, successor, axis=axis, coordinate=coordinate, **data)
 
     def screw(
         self,
@@ -85,7 +88,7 @@ class JointMethods:
     ) -> JointHandle:
         """Add a joint that turns about an axis and slides along it by ``pitch`` (m) a turn; see :meth:`joint`."""
         keys = {"pitch": pitch, "axis": axis, "coordinate": coordinate}
-        return self.joint("screw", name, predecessor, successor, **keys, **data)
+        return self._checked("screw", name, predecessor, successor, **keys, **data)
 
     def cylindrical(
         self,
@@ -97,7 +100,7 @@ class JointMethods:
         **data: Any,
     ) -> JointHandle:
         """Add a joint that slides along an axis and turns about it; see :meth:`joint`."""
-        return self.joint("cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
+        return self._checked("cylindrical", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
 
     def universal(
         self,
@@ -112,7 +115,7 @@ class JointMethods:
 
         With the default axis its cross turns about x of the predecessor and y of the successor; see :meth:`joint`.
         """
-        return self.joint("universal", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
+        return self._checked("universal", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
 
     def constant_velocity(
         self,
@@ -125,7 +128,7 @@ class JointMethods:
     ) -> JointHandle:
         """Add a joint that bends across the axis and passes turning about it on evenly; see :meth:`joint`."""
         keys = {"axis": axis, "coordinates": coordinates}
-        return self.joint("constant_velocity", name, predecessor, successor, **keys, **data)
+        return self._checked("constant_velocity", name, predecessor, successor, **keys, **data)
 
     def spherical(
         self,
@@ -139,7 +142,7 @@ class JointMethods:
     ) -> JointHandle:
         """Add a ball joint, in Euler angles (``"xyz"`` unless given) or Euler parameters; see :meth:`joint`."""
         keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
-        return self.joint("spherical", name, predecessor, successor, **keys, **data)
+        return self._checked("spherical", name, predecessor, successor, **keys, **data)
 
     def planar(
         self,
@@ -151,7 +154,7 @@ class JointMethods:
         **data: Any,
     ) -> JointHandle:
         """Add a joint that moves in a plane and turns about its normal, the axis; see :meth:`joint`."""
-        return self.joint("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
+        return self._checked("planar", name, predecessor, successor, axis=axis, coordinates=coordinates, **data)
 
     def free(
         self,
@@ -165,15 +168,15 @@ class JointMethods:
     ) -> JointHandle:
         """Add six degrees of freedom: position, then rotation as for a spherical joint; see :meth:`joint`."""
         keys = {"sequence": sequence, "coordinates": coordinates, "rotation": rotation}
-        return self.joint("free", name, predecessor, successor, **keys, **data)
+        return self._checked("free", name, predecessor, successor, **keys, **data)
 
     def weld(self, name: str, predecessor: Any, successor: Any) -> JointHandle:
         """Fix two bodies to each other; see :meth:`joint`."""
-        return self.joint("weld", name, predecessor, successor)
+        return self._checked("weld", name, predecessor, successor)
 
     def distance(self, name: str, predecessor: Any, successor: Any, length: Any) -> JointHandle:
         """Hold two points ``length`` (m) apart by a massless rod: a pure constraint; see :meth:`joint`."""
-        return self.joint("distance", name, predecessor, successor, length=length)
+        return self._checked("distance", name, predecessor, successor, length=length)
 
     def point_on_curve(
         self, name: str, predecessor: Any, successor: Any, curve: Sequence[Any], **keys: Any
@@ -183,7 +186,7 @@ class JointMethods:
         ``curve`` is a point [x, y, z] (m) by the joint's first coordinate, ``<name>_s`` unless named; further keys are
         those of a spherical joint; see :meth:`joint`, and :meth:`curve_slider` for a successor that does not turn.
         """
-        return self.joint("point_on_curve", name, predecessor, successor, curve=curve, **keys)
+        return self._checked("point_on_curve", name, predecessor, successor, curve=curve, **keys)
 
     def curve_slider(
         self,
@@ -198,7 +201,7 @@ class JointMethods:
 
         ``curve`` is a point [x, y, z] (m) by the joint's coordinate; see :meth:`joint`.
         """
-        return self.joint("curve_slider", name, predecessor, successor, curve=curve, coordinate=coordinate, **data)
+        return self._checked("curve_slider", name, predecessor, successor, curve=curve, coordinate=coordinate, **data)
 
     def point_on_surface(
         self, name: str, predecessor: Any, successor: Any, surface: Sequence[Any], **keys: Any
@@ -209,13 +212,13 @@ class JointMethods:
         named; further keys are those of a spherical joint; see :meth:`joint`, and :meth:`surface_slider` for a
         successor that does not turn.
         """
-        return self.joint("point_on_surface", name, predecessor, successor, surface=surface, **keys)
+        return self._checked("point_on_surface", name, predecessor, successor, surface=surface, **keys)
 
     def surface_slider(
         self, name: str, predecessor: Any, successor: Any, surface: Sequence[Any], **keys: Any
     ) -> JointHandle:
         """Guide the successor's origin on a surface of the predecessor, without turning; see :meth:`joint`."""
-        return self.joint("surface_slider", name, predecessor, successor, surface=surface, **keys)
+        return self._checked("surface_slider", name, predecessor, successor, surface=surface, **keys)
 
     def _joint_method(self, type_name: str) -> Callable[..., JointHandle] | None:
         """A method for a type of joint that has none written out here."""
@@ -223,6 +226,6 @@ class JointMethods:
             return None
 
         def method(name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
-            return self.joint(type_name, name, predecessor, successor, **keys)
+            return self._checked(type_name, name, predecessor, successor, **keys)
 
         return method

@@ -39,12 +39,15 @@ class Kernel:
         Sizes -> shape of the result for one state.
     result : str
         What the result is, one line for headers and documentation.
+    late : bool
+        Of analyses: left out of a module made in this process until it is first called; never out of an export.
     """
 
     name: str
     inputs: tuple[str, ...]
     shape: Callable[[Sizes], tuple[int, ...]]
     result: str
+    late: bool = False
 
 
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
@@ -58,7 +61,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("bias", ("q", "v"), lambda s: (s.n_v,), "h in M v' + h = generalized forces not in the model"),
     Kernel("inverse_dynamics", ("q", "v", "a"), lambda s: (s.n_v,), "M a + h, the generalized forces to add"),
     Kernel("energy", ("q", "v"), lambda s: (2,), "kinetic and potential energy (J)"),
-    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL),
+    Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows, nonholonomic ones last"),

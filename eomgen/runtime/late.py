@@ -1,0 +1,90 @@
+"""Stage runtime: a core and a way to make more kernels -> one core, whose rarer kernels are made when first called.
+
+Most runs need few of the kernels, and compiling those of the analyses as well would make every start slower.  An
+exported package has them all from the beginning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .protocols import Core
+
+
+class LateCore:
+    """A core that offers further kernels, compiled or loaded at the first call of any of them.
+
+    Parameters
+    ----------
+    core : Core
+    late : sequence of str
+        Names of the further kernels.
+    load : callable
+        Makes a core that has them.
+    """
+
+    def __init__(self, core: Core, late: Sequence[str], load: Callable[[], Core]) -> None:
+        self.core = core
+        self.names = (*core.names, *(name for name in late if name not in core.names))
+        self.load = load
+
+    @cached_property
+    def further(self) -> Core:
+        """The core with the rarer kernels."""
+        return self.load()
+
+    def timed(self, name: str, *options: Any) -> Any:
+        """A kernel of time and state; see :class:`~.protocols.Core`."""
+        return self._make("timed", name, options)
+
+    def state(self, name: str, *options: Any) -> Any:
+        """A kernel of the state alone."""
+        return self._make("state", name, options)
+
+    def motion(self, name: str, *options: Any) -> Any:
+        """A kernel of coordinates, velocities and accelerations."""
+        return self._make("motion", name, options)
+
+    def _make(self, maker: str, name: str, options: tuple[Any, ...]) -> Any:
+        if name in self.core.names:
+            return getattr(self.core, maker)(name, *options)
+        return LateKernel(self, maker, name, options)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.core, name)
+
+
+class LateKernel:
+    """A kernel that is made when it is first called.
+
+    Parameters
+    ----------
+    core : LateCore
+    maker : {'timed', 'state', 'motion'}
+    name : str
+    options : tuple
+        What the maker takes after the name: the context with parameters and inputs, then all else.
+    """
+
+    def __init__(self, core: LateCore, maker: str, name: str, options: tuple[Any, ...]) -> None:
+        self.core, self.maker, self.name, self.options = core, maker, name, options
+
+    @cached_property
+    def kernel(self) -> Any:
+        """The kernel itself."""
+        core, (context, *rest) = self.core.further, self.options
+        return getattr(core, self.maker)(self.name, core.context(context.p, context.u), *rest)
+
+    @property
+    def failure(self) -> tuple[int, float, Array] | None:
+        """The last failure, as other kernels have it; None before the first call."""
+        return self.__dict__["kernel"].failure if "kernel" in self.__dict__ else None
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Evaluate."""
+        return self.kernel(*args, **options)

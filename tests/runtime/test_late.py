@@ -1,0 +1,37 @@
+"""Rarer kernels, made when first called: the same numbers as in a module that has them from the beginning."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import UsageError
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "slider_crank.yaml"
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_rare_kernel_is_made_when_first_called(target: str) -> None:
+    equations = eg.load(EXAMPLE).derive()
+    module = equations.compile(target=target)
+    core = module.core
+    assert "centroidal" in core.names
+    assert "centroidal" not in core.core.names
+    x = module.x0()
+    module.rhs(0.0, x)
+    assert "further" not in core.__dict__
+    longer = module.bind({"r": 0.2})
+    q = x[: module.n_q]
+    centre, other = module.centre_of_mass(q), longer.centre_of_mass(q)
+    assert core.further.names == ("centroidal",)
+    assert longer.core is core
+    everything = equations.compile(target=target, kernels=["centroidal", "rhs"])
+    assert "centroidal" in everything.core.names
+    np.testing.assert_array_equal(centre, everything.centre_of_mass(q))
+    np.testing.assert_array_equal(other, everything.bind({"r": 0.2}).centre_of_mass(q))
+    assert np.abs(other - centre).max() > 1e-3
+    with pytest.raises(UsageError, match="q must have shape"):
+        module.centre_of_mass(q[:1])
