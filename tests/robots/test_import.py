@@ -267,3 +267,18 @@ def test_equalities_of_joints_and_tendons_become_couplings(tmp_path: Path) -> No
     assert [n for n in model.notes if "straight" in n] == [
         "left out: the coupling straight, all of whose joints are locked"
     ]
+
+
+PLANAR = """<robot name="plate"><link name="w"/>
+<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
+<joint name="j" type="{0}"><parent link="w"/><child link="b"/><axis xyz="0 0 1"/>
+<dynamics damping="0.1" friction="0.2"/><mimic joint="j"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("given", ["planar", "floating"])
+def test_dynamics_of_joints_of_several_degrees_are_left_out_with_a_note(given: str, tmp_path: Path) -> None:
+    path = tmp_path / "plate.urdf"
+    path.write_text(PLANAR.format(given))
+    model = eg.load(path, friction=True, mimic="coupling")
+    assert [f"left out: <{tag}> of the {given} joint j" for tag in ("dynamics", "mimic")] == list(model.notes)
+    assert model.check().degrees_of_freedom == (3 if given == "planar" else 6)
