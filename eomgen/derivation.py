@@ -65,6 +65,12 @@ class Equations:
         """Names of the independent coordinates."""
         return self.mobility.independent
 
+    @property
+    def accelerations(self) -> tuple[str, ...]:
+        """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
+        k = self.kinematics
+        return tuple(acceleration_name(k.velocity_names[k.freedoms.index(n)]) for n in self.independent)
+
     @cached_property
     def report(self) -> MechanismReport:
         """Bodies, joints, loops, rank, degrees of freedom, partition."""
@@ -200,7 +206,6 @@ class Equations:
             return None
         import sympy
 
-        names = [self.kinematics.velocity_names[self.kinematics.freedoms.index(n)] for n in self.independent]
-        rates = [sympy.Symbol(acceleration_name(n)) for n in names]
+        rates = [sympy.Symbol(name) for name in self.accelerations]
         left = f"{sympy.latex(self.mass_matrix)} {sympy.latex(sympy.Matrix(rates))}"
         return f"$\\displaystyle {left} = {sympy.latex(self.force)}$"

@@ -91,7 +91,7 @@ def written(derived: Equations) -> dict[str, Any]:
         "intermediates": {str(symbol): str(expression) for symbol, expression in derived.intermediates},
         "mass_matrix": [[str(x) for x in row] for row in derived.mass_matrix.tolist()],
         "force": [str(x) for x in derived.force],
-        "accelerations": [f"{name}_ddot" for name in derived.independent],
+        "accelerations": list(derived.accelerations),
     }
 
 

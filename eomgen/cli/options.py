@@ -115,6 +115,12 @@ _ROBOT = (
     click.option("--mimic", metavar="HOW", help="Robots: joints that mimic others are independent, or a coupling."),
     click.option("--rotation", metavar="HOW", help="Robots: free and ball joints in euler_angles or euler_parameters."),
     click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
+    click.option(
+        "--friction",
+        type=float,
+        metavar="VELOCITY",
+        help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
+    ),
     click.option("--symbolic", is_flag=True, help="Robots: masses and inertias become parameters."),
     click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
 )
@@ -122,7 +128,7 @@ _ROBOT = (
 
 def robot_options(verb: Callable[..., Any]) -> Callable[..., Any]:
     """Options of robot files, handed to the verb as one mapping ``robot``."""
-    keys = ("floating", "lock", "mimic", "rotation", "actuate", "symbolic", "assets")
+    keys = ("floating", "lock", "mimic", "rotation", "actuate", "friction", "symbolic", "assets")
 
     @functools.wraps(verb)
     def wrapped(*args: Any, **kwargs: Any) -> Any:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict, dataclass
+from textwrap import wrap
 from typing import Any
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from .kinematics import Kinematics
 from .mobility import Mobility
+
+WIDTH = 110  #: of the lines of a report
+WHOLE_WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
 
 
 @dataclass(frozen=True)
@@ -62,11 +67,12 @@ class MechanismReport:
         lines = [f"mechanism {self.name}"]
 
         def say(label: str, text: str) -> None:
-            lines.append(f"  {label:<22}{text}")
+            space = " " * 24
+            lines.extend(wrap(text, WIDTH, initial_indent=f"  {label:<22}", subsequent_indent=space, **WHOLE_WORDS))
 
         if self.bodies:
             say("bodies", f"{len(self.bodies)}: {_list(self.bodies)}")
-            say("joints", f"{len(self.joints)}: " + _list([f"{j['name']} ({j['type']})" for j in self.joints]))
+            say("joints", f"{len(self.joints)}: {_list_joints(self.joints)}")
             say("loop joints", _list(self.loop_joints) or "none (open tree)")
         say("coordinates", f"{len(self.coordinates)}: {_list(self.coordinates)}")
         if self.loop_coordinates:
@@ -107,6 +113,14 @@ def _list(names: list[str], limit: int = 12) -> str:
     if len(names) <= limit:
         return ", ".join(names)
     return ", ".join(names[: limit - 2]) + f", ... ({len(names) - limit + 2} more)"
+
+
+def _list_joints(joints: list[dict[str, Any]], limit: int = 12) -> str:
+    """Each with its type, or many of them by type."""
+    if len(joints) <= limit:
+        return ", ".join(f"{j['name']} ({j['type']})" for j in joints)
+    types = Counter(j["type"] for j in joints)
+    return ", ".join(f"{count} {kind}" for kind, count in types.most_common())
 
 
 def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:

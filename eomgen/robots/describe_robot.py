@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from ..describe.description import GROUND_NAME, SECTIONS, Description, Values
+from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
-from ..errors import UsageError
 from ..joints import JOINTS
+from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .names import Names, clean_model_name
-from .placement import Inertia, numbers
+from .placement import Inertia, Placement, numbers
 from .robot import Joint, Options, Robot
+from .ties import Sum, Tie, describe_tie
 from .tree import GROUND, Bodies, Body, build_bodies
 
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -48,8 +49,8 @@ class _Writer:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
         for body in moving:
             assert body.joint is not None
-            suffixes = [c.suffix for c in JOINTS[body.joint.type].coordinates]
-            self.joints[body.joint.name] = self.names.joint(body.joint.name, suffixes)
+            rates = ("_wx", "_wy", "_wz") if self._in_parameters(body.joint.type) else ()
+            self.joints[body.joint.name] = self.names.joint(body.joint.name, [*self._suffixes(body.joint.type), *rates])
         for body in self.found.bodies.values():
             self._body(body)
         for body in moving:
@@ -108,6 +109,15 @@ class _Writer:
         return given
 
     # -- joints ---------------------------------------------------------------------------------------------------
+    def _in_parameters(self, joint_type: str) -> bool:
+        return self.options.rotation == "euler_parameters" and joint_type in ("free", "spherical")
+
+    def _suffixes(self, joint_type: str) -> list[str]:
+        """Of the coordinates of a joint of the tree, as the options have them turn."""
+        kind = JOINTS[joint_type]
+        turning = {"rotation": self.options.rotation} if "rotation" in kind.options else {}
+        return [c.suffix for c in (kind(**turning) if turning else kind).coordinates]
+
     def _joint(self, body: Body) -> None:
         joint = body.joint
         assert joint is not None
@@ -119,9 +129,9 @@ class _Writer:
         kind = JOINTS[joint.type]
         if kind.has_axis:
             values["axis"] = _axis(joint.axis)
-        if joint.type in ("free", "spherical") and self.options.rotation != "euler_angles":
+        if self._in_parameters(joint.type):
             values["rotation"] = self.options.rotation
-        names = [name + c.suffix for c in kind.coordinates]
+        names = [name + suffix for suffix in self._suffixes(joint.type)]
         if self.robot.loops and names:  # named coordinates stay in the tree, so that the loop's own joint is cut
             values |= {"coordinate": names[0]} if len(names) == 1 else {"coordinates": names}
         if joint.limits:
@@ -131,19 +141,32 @@ class _Writer:
         if joint.armature:
             values["armature"] = joint.armature
         self._add("joints", name, values, joint.place)
-        if joint.damping:
-            self._force("friction", joint, "damping", {"viscous": joint.damping})
+        rubbing = {"viscous": joint.damping} if joint.damping else {}
+        if self.options.smoothing and joint.dry_friction:
+            rubbing |= {"coulomb": joint.dry_friction, "smoothing": self.options.smoothing}
+        if rubbing:
+            self._force("friction", joint, "friction" if "coulomb" in rubbing else "damping", rubbing)
         if joint.stiffness:
             self._spring(joint)
-        if joint.initial:
-            start = self.out.values.setdefault("initial", {})
-            start.update({c: x for c, x in zip(names, joint.initial, strict=True) if x})
+        if joint.initial or joint.start:
+            start = [joint.initial] if joint.start is None else self._start(joint.start)
+            reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
+            known = self.out.values.setdefault("initial", {})
+            known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
         chosen = self.options.actuate
         if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
             force = self.names.symbol(f"tau_{name}")
             unit = "N" if joint.type == "prismatic" else "N*m"
             self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
             self._force("actuator", joint, "drive", {"value": force})
+
+    def _start(self, pose: Placement) -> list[float]:
+        """Coordinates of a free joint."""
+        if self.options.rotation == "euler_parameters":
+            turn = euler_parameters_from_matrix(pose.rotation)
+        else:
+            turn = euler_angles_from_matrix("xyz", pose.rotation)
+        return [*numbers(pose.position), *numbers(turn)]
 
     def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
         name = self.joints[joint.name]
@@ -170,45 +193,28 @@ class _Writer:
             self._add("joints", name, {"type": loop.type, "between": pair}, loop.place)
 
     def _mimics(self) -> None:
-        ties = list(self.robot.couplings)
+        ties = list(self.robot.ties)
         loose = []
         for joint in self.robot.joints.values():
-            if joint.mimic is None or joint.type == "weld":
+            law = joint.mimic
+            if law is None or joint.type == "weld":
                 continue
             if self.options.mimic == "coupling":
-                ties.append((f"{joint.name}_mimic", joint.name, joint.mimic, joint.place))
+                sums = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
+                ties.append(Tie(f"{joint.name}_mimic", *sums, (law.offset, law.factor), joint.place))
             else:
-                loose.append(f"{joint.name} = {joint.mimic.factor:g} {joint.mimic.joint} + {joint.mimic.offset:g}")
+                loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
         if loose:
             remedy = "mimic='coupling' ties them"
             self.out.notes.append(
                 f"joints that mimic others keep coordinates of their own ({', '.join(loose)}); {remedy}"
             )
-        if ties and "constraints" not in SECTIONS:
-            if self.options.mimic == "coupling":
-                raise UsageError("couplings of joints need the model section constraints, which this version has not")
-            self.out.notes.append(f"left out: couplings of joints ({', '.join(name for name, *_ in ties)})")
-            ties = []
-        for name, joint_name, law, place in ties:
-            self._coupling(name, joint_name, law, place)
-
-    def _coupling(self, name: str, joint: str, law: Any, place: tuple[str, int]) -> None:
-        first, second = self.joints.get(joint), self.joints.get(law.joint)
-        locked = self.options.locked
-        coordinates: dict[str, float] = {}
-        offset = law.offset
-        if first is not None:
-            coordinates[first] = 1.0
-        else:
-            offset -= locked.get(joint, 0.0)
-        if second is not None and law.factor != 0.0:
-            coordinates[second] = -law.factor
-        else:
-            offset += law.factor * locked.get(law.joint, 0.0)
-        values: Values = {"type": "coupling", "coordinates": coordinates}
-        if offset:
-            values["offset"] = offset
-        self._add("constraints", self.names.link(name), values, place)
+        for tie in ties:
+            values = describe_tie(tie, self.joints, self.options.locked)
+            if values is None:
+                self.out.notes.append(f"left out: the coupling {tie.name}, all of whose joints are locked")
+            else:
+                self._add("constraints", self.names.link(tie.name), values, tie.place)
 
     def _drives(self) -> None:
         for k, drive in enumerate(self.robot.drives):

@@ -72,4 +72,7 @@ def make_options(given: dict[str, Any]) -> Options:
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS)):
         if key in given and given[key] not in allowed:
             raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}")
+    friction = given.get("friction", False)
+    if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
+        raise UsageError(f"friction={friction!r}: True, or the velocity (rad/s or m/s) below which it is smoothed")
     return Options(**given)

@@ -133,7 +133,7 @@ class _Reader:
             if kind == "spherical":
                 return joint
             pose = Placement(from_quaternion(*m.qpos0[start + 3 : start + 7]), m.qpos0[start : start + 3])
-            return replace(joint, outer=IDENTITY, inner=IDENTITY, initial=_start(pose))
+            return replace(joint, outer=IDENTITY, inner=IDENTITY, start=pose)
         axis = numbers(m.jnt_axis[j])
         q0 = float(m.qpos0[start])
         back = Placement(about(axis, -q0), np.zeros(3)) if kind == "revolute" else moved(-q0 * np.array(axis))
@@ -152,7 +152,7 @@ class _Reader:
             armature=float(m.dof_armature[dof]),
             stiffness=float(m.jnt_stiffness[j]),
             rest=float(m.qpos_spring[start]),
-            initial=(q0,),
+            initial=q0,
         )
 
     # -- what has no counterpart ----------------------------------------------------------------------------------
@@ -170,10 +170,3 @@ class _Reader:
             values = getattr(m, key, None)
             if values is not None and np.any(values):
                 notes.append(f"left out: {key}, the parts of springs and dampers that are not linear")
-
-
-def _start(pose: Placement) -> tuple[float, ...]:
-    """Position and intrinsic x-y'-z'' angles of a free joint at the start."""
-    R = pose.rotation
-    angles = (np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(np.clip(R[0, 2], -1, 1)), np.arctan2(-R[0, 1], R[0, 0]))
-    return tuple(numbers(pose.position)) + tuple(numbers(angles))

@@ -45,11 +45,11 @@ def _actuated(reader: _Reader, k: int) -> Parts:
     if m.actuator_trntype[k] in (_JOINT, _JOINT_IN_PARENT) and m.jnt_type[target] >= 2:
         return ((reader.names["joint"][target], gear),)
     if m.actuator_trntype[k] == _TENDON:
-        return tuple((joint, gear * c) for joint, c in _fixed_tendon(reader, target))
+        return tuple((joint, gear * c) for joint, c in fixed_tendon(reader, target))
     return ()
 
 
-def _fixed_tendon(reader: _Reader, k: int) -> Parts:
+def fixed_tendon(reader: _Reader, k: int) -> Parts:
     """Joints and coefficients of a tendon whose length is a sum of joint coordinates."""
     m = reader.m
     wraps = range(m.tendon_adr[k], m.tendon_adr[k] + m.tendon_num[k])
@@ -63,7 +63,7 @@ def _tendons(reader: _Reader) -> None:
     left = []
     for k in range(m.ntendon):
         name = m.tendon(k).name or f"tendon{k}"
-        parts = _fixed_tendon(reader, k)
+        parts = fixed_tendon(reader, k)
         stiffness, damping = float(m.tendon_stiffness[k]), float(m.tendon_damping[k])
         low, high = (float(x) for x in m.tendon_lengthspring[k])
         if stiffness or damping:

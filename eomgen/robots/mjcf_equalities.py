@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .mjcf_actuators import fixed_tendon
 from .placement import Placement, from_quaternion, moved
-from .robot import Loop, Mimic
+from .robot import Loop
+from .ties import Sum, Tie
 
 if TYPE_CHECKING:
     from .mjcf import _Reader
 
-CONNECT, WELD, JOINT = 0, 1, 2  # mjtEq
+CONNECT, WELD, JOINT, TENDON = 0, 1, 2, 3  # mjtEq
 _BODY, _SITE = 1, 6  # mjtObj
 
 
@@ -24,21 +26,16 @@ def read_equalities(reader: _Reader) -> None:
     m, robot = reader.m, reader.robot
     for k in range(m.neq):
         name = m.eq(k).name or f"equality{k}"
-        place = reader.place(name, "connect", "weld", "joint")
+        place = reader.place(name, "connect", "weld", "joint", "tendon")
         kind = m.eq_type[k]
         if not m.eq_active0[k]:
             robot.notes.append(f"left out: the equality {name}, which is not active")
         elif kind in (CONNECT, WELD) and m.eq_objtype[k] in (_BODY, _SITE):
             robot.loops.append(_loop(reader, k, name, place))
-        elif kind == JOINT and not m.eq_data[k][2:5].any() and _is_scalar(reader, k):
-            robot.couplings.append(_coupling(reader, k, name, place))
+        elif kind in (JOINT, TENDON) and (tie := _tie(reader, k, name, place)) is not None:
+            robot.ties.append(tie)
         else:
             robot.notes.append(f"left out: the equality {name}, which has no counterpart")
-
-
-def _is_scalar(reader: _Reader, k: int) -> bool:
-    joints = [j for j in (reader.m.eq_obj1id[k], reader.m.eq_obj2id[k]) if j >= 0]
-    return all(reader.m.jnt_type[j] >= 2 for j in joints)
 
 
 def _loop(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Loop:
@@ -59,13 +56,23 @@ def _loop(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Loop:
     return Loop(name, kind, (links[0], frames[0]), (links[1], frames[1]), place)
 
 
-def _coupling(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> tuple[str, str, Mimic, tuple[str, int]]:
-    """q1 - q1(0) = c0 + c1 (q2 - q2(0))."""
-    m, joints = reader.m, reader.names["joint"]
-    first, second = m.eq_obj1id[k], m.eq_obj2id[k]
-    c0, c1 = (float(c) for c in m.eq_data[k][:2])
-    offset = float(m.qpos0[m.jnt_qposadr[first]]) + c0
-    if second < 0:
-        return name, joints[first], Mimic("", 0.0, offset), place
-    offset -= c1 * float(m.qpos0[m.jnt_qposadr[second]])
-    return name, joints[first], Mimic(joints[second], c1, offset), place
+def _tie(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Tie | None:
+    """y - y(0) = c0 + c1 (x - x(0)) + ... + c4 (x - x(0))^4 of joint coordinates, or of lengths of fixed tendons."""
+    m = reader.m
+    summed = _joint if m.eq_type[k] == JOINT else _tendon
+    left = summed(reader, m.eq_obj1id[k])
+    right = summed(reader, m.eq_obj2id[k]) if m.eq_obj2id[k] >= 0 else Sum(())
+    if left is None or right is None:
+        return None
+    return Tie(name, left, right, tuple(float(c) for c in m.eq_data[k][: 5 if right.parts else 1]), place)
+
+
+def _joint(reader: _Reader, j: int) -> Sum | None:
+    if reader.m.jnt_type[j] < 2:
+        return None
+    return Sum(((reader.names["joint"][j], 1.0),), -float(reader.m.qpos0[reader.m.jnt_qposadr[j]]))
+
+
+def _tendon(reader: _Reader, k: int) -> Sum | None:
+    parts = fixed_tendon(reader, k)
+    return Sum(parts, -float(reader.m.tendon_length0[k])) if parts else None

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import Problem
 from .placement import IDENTITY, NOTHING, Inertia, Placement
+from .ties import Tie
 
 Place = tuple[str, int]  # file, line
 
@@ -34,6 +35,9 @@ class Options:
         Whether masses, centres of mass and inertias become parameters; else they are numbers, which fold.
     actuate : bool or names
         Inputs ``tau_<joint>`` on all joints of one degree, or on these.
+    friction : bool or float
+        Whether the dry friction of joints acts, smoothed below this velocity (rad/s or m/s; True: 0.01); else it is
+        data only.
     snap : float
         Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
     assets : str, optional
@@ -48,8 +52,14 @@ class Options:
     merge: bool = True
     symbolic: bool = False
     actuate: Any = False
+    friction: Any = False
     snap: float = 1e-11
     assets: str | None = None
+
+    @property
+    def smoothing(self) -> float:
+        """The velocity below which dry friction is smoothed; 0 where it does not act."""
+        return 0.01 if self.friction is True else float(self.friction)
 
     @property
     def locked(self) -> dict[str, float]:
@@ -101,7 +111,8 @@ class Joint:
     stiffness: float = 0.0
     rest: float = 0.0
     mimic: Mimic | None = None
-    initial: tuple[float, ...] = ()
+    initial: float = 0.0
+    start: Placement | None = None  #: of a free joint
 
 
 @dataclass(frozen=True)
@@ -139,7 +150,7 @@ class Robot:
     links: dict[str, Link] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
     loops: list[Loop] = field(default_factory=list)
-    couplings: list[tuple[str, str, Mimic, Place]] = field(default_factory=list)  #: name, joint, law, place
+    ties: list[Tie] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     problems: list[Problem] = field(default_factory=list)

@@ -205,7 +205,11 @@ class _Reader:
         if kind in ("revolute", "prismatic", "planar") and not any(direction):
             self.fault(axis or element, f"{path}.axis", "the axis has no length", "give three numbers, not all zero")
             direction = (1.0, 0.0, 0.0)
-        dynamics = element.find("dynamics")
+        one_degree = kind in ("revolute", "prismatic")
+        if kind in ("planar", "free"):
+            left = [tag for tag in ("dynamics", "mimic") if element.find(tag) is not None]
+            self.robot.notes += [f"left out: <{tag}> of the {given} joint {name}" for tag in left]
+        dynamics = element.find("dynamics") if one_degree else None
         self.robot.joints[name] = Joint(
             name=name,
             type=kind or "weld",
@@ -214,10 +218,10 @@ class _Reader:
             place=(element.file, element.line),
             outer=self.origin(element, path),
             axis=direction,
-            limits=self._limits(element, path, given) if kind in ("revolute", "prismatic") else {},
+            limits=self._limits(element, path, given) if one_degree else {},
             damping=0.0 if dynamics is None else self.number(dynamics, "damping", f"{path}.dynamics", 0.0),
             dry_friction=0.0 if dynamics is None else self.number(dynamics, "friction", f"{path}.dynamics", 0.0),
-            mimic=self._mimic(element, path),
+            mimic=self._mimic(element, path) if one_degree else None,
         )
 
     def _limits(self, element: Element, path: str, kind: str) -> dict[str, float]:

@@ -1,7 +1,8 @@
 """MuJoCo as a judge of MJCF models: what it says of random states, in the coordinates of our model.
 
-MuJoCo turns free and ball joints by quaternions, with the angular velocity in body axes as their rate; ours turn by
-Euler angles x-y'-z''.  With v = J v_ours and v' = J v'_ours + J' v_ours its equations become ours.
+MuJoCo turns free and ball joints by quaternions, scalar part first, with the angular velocity in body axes as their
+rate.  Our Euler parameters have the same velocities; our Euler angles x-y'-z'' have their own rates: with MuJoCo's
+v = J v_ours and v' = J v'_ours + J' v_ours its equations become ours.
 """
 
 from __future__ import annotations
@@ -11,16 +12,15 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from robots.pinocchio_judge import State
+from robots.state import State, angle_rates, angle_rates_slope, draw_parameters
 
+import eomgen as eg
 
-def rates(angles: np.ndarray) -> np.ndarray:
-    """E with omega (body axes) = E angles' for R = Rx Ry Rz; angles may be complex."""
-    _, b, c = angles
-    return np.array(
-        [[np.cos(b) * np.cos(c), np.sin(c), 0], [-np.cos(b) * np.sin(c), np.cos(c), 0], [np.sin(b), 0, 1]],
-        dtype=angles.dtype,
-    )
+TURNS = {  # coordinates and velocities of a joint that turns freely
+    "euler_angles": (["_1", "_2", "_3"], ["_1_dot", "_2_dot", "_3_dot"]),
+    "euler_parameters": (["_e0", "_e1", "_e2", "_e3"], ["_wx", "_wy", "_wz"]),
+}
+SLIDES = ["_x", "_y", "_z"]
 
 
 def quaternion(angles: np.ndarray) -> np.ndarray:
@@ -34,10 +34,17 @@ def quaternion(angles: np.ndarray) -> np.ndarray:
     return q
 
 
+def load_tree(path: Path, assets: Path, rotation: str) -> Any:
+    """Our model without its couplings, as MuJoCo's ``qacc_smooth`` knows no equalities."""
+    model = eg.load(path, assets=str(assets), rotation=rotation)
+    model.description.sections["constraints"].clear()
+    return model
+
+
 class Judge:
     """A model in MuJoCo, beside ours of the same file."""
 
-    def __init__(self, path: Path, model: Any) -> None:
+    def __init__(self, path: Path, model: Any, rotation: str = "euler_parameters") -> None:
         mujoco.set_mju_user_warning(lambda text: None)  # no log file in the current folder
         self.mj = mujoco.MjModel.from_xml_path(str(path))
         self.mj.opt.density = self.mj.opt.viscosity = 0.0  # the medium is left out of ours, which a note says
@@ -47,42 +54,54 @@ class Judge:
         self.data = mujoco.MjData(self.mj)
         self.model = model
         joints, inputs = model.renamed.get("joints", {}), model.renamed.get("inputs", {})
-        self.joints: list[tuple[int, list[str]]] = []
+        self.joints: list[tuple[int, list[str], list[str]]] = []  # with our coordinates and velocities
         for j in range(self.mj.njnt):
             name = self.mj.joint(j).name or f"joint{j}"
             name = joints.get(name, name)
-            suffixes = {0: "xyz123", 1: "123"}.get(int(self.mj.jnt_type[j]), "")
-            self.joints.append((j, [f"{name}_{s}" for s in suffixes] or [name]))
+            turns, rates = TURNS[rotation]
+            coordinates, velocities = {
+                0: ([*SLIDES, *turns], [*(f"{s}_dot" for s in SLIDES), *rates]),
+                1: (turns, rates),
+            }.get(int(self.mj.jnt_type[j]), ([""], ["_dot"]))
+            self.joints.append((j, [name + s for s in coordinates], [name + s for s in velocities]))
         actuators = [self.mj.actuator(k).name or f"actuator{k}" for k in range(self.mj.nu)]
         self.inputs = {inputs.get(name, name): k for k, name in enumerate(actuators)}
+        known = {entry.name for entry in model.description.sections["inputs"]}
+        for name in self.inputs.keys() - known:  # those with states of their own, which a note names
+            assert any("actuators" in note and name in note for note in model.notes), name
+            self.mj.actuator_gainprm[self.inputs[name]] = self.mj.actuator_biasprm[self.inputs[name]] = 0.0
 
-    def states(self, names: tuple[str, ...], count: int, seed: int) -> list[State]:
-        """Random states, each with values of our inputs."""
-        assert sorted(names) == sorted(name for _, group in self.joints for name in group)
+    def states(self, kinematics: Any, count: int, seed: int) -> list[State]:
+        """Random states in the order of our coordinates and velocities, each with values of our inputs."""
+        names, velocities = kinematics.names, kinematics.velocity_names
+        assert sorted(names) == sorted(name for _, group, _ in self.joints for name in group)
+        assert sorted(velocities) == sorted(name for _, _, group in self.joints for name in group)
         random = np.random.default_rng(seed)
-        return [self._state(names, random) for _ in range(count)]
+        return [self._state(names, velocities, random) for _ in range(count)]
 
-    def _state(self, names: tuple[str, ...], random: np.random.Generator) -> State:
+    def _state(self, names: tuple[str, ...], velocities: tuple[str, ...], random: np.random.Generator) -> State:
         mj, data = self.mj, self.data
-        n = len(names)
-        q, v, a = random.uniform(-1, 1, (3, n)) * np.array([[1.0], [3.0], [5.0]])
-        J, drift = np.zeros((mj.nv, n)), np.zeros(mj.nv)
-        for j, group in self.joints:
-            at = [names.index(name) for name in group]
+        q = random.uniform(-1, 1, len(names))
+        v, a = random.uniform(-1, 1, (2, len(velocities))) * np.array([[3.0], [5.0]])
+        J, drift = np.zeros((mj.nv, len(v))), np.zeros(mj.nv)
+        for j, coordinates, rates in self.joints:
+            at, moving = [names.index(n) for n in coordinates], [velocities.index(n) for n in rates]
             start, dof = mj.jnt_qposadr[j], mj.jnt_dofadr[j]
-            if len(group) == 6:
+            if len(moving) == 6:
                 data.qpos[start : start + 3] = q[at[:3]]
-                J[dof : dof + 3, at[:3]] = np.eye(3)
-                start, dof, at = start + 3, dof + 3, at[3:]
-            if len(at) == 3:
-                angles = q[at]
-                data.qpos[start : start + 4] = quaternion(angles)
-                J[dof : dof + 3, at] = rates(angles)
-                slope = rates(angles + 1e-30j * v[at]).imag / 1e-30
-                drift[dof : dof + 3] = slope @ v[at]
+                J[dof : dof + 3, moving[:3]] = np.eye(3)
+                start, dof, at, moving = start + 3, dof + 3, at[3:], moving[3:]
+            if len(at) == 4:
+                q[at] = draw_parameters(random)
+                data.qpos[start : start + 4] = q[at] / np.linalg.norm(q[at])
+                J[dof : dof + 3, moving] = np.eye(3)
+            elif len(at) == 3:
+                data.qpos[start : start + 4] = quaternion(q[at])
+                J[dof : dof + 3, moving] = angle_rates(q[at])
+                drift[dof : dof + 3] = angle_rates_slope(q[at], v[moving]) @ v[moving]
             else:
                 data.qpos[start] = q[at[0]]
-                J[dof, at[0]] = 1.0
+                J[dof, moving[0]] = 1.0
         data.qvel[:] = J @ v
         data.ctrl[:] = 0.0
         mujoco.mj_forward(mj, data)
@@ -95,8 +114,9 @@ class Judge:
         poses = {mj.body(k).name or f"body{k}": np.eye(4) for k in range(mj.nbody)}
         for k, pose in enumerate(poses.values()):
             pose[:3, :3], pose[:3, 3] = data.xmat[k].reshape(3, 3), data.xpos[k]
-        moving = mj.body_weldid > 0
-        com = (mj.body_mass[moving] @ data.xipos[moving]) / mj.body_mass[moving].sum()
+        moving_bodies = mj.body_weldid > 0
+        masses = mj.body_mass[moving_bodies]
+        com = (masses @ data.xipos[moving_bodies]) / masses.sum()
         u = {entry.name: float(random.uniform(-1, 1)) for entry in self.model.description.sections["inputs"]}
         for name, value in u.items():
             data.ctrl[self.inputs[name]] = value
@@ -104,3 +124,11 @@ class Judge:
         tau = J.T @ data.qfrc_actuator - rest
         forward = np.linalg.solve(J, data.qacc_smooth - drift)
         return State(q, v, a, tau, mass, bias, bias + mass @ a, forward, poses, com, u)
+
+    def reference_pose(self, body: str) -> np.ndarray:
+        """(4, 4) of a body where the file places it."""
+        mujoco.mj_resetData(self.mj, self.data)
+        mujoco.mj_kinematics(self.mj, self.data)
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self.data.body(body).xmat.reshape(3, 3), self.data.body(body).xpos
+        return pose

@@ -1,37 +1,34 @@
-"""Pinocchio as a judge of URDF robots: what it says of random states, in the coordinates of our model."""
+"""Pinocchio as a judge of URDF robots: what it says of random states, in the coordinates of our model.
+
+A base that floats is, in Euler angles, a chain of three slides and three hinges; in Euler parameters it is Pinocchio's
+free flyer, whose linear velocity is in body axes where ours is in ground axes: with its v = J v_ours and
+v' = J v'_ours + J' v_ours its equations become ours.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from robots.state import State, draw_parameters
 
-
-@dataclass(frozen=True)
-class State:
-    """One state, and what Pinocchio says of it; damping of joints is added to its numbers."""
-
-    q: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    tau: np.ndarray
-    mass_matrix: np.ndarray
-    bias: np.ndarray
-    inverse_dynamics: np.ndarray
-    acceleration: np.ndarray
-    frames: dict[str, np.ndarray]
-    com: np.ndarray
-    u: dict[str, float]  #: inputs; ``tau`` is what they make
+SUFFIXES = {
+    "euler_angles": (["x", "y", "z", "1", "2", "3"], ["x_dot", "y_dot", "z_dot", "1_dot", "2_dot", "3_dot"]),
+    "euler_parameters": (["x", "y", "z", "e0", "e1", "e2", "e3"], ["x_dot", "y_dot", "z_dot", "wx", "wy", "wz"]),
+}
 
 
 class Judge:
-    """A robot in Pinocchio; ``columns`` are its velocities in the order of our coordinates."""
+    """A robot in Pinocchio; ``places`` say where its positions and velocities are of our names."""
 
-    def __init__(self, path: Path, floating: bool, model: Any) -> None:
-        if floating:
+    def __init__(self, path: Path, floating: bool, model: Any, rotation: str = "euler_parameters") -> None:
+        self.flyer = floating and rotation == "euler_parameters"
+        if self.flyer:
+            self.pin = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+        elif floating:
             root = pin.JointModelComposite()
             for joint in (pin.JointModelTranslation(), *(getattr(pin, f"JointModelR{axis}")() for axis in "XYZ")):
                 root.addJoint(joint)
@@ -41,66 +38,120 @@ class Judge:
         self.data = self.pin.createData()
         self.model = model
         renamed = model.renamed.get("joints", {})
+        self.positions: dict[str, int] = {}  # an angle of a continuous joint: the place of its cosine
         self.velocities: dict[str, int] = {}
+        self.continuous: set[str] = set()
         for joint, name in list(zip(self.pin.joints, self.pin.names, strict=True))[1:]:
+            ours = renamed.get(name, name)
+            coordinates, velocities = [ours], [f"{ours}_dot"]
             if name == "root_joint":
-                names = [f"base_{k}" for k in ("x", "y", "z", "1", "2", "3")]
+                coordinates, velocities = ([f"base_{s}" for s in part] for part in SUFFIXES[rotation])
+            elif joint.nq == 2 and joint.nv == 1:
+                self.continuous.add(ours)
             else:
-                names = [renamed.get(name, name)]
-            assert joint.nv == len(names), name
-            self.velocities |= {n: joint.idx_v + k for k, n in enumerate(names)}
+                assert joint.nq == joint.nv == 1, name
+            self.positions |= {n: joint.idx_q + k for k, n in enumerate(coordinates)}
+            self.velocities |= {n: joint.idx_v + k for k, n in enumerate(velocities)}
+        assert sum(n.startswith("base_") for n in self.velocities) >= 6 * floating
 
-    def states(self, names: tuple[str, ...], count: int, seed: int) -> list[State]:
-        """Random states; ``names`` are our coordinates in our order."""
-        assert sorted(names) == sorted(self.velocities)
-        order = [self.velocities[name] for name in names]
+    def states(self, kinematics: Any, count: int, seed: int) -> list[State]:
+        """Random states in the order of our coordinates and velocities."""
+        names, velocities = kinematics.names, kinematics.velocity_names
+        assert sorted(names) == sorted(self.positions)
+        assert sorted(velocities) == sorted(self.velocities)
         random = np.random.default_rng(seed)
-        return [self._state(order, *random.uniform(-1, 1, (4, len(names)))) for _ in range(count)]
+        return [self._state(names, velocities, random) for _ in range(count)]
 
-    def _state(self, order: list[int], q: np.ndarray, v: np.ndarray, a: np.ndarray, tau: np.ndarray) -> State:
+    def _state(self, names: tuple[str, ...], velocities: tuple[str, ...], random: np.random.Generator) -> State:
+        q = random.uniform(-1, 1, len(names))
+        if self.flyer:
+            q[[names.index(f"base_e{k}") for k in range(4)]] = draw_parameters(random)
+        v, a, tau = random.uniform(-1, 1, (3, len(velocities))) * np.array([[3.0], [5.0], [10.0]])
+        driven = {f"{name}_dot": name for name in self.actuated}
+        tau = np.where([name in driven for name in velocities], tau, 0.0)
+        return self.at(names, velocities, q, v, a, tau)
+
+    def at(
+        self,
+        names: tuple[str, ...],
+        velocities: tuple[str, ...],
+        q: np.ndarray,
+        v: np.ndarray,
+        a: np.ndarray,
+        tau: np.ndarray,
+    ) -> State:
+        """What Pinocchio says of one state given in our names; ``tau`` (n_v,) in their order."""
         model, data = self.pin, self.data
-        v, a, tau = 3 * v, 5 * a, 10 * tau
-        tau = np.where([name in self.actuated for name in self.names_of(order)], tau, 0.0)
-        u = {
-            f"tau_{name}": x
-            for name, x in zip(self.names_of(order), tau.tolist(), strict=True)
-            if name in self.actuated
-        }
-        turned, theirs = np.zeros(model.nv), np.zeros((3, model.nv))
-        turned[order] = q
-        theirs[:, order] = v, a, tau
-        pq = pin.neutral(model)
-        for joint in list(model.joints)[1:]:
-            if joint.nq == 2 and joint.nv == 1:  # a continuous joint: cosine and sine
-                pq[joint.idx_q : joint.idx_q + 2] = np.cos(turned[joint.idx_v]), np.sin(turned[joint.idx_v])
-            else:
-                pq[joint.idx_q : joint.idx_q + joint.nq] = turned[joint.idx_v : joint.idx_v + joint.nv]
-        pv, pa, ptau = theirs
+        driven = {f"{name}_dot": name for name in self.actuated}
+        u = {f"tau_{driven[n]}": float(x) for n, x in zip(velocities, tau, strict=True) if n in driven}
+        theirs = self.position(names, q)
+        order = [self.velocities[name] for name in velocities]
+        J, drift = np.zeros((model.nv, len(v))), np.zeros(model.nv)
+        J[order, range(len(v))] = 1.0
+        if self.flyer:
+            turned = pin.XYZQUATToSE3(theirs[:7]).rotation.T
+            linear, omega = J[:3] @ v, J[3:6] @ v
+            J[:3] = turned @ J[:3]
+            drift[:3] = -np.cross(omega, turned @ linear)
+        pv, pa, ptau = J @ v, J @ a + drift, np.linalg.solve(J.T, tau)
         drag = np.asarray(model.damping) * pv
-        M = pin.crba(model, data, pq).copy()
+        M = pin.crba(model, data, theirs).copy()
         M = np.triu(M) + np.triu(M, 1).T
-        bias = pin.nonLinearEffects(model, data, pq, pv) + drag
-        inverse = pin.rnea(model, data, pq, pv, pa) + drag
-        forward = pin.aba(model, data, pq, pv, ptau - drag).copy()
-        pin.framesForwardKinematics(model, data, pq)
+        bias = pin.nonLinearEffects(model, data, theirs, pv) + drag
+        inverse = pin.rnea(model, data, theirs, pv, pa) + drag
+        forward = pin.aba(model, data, theirs, pv, ptau - drag).copy()
+        pin.framesForwardKinematics(model, data, theirs)
         frames = {
             frame.name: data.oMf[k].homogeneous.copy()
             for k, frame in enumerate(model.frames)
             if frame.type == pin.FrameType.BODY
         }
-        com = pin.centerOfMass(model, data, pq).copy()
-        return State(q, v, a, tau, M[np.ix_(order, order)], bias[order], inverse[order], forward[order], frames, com, u)
+        return State(
+            q=q,
+            v=v,
+            a=a,
+            tau=tau,
+            mass_matrix=J.T @ M @ J,
+            bias=J.T @ (bias + M @ drift),
+            inverse_dynamics=J.T @ inverse,
+            acceleration=np.linalg.solve(J, forward - drift),
+            frames=frames,
+            com=pin.centerOfMass(model, data, theirs).copy(),
+            u=u,
+        )
+
+    def position(self, names: tuple[str, ...], q: np.ndarray) -> np.ndarray:
+        """Pinocchio's q: a continuous joint as cosine and sine, Euler parameters of length one, scalar part last."""
+        theirs = pin.neutral(self.pin)
+        for name, x in zip(names, q, strict=True):
+            place = self.positions[name]
+            if name in self.continuous:
+                theirs[place : place + 2] = np.cos(x), np.sin(x)
+            else:
+                theirs[place] = x
+        if self.flyer:
+            e = theirs[3:7] / np.linalg.norm(theirs[3:7])
+            theirs[3:7] = *e[1:], e[0]
+        return theirs
+
+    def call_time(self) -> float:
+        """Nanoseconds of one call of Pinocchio's forward dynamics from Python, the best of several rounds."""
+        model, data = self.pin, self.data
+        q, v = pin.neutral(model), np.full(model.nv, 0.1)
+        tau = np.zeros(model.nv)
+        rounds = []
+        for _ in range(7):
+            start = perf_counter()
+            for _ in range(300):
+                pin.aba(model, data, q, v, tau)
+            rounds.append((perf_counter() - start) / 300)
+        return 1e9 * min(rounds)
 
     @property
     def actuated(self) -> set[str]:
         """Our coordinates that have an input."""
         entries = self.model.description.sections["forces"]
         return {entry.values["joint"] for entry in entries if entry.values["type"] == "actuator"}
-
-    def names_of(self, order: list[int]) -> list[str]:
-        """Our names of their velocities."""
-        back = {k: name for name, k in self.velocities.items()}
-        return [back[k] for k in order]
 
 
 def link_frames(model: Any) -> dict[str, tuple[str | None, np.ndarray]]:
@@ -117,21 +168,3 @@ def link_frames(model: Any) -> dict[str, tuple[str | None, np.ndarray]]:
             frame[:3, 3] = placed.get("at", (0.0, 0.0, 0.0))
             found[back.get(name, name)] = body, frame
     return found
-
-
-def centre_of_mass(model: Any, poses: np.ndarray, body_names: tuple[str, ...]) -> np.ndarray:
-    """Of all bodies together, from their poses and the numbers in the description."""
-    total, moment = 0.0, np.zeros(3)
-    for entry in model.description.sections["bodies"]:
-        if entry.name == "ground":
-            continue
-        pose = poses[body_names.index(entry.name)]
-        mass = entry.values["mass"]
-        total += mass
-        moment += mass * (pose[:3, :3] @ np.array(entry.values.get("com", (0, 0, 0))) + pose[:3, 3])
-    return moment / total
-
-
-def difference(ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Largest difference, of the largest entry."""
-    return float(np.abs(ours - theirs).max(initial=0.0) / max(np.abs(theirs).max(initial=0.0), 1e-12))

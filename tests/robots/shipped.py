@@ -78,10 +78,13 @@ MJCF: dict[str, tuple[str, str]] = {
     "hopper": ("dm_control", "suite/hopper.xml"),
     "walker": ("dm_control", "suite/walker.xml"),
     "humanoid": ("dm_control", "suite/humanoid.xml"),
+    "humanoid of motion capture": ("dm_control", "suite/humanoid_CMU.xml"),
+    "quadruped": ("dm_control", "suite/quadruped.xml"),
     "fish": ("dm_control", "suite/fish.xml"),
     "ball in cup": ("dm_control", "suite/ball_in_cup.xml"),
     "jaco arm": ("dm_control", "third_party/kinova/jaco_arm.xml"),
     "ant": ("gymnasium_robotics", "envs/mujoco/assets/ant.xml"),
+    "humanoid of Gymnasium": ("gymnasium_robotics", "envs/mujoco/assets/humanoid.xml"),
     "pusher": ("gymnasium_robotics", "envs/mujoco/assets/pusher.xml"),
     "shadow hand": ("gymnasium_robotics", "envs/assets/hand/reach.xml"),
 }

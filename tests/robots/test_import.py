@@ -68,12 +68,6 @@ def test_locked_joints_are_welds_at_their_value() -> None:
 def test_mimics_are_told() -> None:
     (note,) = [n for n in eg.load(ARM).notes if "mimic" in n]
     assert "right = 1 left + 0" in note
-    from eomgen.describe.description import SECTIONS
-
-    if "constraints" not in SECTIONS:
-        with pytest.raises(eg.UsageError, match="couplings of joints need the model section constraints"):
-            eg.load(ARM, mimic="coupling")
-        return
     module = eg.load(ARM, mimic="coupling").compile(target="numpy")
     assert module.n_dof == 4
     x = module.x0(left=0.02, left_dot=0.1)
@@ -217,3 +211,74 @@ def test_the_drive_of_a_cut_joint_counts(tmp_path: Path) -> None:
 
 def values_coordinate(joints: dict[str, Any], name: str) -> str:
     return str(joints[name].get("coordinate", name))
+
+
+def test_dry_friction_acts_where_it_is_asked_for() -> None:
+    q, v = np.array([0.1, 0.2, -0.3, 0.01, 0.02]), np.array([1.0, -2.0, 0.015, 0.1, 0.0])
+    modules = [
+        eg.load(ARM, **friction).compile(target="numpy", kernels=["bias"])
+        for friction in ({}, {"friction": True}, {"friction": 0.05})
+    ]
+    elbow = modules[0].q_names.index("elbow")
+    without, hard, soft = (module.bias(0.0, np.concatenate([q, v])) for module in modules)
+    for found, smoothing in ((hard, 0.01), (soft, 0.05)):
+        added = found - without
+        assert added[elbow] == pytest.approx(0.1 * np.tanh(v[elbow] / smoothing), rel=1e-12)
+        assert not np.delete(added, elbow).any()
+    forces = values(eg.load(ARM, friction=0.05), "forces")
+    assert [n for n, d in forces.items() if "coulomb" in d] == ["elbow_friction"]
+
+
+@pytest.mark.parametrize("friction", [-1, "much", float("nan")])
+def test_friction_is_a_velocity(friction: Any) -> None:
+    with pytest.raises(eg.UsageError, match="friction="):
+        eg.load(ARM, friction=friction)
+
+
+TIED = """
+<mujoco model="tied">
+  <worldbody>
+    {bodies}
+  </worldbody>
+  <tendon><fixed name="sum"><joint joint="a" coef="2"/><joint joint="b" coef="-1"/></fixed></tendon>
+  <equality>
+    <joint name="bent" joint1="a" joint2="b" polycoef="0.1 0.5 0.25 0 0"/>
+    <tendon name="held" tendon1="sum" polycoef="0.3"/>
+    <joint name="straight" joint1="c" joint2="b" polycoef="0 -2 0 0 0"/>
+  </equality>
+</mujoco>
+"""
+TIED_BODY = '<body><joint name="{0}" ref="{1}"/><geom type="box" size="0.1 0.2 0.3" pos="0.2 0 0"/></body>'
+
+
+def test_equalities_of_joints_and_tendons_become_couplings(tmp_path: Path) -> None:
+    path = tmp_path / "tied.xml"
+    bodies = [TIED_BODY.format(name, ref) for name, ref in (("a", 90), ("b", 0), ("c", 0))]
+    path.write_text(TIED.format(bodies="".join(bodies)))
+    quarter = np.pi / 2
+    found = values(eg.load(path), "constraints")
+    assert found["held"] == {"type": "coupling", "coordinates": {"a": 2.0, "b": -1.0}, "offset": 0.3 + np.pi}
+    assert found["straight"] == {"type": "coupling", "coordinates": {"c": 1.0, "b": 2.0}}
+    assert "b" in found["bent"]["equation"]
+    locked = values(eg.load(path, lock={"b": 0.2}), "constraints")
+    assert locked["bent"]["coordinates"] == {"a": 1.0}
+    assert locked["bent"]["offset"] == pytest.approx(quarter + 0.1 + 0.5 * 0.2 + 0.25 * 0.2**2)
+    model = eg.load(path, lock=["a", "b", "c"][1:])
+    assert [n for n in model.notes if "straight" in n] == [
+        "left out: the coupling straight, all of whose joints are locked"
+    ]
+
+
+PLANAR = """<robot name="plate"><link name="w"/>
+<link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
+<joint name="j" type="{0}"><parent link="w"/><child link="b"/><axis xyz="0 0 1"/>
+<dynamics damping="0.1" friction="0.2"/><mimic joint="j"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("given", ["planar", "floating"])
+def test_dynamics_of_joints_of_several_degrees_are_left_out_with_a_note(given: str, tmp_path: Path) -> None:
+    path = tmp_path / "plate.urdf"
+    path.write_text(PLANAR.format(given))
+    model = eg.load(path, friction=True, mimic="coupling")
+    assert [f"left out: <{tag}> of the {given} joint j" for tag in ("dynamics", "mimic")] == list(model.notes)
+    assert model.check().degrees_of_freedom == (3 if given == "planar" else 6)
