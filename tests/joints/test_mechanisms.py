@@ -137,6 +137,7 @@ def test_loop_of_guides_alone_cannot_be_cut() -> None:
         ("curve_slider", {"curve": [0, 1]}, r"joints\.j\.curve: \[0, 1\] is not three numbers"),
         ("curve_slider", {"curve": [0, 1, 2]}, r"joints\.j\.curve: does not depend on j"),
         ("curve_slider", {"curve": ["j", "t", 0]}, r"joints\.j\.curve: the time 't' cannot stand here"),
+        ("revolute", {"pitch": 1}, r"a revolute joint has no 'pitch'"),
     ],
 )
 def test_bad_options(kind: str, keys: dict[str, object], message: str) -> None:
@@ -144,12 +145,6 @@ def test_bad_options(kind: str, keys: dict[str, object], message: str) -> None:
     m.joint(kind, "j", m.ground, m.body("b", mass=1), **keys)
     with pytest.raises(ModelError, match=message):
         m.mechanism()
-
-
-def test_an_option_of_another_joint_is_refused_where_it_is_written() -> None:
-    m = eg.Model("bad")
-    with pytest.raises(eg.UsageError, match=r"revolute has no argument 'pitch'"):
-        m.joint("revolute", "j", m.ground, m.body("b", mass=1), pitch=1)
 
 
 def test_options_round_trip_through_a_file(tmp_path: Path) -> None:
