@@ -45,8 +45,8 @@ def yaml_text(description: Description) -> str:
             lines += _section(key, description)
         elif key in description.values:
             value = description.values[key]
-            if key == "lagrangian" and value is not None:
-                lines += ["lagrangian:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
+            if key in ("lagrangian", "equations") and value is not None:
+                lines += [f"{key}:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
             elif not _is_default(key, value):
                 lines.append(f"{key}: {_value(value, functions)}")
     return "\n".join(lines) + "\n"
