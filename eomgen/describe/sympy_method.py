@@ -170,11 +170,14 @@ class _Known:
         for expression in expressions:
             if not is_sympy(expression):
                 continue
-            for part in expression.atoms(sympy.Symbol, AppliedUndef, sympy.Derivative):
+            walk = sympy.preorder_traversal(expression)
+            for part in walk:
                 if isinstance(part, sympy.Symbol):
                     symbols.setdefault(part.name, set()).add(part)
-                elif (found := function_name(part)) is not None and found not in self.motion:
-                    functions.add(found)
+                elif isinstance(part, AppliedUndef | sympy.Derivative) and (found := function_name(part)) is not None:
+                    walk.skip()  # f' is not f
+                    if found not in self.motion:
+                        functions.add(found)
         symbols.pop("t", None)
         for symbol, different in symbols.items():
             if symbol in self.names or symbol in functions:
