@@ -84,6 +84,7 @@ def _read_lagrange(method: Any) -> Forms:
 
 def _read_kane(method: Any) -> Forms:
     from sympy import S
+    from sympy.physics.mechanics import dynamicsymbols
 
     if method._fr is None or method._frstar is None:
         raise UsageError("the KanesMethod has no equations yet; call kanes_equations(bodies, loads) on it first")
@@ -92,12 +93,12 @@ def _read_kane(method: Any) -> Forms:
     if len(method._udep) or not method._k_kqdot_implicit.is_diagonal():
         whole = _of_all_speeds(method)
     rates = whole.kindiffdict()
-    auxiliary = dict.fromkeys(method._uaux, S.Zero)
+    auxiliary = dict.fromkeys([*method._uaux, *method._uaux.diff(dynamicsymbols._t)], S.Zero)
     bodies = list(method.bodies)
     kinetic = sum((body.kinetic_energy(method._inertial) for body in bodies), S.Zero)
     potential = sum((body.potential_energy for body in bodies), S.Zero)
     order = _paired(q, v, rates)
-    matrix, forcing = whole.mass_matrix, whole.forcing
+    matrix, forcing = whole.mass_matrix.xreplace(auxiliary), whole.forcing.xreplace(auxiliary)
     return Forms(
         q=q,
         v=[v[k] for k in order],
@@ -108,7 +109,7 @@ def _read_kane(method: Any) -> Forms:
         motion=_constraints_of_speeds(method, rates, auxiliary),
         kinetic=kinetic.xreplace(rates).xreplace(auxiliary),
         potential=potential,
-        noncontributing=list(method.auxiliary_eqs) if len(method._uaux) else [],
+        noncontributing=list(method.auxiliary_eqs.xreplace(auxiliary)) if len(method._uaux) else [],
     )
 
 
@@ -138,7 +139,7 @@ def _constraints_of_speeds(method: Any, rates: dict[Any, Any], auxiliary: dict[A
 
 
 def _solve_blocks(left: Any, right: Any) -> Any:
-    """left^-1 right, block by block, by Cramer's rule: singular only where left is, unlike elimination in a fixed order."""
+    """left^-1 right, block by block, by Cramer's rule: singular where left is, unlike elimination in a fixed order."""
     from sympy import zeros
 
     result = zeros(*right.shape)

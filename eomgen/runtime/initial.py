@@ -336,6 +336,7 @@ def start_from(module: Module, t: float, p: Any, u: Any) -> Initial:
     """
     for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
         scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
-        if scalar and name in module.layout.q + module.layout.loops:
-            raise UsageError(f"{name}= gives the {what}; the coordinate {name!r} goes in a dict: {{{name!r}: ...}}")
+        if scalar and name in module.layout.q + module.layout.loops + module.layout.v:
+            kind = "velocity" if name in module.layout.v else "coordinate"
+            raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
     return Initial((module if p is None and u is None else module.bind(p, u)).kernels, t)
