@@ -14,7 +14,7 @@ from .checks import check_keys
 from .description import items
 from .fields import EQUATIONS, MOTION
 from .mechanism import GivenEquations
-from .names import nearest
+from .names import fault_of_name, nearest
 from .reading import Reader
 from .sympy_face import name_of
 
@@ -72,12 +72,25 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
         return None
     graph, faults = reader.graph, reader.faults
     q, v, named = values.get("coordinates", []), values.get("velocities", []), values.get("multipliers", [])
-    rates = _rates(reader, values.get("rates"), q, v)
+    local: dict[str, Expr] = {}
+    parts = values.get("intermediates", {})
+    if not isinstance(parts, Mapping):
+        reader.wrong(f"{PATH}.intermediates", parts, "rates")
+        parts = {}
+    for name, part in parts.items():
+        fault = fault_of_name(name, symbol=True)
+        if fault:
+            faults.add(f"{PATH}.intermediates.{name}", *fault)
+        elif name in reader.names.kinds:
+            message = f"the name is taken by the {reader.names.kinds[name]}"
+            faults.add(f"{PATH}.intermediates.{name}", message, "rename one")
+        local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
+    rates = _rates(reader, values.get("rates"), q, v, local)
     derived = {f"{name}_dot": rate for name, rate in zip(q, rates, strict=True) if f"{name}_dot" not in v}
     mapping = {graph.symbol(name): rate for name, rate in derived.items()}
 
     def read(path: str, value: Any) -> Expr:
-        expression = reader.expression(path, value, MOTION)
+        expression = reader.expression(path, value, MOTION, local)
         return substitute([expression], mapping)[0] if not symbols_of([expression]).isdisjoint(derived) else expression
 
     def listed(key: str, size: int | None) -> tuple[Expr, ...]:
@@ -120,7 +133,9 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     )
 
 
-def _rates(reader: Reader, given: Any, q: Sequence[str], v: Sequence[str]) -> tuple[Expr, ...]:
+def _rates(
+    reader: Reader, given: Any, q: Sequence[str], v: Sequence[str], local: Mapping[str, Expr]
+) -> tuple[Expr, ...]:
     """q' in terms of the velocities."""
     path, faults = f"{PATH}.rates", reader.faults
     if given is None:
@@ -140,7 +155,7 @@ def _rates(reader: Reader, given: Any, q: Sequence[str], v: Sequence[str]) -> tu
         value: Any = named.get(name, f"{name}_dot" if f"{name}_dot" in v else None)
         if value is None:
             faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}")
-        rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION)
+        rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION, local)
         if not symbols_of([rate]).isdisjoint(own):
             faults.add(f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}")
         _check_linear(reader, f"{path}.{name}", rate, v)

@@ -61,7 +61,7 @@ KINDS = {
     "matrix6": "six numbers or expressions for the diagonal, or 6 x 6 of them",
     "radii": "two numbers or expressions",
     "matrix": "a list of rows, each a list of numbers or expressions",
-    "rates": "a mapping of coordinates to expressions",
+    "rates": "a mapping of names to expressions",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -211,6 +211,7 @@ EQUATIONS: Fields = {
     "coordinates": Field("names", "generalized coordinates q, in order", required=True),
     "velocities": Field("names", "generalized velocities v, in order (<coordinate>_dot unless given)"),
     "rates": Field("rates", "q' in q, v, t, linear in v (the velocities in order unless given)", level=MOTION),
+    "intermediates": Field("rates", "names for parts of the expressions, each in the ones before", level=MOTION),
     "mass_matrix": Field("matrix", "M in M v' = f, of q and t, symmetric", required=True, level=MOTION),
     "forcing": Field("expressions", "f, of q, v, t and inputs", required=True, level=MOTION),
     "constraints": Field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -125,12 +126,16 @@ def test_bicycle(whipple: eg.Model, target: str) -> None:
 
 
 @pytest.mark.slow
-def test_bicycle_far_from_upright(whipple: eg.Model) -> None:
+def test_bicycle_far_from_upright(whipple: eg.Model, tmp_path: Path) -> None:
+    whipple.save(tmp_path / "bicycle.yaml")  # with intermediates: entries are longer than a file may have them
+    again = eg.load(tmp_path / "bicycle.yaml")
+    assert len(again.description.values["equations"]["intermediates"]) > 100
     module = whipple.compile(target="numpy")
     x = module.x0(q1=0.2, q2=0.1, q5=0.2, u2=0.3, u5=-0.2, u3=5.0)
     assert abs(module.constraints(x[:4])[0]) < 1e-12
     exact = module.jacobian(0.0, x)
     assert np.abs(exact - slopes(lambda z: module.rhs(0.0, z), x)).max() < 1e-7
+    assert again.compile(target="numpy").rhs(0.0, x) == pytest.approx(module.rhs(0.0, x), rel=1e-10, abs=1e-10)
     numbers = dict(zip(module.x_names, x, strict=True))
     assert numbers["q4"] != 0.0
     off = module.project(x + 1e-3 * np.arange(1.0, len(x) + 1.0))

@@ -220,6 +220,12 @@ def test_given_equations_are_checked() -> None:
     assert "equations: the model has bodies" in str_of_mixed()
 
 
+def test_intermediates_are_checked() -> None:
+    assert "equations.intermediates.a: the name is taken by the coordinate" in faults(intermediates={"a": "2"})
+    assert "unknown name 'z2'" in faults(intermediates={"z1": "z2 + 1", "z2": "a"})
+    assert "equations.intermediates.2z" in faults(intermediates={"2z": 1})
+
+
 def str_of_mixed() -> str:
     m = eg.Model("mixed")
     m.body("b", mass=1)
