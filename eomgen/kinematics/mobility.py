@@ -243,6 +243,9 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.freedoms)}"
+            if kinematics.given_rates:
+                message = f"{name!r} is no velocity's own coordinate: its rate is given as a function of velocities"
+                remedy = f"choose of {', '.join(kinematics.freedoms)}"
             problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:

@@ -14,7 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
-from .multipliers import multiplier_values
+from .given_multipliers import multiplier_values
 from .program import Limits
 from .soundness import flag_forces
 from .terms import SystemTerms

@@ -77,6 +77,14 @@ def test_constraints_with_given_rates(target: str) -> None:
     assert off[0] ** 2 + off[1] - 0.3 * off[2] - 0.1 * t == pytest.approx(0.5, abs=1e-12)
     with pytest.raises(eg.UsageError, match="the rates of its coordinates are given as functions of velocities"):
         _ = module.minimal.names
+    with pytest.raises(eg.ModelError, match="'a' is no velocity's own coordinate.*choose of r, v, s, z"):
+        tied().derive(independent=["a", "v"])
+    with pytest.raises(eg.UsageError, match="'a_dot' follows from the velocities; give those instead, of r, v, s, z"):
+        module.x0(a_dot=1.0)
+    with pytest.raises(eg.UsageError, match="p= gives the parameters; the velocity 'p'"):
+        given("named", coordinates=["a"], velocities=["p"], mass_matrix=[[1]], forcing=[0]).compile(target="numpy").x0(
+            p=1.0
+        )
 
 
 @pytest.mark.parametrize("target", TARGETS)
