@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .describe import Model as Model
+    from .describe import from_sympy as from_sympy
     from .describe import load as load
     from .runtime import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
 
-_HOMES = {"Model": "describe", "load": "describe", "load_trajectory": "runtime"}
+_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "describe", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
     "EomgenError",
@@ -34,7 +35,7 @@ _ERRORS = (
 )
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 
-__all__ = ["Model", "__version__", "errors", "load", "load_trajectory", *_ERRORS]
+__all__ = ["Model", "__version__", "errors", "from_sympy", "load", "load_trajectory", *_ERRORS]
 
 
 def __getattr__(name: str) -> Any:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from .derivation import Equations
-from .equations import METHODS, TreeEquations
+from .equations import GIVEN, METHODS, TreeEquations, take_given
 from .errors import AssemblyError, EvaluationError, ModelError, UsageError
 from .graph.evaluate import compile_evaluator
 from .kinematics import Kinematics, analyse
@@ -55,6 +55,10 @@ def _without_collection() -> Iterator[None]:
 def choose_method(mechanism: Mechanism, method: str) -> str:
     """Resolve ``auto`` for a bare Lagrangian; refuse a method that is not there or does not fit."""
     bare = mechanism.lagrangian is not None
+    if mechanism.given is not None:
+        if method not in ("auto", GIVEN):
+            raise UsageError(f"method {method!r} needs bodies; given equations are taken as they are: auto, {GIVEN}")
+        return GIVEN
     if method == "auto" and bare:
         return "lagrange"
     if method not in ("auto", *METHODS):
@@ -96,7 +100,9 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
         mobility = _judge(kinematics, independent or ())
     with _without_collection(), _timed(seconds, "equations"):
         choice: Choice | None = None
-        if chosen != "auto":
+        if chosen == GIVEN:
+            tree = take_given(kinematics)
+        elif chosen != "auto":
             tree = METHODS[chosen](kinematics)
         elif kinematics.constraints.labels:
             tree = METHODS["embedding"](kinematics)
@@ -176,7 +182,8 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():
             spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
-            path = f"joints.{spec.name}" if spec else f"lagrangian.{names[j]}"
+            section = "lagrangian" if m.given is None else "equations"
+            path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
             what = "negative inertia" if size < 0.0 else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
             problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))

@@ -63,9 +63,7 @@ def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping
 
 def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, float]) -> NDArray[np.float64] | None:
     """Work done up to each time (n_t,), by Gauss's quadrature of the power over each step; None if not known."""
-    if kinematics.mechanism.lagrangian is not None or not all(
-        e.is_zero for e in kinematics.constraints.time_derivative
-    ):
+    if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
         return None  # constraints that move do work of their own
     values = {**trajectory.metadata["parameters"], **inputs}
     graph = kinematics.graph

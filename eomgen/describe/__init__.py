@@ -6,6 +6,7 @@ from .handles import BodyHandle, JointHandle, MarkerHandle
 from .mechanism import Mechanism
 from .model import Model
 from .schema import model_schema
+from .sympy_method import from_sympy
 from .yaml_file import load, load_yaml
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "MarkerHandle",
     "Mechanism",
     "Model",
+    "from_sympy",
     "load",
     "load_yaml",
     "model_schema",

@@ -11,6 +11,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
+from .build_equations import build_equations, declare_equations
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -64,11 +65,15 @@ def build(description: Description) -> Mechanism:
     lagrangian_values = declare_lagrangian(
         reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
     )
+    given_values = declare_equations(
+        reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
+    )
 
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
     forces = build_forces(reader, sections["forces"], specs, bodies, parameters)
     lagrangian = build_lagrangian(reader, lagrangian_values)
+    given = build_equations(reader, given_values)
     constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
@@ -78,7 +83,7 @@ def build(description: Description) -> Mechanism:
     simulation = _simulation(reader, values.get("simulation", {}))
     doc = reader.text("doc", values.get("doc", ""))
 
-    if lagrangian_values is None and not bodies and not faults.under("bodies"):
+    if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
     check_bodies(bodies, {p.name: p.value for p in parameters if p.value is not None}, faults)
@@ -103,6 +108,7 @@ def build(description: Description) -> Mechanism:
         independent=independent,
         simulation=simulation,
         lagrangian=lagrangian,
+        given=given,
         constraints=constraints,
         lines=dict(description.lines),
         doc=doc,
@@ -194,7 +200,7 @@ def _output(reader: Reader, entry: Entry) -> Output:
     if "expression" in entry.values:
         expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
     kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
-    if kind in ("coordinate", "velocity", "acceleration"):
+    if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
         if expression != reader.graph.symbol(entry.name):
             faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
     elif kind != "output":

@@ -44,6 +44,10 @@ def model_html(description: Description) -> str:
     if isinstance(lagrangian, Mapping):
         text = text_of(lagrangian.get("expression"))
         rows.append(f"<tr><td>Lagrangian</td><td></td><td>{escape(text)}</td></tr>")
+    equations = description.values.get("equations")
+    if isinstance(equations, Mapping):
+        shown = ", ".join(text_of(q) for q in items(equations.get("coordinates")) or ())
+        rows.append(f"<tr><td>equations</td><td></td><td>of {escape(shown)}</td></tr>")
     for section, entries in description.sections.items():
         for k, entry in enumerate(entries):
             first = section if k == 0 else ""

@@ -60,6 +60,8 @@ KINDS = {
     "via": "a list of markers and cylinders {around, radius, sense}",
     "matrix6": "six numbers or expressions for the diagonal, or 6 x 6 of them",
     "radii": "two numbers or expressions",
+    "matrix": "a list of rows, each a list of numbers or expressions",
+    "rates": "a mapping of names to expressions",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -205,6 +207,20 @@ LAGRANGIAN: Fields = {
         "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
     ),
 }
+EQUATIONS: Fields = {
+    "coordinates": Field("names", "generalized coordinates q, in order", required=True),
+    "velocities": Field("names", "generalized velocities v, in order (<coordinate>_dot unless given)"),
+    "rates": Field("rates", "q' in q, v, t, linear in v (the velocities in order unless given)", level=MOTION),
+    "intermediates": Field("rates", "names for parts of the expressions, each in the ones before", level=MOTION),
+    "mass_matrix": Field("matrix", "M in M v' = f, of q and t, symmetric", required=True, level=MOTION),
+    "forcing": Field("expressions", "f, of q, v, t and inputs", required=True, level=MOTION),
+    "constraints": Field(
+        "expressions", "constraints, each = 0: of coordinates, or linear in velocities", default=(), level=MOTION
+    ),
+    "multipliers": Field("names", "names of the multipliers l of the constraints, for outputs: M v' + C_q^T l = f"),
+    "kinetic_energy": Field("expression", "kinetic energy (J)", default=0, level=MOTION),
+    "potential_energy": Field("expression", "potential energy (J)", default=0, level=MOTION),
+}
 SIMULATION: Fields = {
     "end": Field("positive", "end time (s)", default=Simulation.end),
     "method": Field("choice", "integrator", default=Simulation.method, choices=SOLVERS),
@@ -224,6 +240,7 @@ MODEL: Fields = {
     "constraints": Field("table", "equations between coordinates or markers"),
     "outputs": Field("table", "named results"),
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
+    "equations": Field("table", "equations of motion M v' = f as they are, instead of bodies and joints"),
     "independent": Field("names", "coordinates to integrate, when loops leave a choice", default=()),
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),

@@ -140,6 +140,25 @@ class Lagrangian:
 
 
 @dataclass(frozen=True)
+class GivenEquations:
+    """Equations of motion as they are given: M v' + C_q^T l = f with q' = N(q, t) v + b(q, t) and constraints C = 0.
+
+    M is of q and t, f of q, v and t; a constraint that contains velocities is linear in them.  ``multipliers`` names
+    the l, in the order of the constraints; there are none, or one for each.
+    """
+
+    coordinates: tuple[str, ...]
+    velocities: tuple[str, ...]
+    rates: tuple[Expr, ...]
+    mass_matrix: tuple[tuple[Expr, ...], ...]
+    forcing: tuple[Expr, ...]
+    constraints: tuple[Expr, ...]
+    multipliers: tuple[str, ...]
+    kinetic_energy: Expr
+    potential_energy: Expr
+
+
+@dataclass(frozen=True)
 class Simulation:
     """Defaults of ``simulate`` and ``eomgen run``."""
 
@@ -168,9 +187,15 @@ class Mechanism:
     independent: tuple[str, ...] = ()
     simulation: Simulation = Simulation()
     lagrangian: Lagrangian | None = None
+    given: GivenEquations | None = None
     constraints: tuple[Constraint, ...] = ()
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
+
+    @property
+    def bare(self) -> bool:
+        """Whether there are no bodies: a Lagrangian, or equations, came instead."""
+        return self.lagrangian is not None or self.given is not None
 
     def problem(self, path: str, message: str, remedy: str = "") -> Problem:
         """A problem at a dotted path, with the file and line the path or its nearest parent came from."""

@@ -100,6 +100,13 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
             describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
         )
 
+    @classmethod
+    def from_sympy(cls, method: Any, name: str = "system", **options: Any) -> Model:
+        """A model from equations that SymPy's mechanics formed; see :func:`eomgen.from_sympy`, with its arguments."""
+        from .sympy_method import describe_method
+
+        return cls.from_description(describe_method(method, name, **options))
+
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:
         """Declare a constant that can change between runs.
@@ -317,7 +324,8 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         return ", ".join(f"{number} {_SINGULAR[s] if number == 1 else s}" for s, number in counts if number)
 
     def __repr__(self) -> str:
-        kind = "Lagrangian" if self._description.values.get("lagrangian") is not None else ""
+        kinds = {"lagrangian": "Lagrangian", "equations": "given equations"}
+        kind = "".join(word for key, word in kinds.items() if self._description.values.get(key) is not None)
         return f"<Model {self.name}: {', '.join(part for part in (kind, self._counts()) if part) or 'empty'}>"
 
     def _repr_html_(self) -> str:

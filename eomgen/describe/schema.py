@@ -10,6 +10,7 @@ from .fields import (
     BODY,
     CYLINDER,
     DISPLAY,
+    EQUATIONS,
     FORCE,
     FUNCTION,
     GROUND,
@@ -126,6 +127,8 @@ _KINDS: dict[str, Schema] = {
             {**_SIX, "items": {**_SIX, "items": _ref("expression")}},
         ]
     },
+    "matrix": {"type": "array", "items": {"type": "array", "items": _ref("expression")}},
+    "rates": {"type": "object", "additionalProperties": _ref("expression")},
     "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {
         "anyOf": [
@@ -230,6 +233,7 @@ def model_schema() -> dict[str, Any]:
         "constraints": _section({"oneOf": [_constraint(name) for name in CONSTRAINT]}, MODEL["constraints"].doc),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
         "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},
+        "equations": {**_table(EQUATIONS), "description": MODEL["equations"].doc},
         "simulation": {**_table(SIMULATION), "description": MODEL["simulation"].doc},
         "initial": {**values, "description": MODEL["initial"].doc},
         "guess": {**values, "description": MODEL["guess"].doc},

@@ -17,6 +17,7 @@ from .names import COM, QUANTITIES, TOTALS, fault_of_name, nearest
 #: Kind of name -> the least level of a field in which it may stand.
 LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": MOTION, "velocity": MOTION}
 LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
+LEVELS |= {"multiplier": OUTPUT}  # of the constraints of given equations
 LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 

@@ -13,6 +13,7 @@ from ..errors import UsageError
 from .description import SECTIONS, Description, items
 from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
+from .write_equations import with_intermediates
 from .yaml_nodes import scalar
 
 Names = frozenset[Any]  # of declared functions
@@ -45,8 +46,10 @@ def yaml_text(description: Description) -> str:
             lines += _section(key, description)
         elif key in description.values:
             value = description.values[key]
-            if key == "lagrangian" and value is not None:
-                lines += ["lagrangian:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
+            if key == "equations" and isinstance(value, Mapping):
+                value = with_intermediates(value)
+            if key in ("lagrangian", "equations") and value is not None:
+                lines += [f"{key}:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
             elif not _is_default(key, value):
                 lines.append(f"{key}: {_value(value, functions)}")
     return "\n".join(lines) + "\n"

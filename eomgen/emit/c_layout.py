@@ -32,7 +32,9 @@ def driver_files(program: Program) -> list[str]:
     files: dict[str, None] = {"terms": None} if program.composes_terms else {}
     if program.drivers:
         space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
-        files.update(dict.fromkeys(space if program.balls else ("space_plain",)))
+        if program.given_rates:
+            space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
+        files.update(dict.fromkeys(space if program.balls or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
         if program.by_columns:
             needed = COLUMNS[driver.name]

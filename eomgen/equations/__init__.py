@@ -3,6 +3,7 @@
 from . import embedding, lagrange, recursive
 from .armature import with_armature
 from .equations import Method, TreeEquations
+from .given import GIVEN, take_given
 
 METHODS: dict[str, Method] = {
     "embedding": with_armature(embedding.derive),
@@ -10,4 +11,4 @@ METHODS: dict[str, Method] = {
     "recursive": with_armature(recursive.derive),
 }
 
-__all__ = ["METHODS", "Method", "TreeEquations"]
+__all__ = ["GIVEN", "METHODS", "Method", "TreeEquations", "take_given"]

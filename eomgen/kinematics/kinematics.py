@@ -16,7 +16,7 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from .couplings import couple
-from .loops import Constraints, close_loop, differentiate_constraints, lagrangian_rows
+from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
 from .topology import Topology, find_topology
@@ -109,8 +109,21 @@ class Kinematics:
     @cached_property
     def freedoms(self) -> tuple[str, ...]:
         """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
+        if self.mechanism.given is not None:
+            places = self.coordinate_of
+            return tuple(n if k < 0 else self.names[k] for n, k in zip(self.velocity_names, places, strict=True))
         bases = set(self.names)
         return tuple(n[:-4] if n.endswith("_dot") and n[:-4] in bases else n for n in self.velocity_names)
+
+    @property
+    def given_rates(self) -> bool:
+        """Whether q' = N(q, t) v + b(q, t) of given equations, beyond q' = v."""
+        return self.mechanism.given is not None and self.rates != self.v
+
+    @cached_property
+    def coordinate_of(self) -> tuple[int, ...]:
+        """Per velocity of given equations the coordinate whose rate it is, -1 for none."""
+        return tuple(self.rates.index(v) if v in self.rates else -1 for v in self.v)
 
     def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
         """d/dt along q' = N v, v' = a, t' = 1."""
@@ -133,11 +146,11 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
     t = graph.symbol("t")
     rates = layout.rates(graph, q, v)
-    state = State(q, v, a, t, rates)
+    state = State(q, v, a, t, rates, not layout.given)
     links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
-    rows = lagrangian_rows(mechanism)
+    rows = own_rows(mechanism)
     aligned: list[tuple[str, Expr]] = []
     loop_names: list[str] = []
     loop_kinds: list[str] = []
@@ -153,7 +166,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
-    second = jvp(list(rates), state.along) if layout.balls else a
+    second = jvp(list(rates), state.along) if layout.balls or layout.given else a
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))

@@ -32,6 +32,7 @@ class Constraints:
     time_derivative: tuple[Expr, ...] = ()  #: C_t
     velocity: tuple[Expr, ...] = ()  #: C_q v + C_t
     gamma: tuple[Expr, ...] = ()
+    slopes: tuple[tuple[Expr, ...], ...] = ()  #: dC/dq of the holonomic rows, where given equations have q' = N v + b
     aligned: tuple[Expr, ...] = ()  #: must be positive, else an axis of the joint in ``aligned_joints`` is flipped
     aligned_joints: tuple[str, ...] = ()
     vanishing: tuple[str, ...] = ()
@@ -113,16 +114,19 @@ def differentiate_constraints(
     entries = state.slopes(values, velocity)
     m = len(values)
     entries |= {(m + i, j): e for (i, j), e in jacobian(nonholonomic, list(state.v)).items()}
+    slopes = {} if state.in_order else jacobian(values, list(state.q))
     at_rest = dict.fromkeys(state.v, graph.zero)
     zero = graph.zero
+    still = [(x, rate) for x, rate in zip(state.q, substitute(state.rates, at_rest), strict=True) if not rate.is_zero]
     return Constraints(
         labels=tuple(r.label for r in kept),
         kinds=tuple(r.kind for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
-        time_derivative=(*jvp(values, {state.t: graph.one}), *substitute(nonholonomic, at_rest)),
+        time_derivative=(*jvp(values, {state.t: graph.one, **dict(still)}), *substitute(nonholonomic, at_rest)),
         velocity=(*velocity, *nonholonomic),
         gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
+        slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),
         aligned=tuple(e for _, e in open_conditions),
         aligned_joints=tuple(joint for joint, _ in open_conditions),
         vanishing=tuple(r.label for r in rows if r.expression.is_zero),
@@ -130,12 +134,13 @@ def differentiate_constraints(
     )
 
 
-def lagrangian_rows(mechanism: Mechanism) -> list[Row]:
-    """The constraint equations that accompany a bare Lagrangian."""
-    if mechanism.lagrangian is None:
+def own_rows(mechanism: Mechanism) -> list[Row]:
+    """The constraint equations that accompany a bare Lagrangian or given equations."""
+    bare = mechanism.lagrangian or mechanism.given
+    if bare is None:
         return []
-    rates = {n + "_dot" for n in mechanism.lagrangian.coordinates}
+    rates = {n + "_dot" for n in bare.coordinates} | set(getattr(bare, "velocities", ()))
     return [
         Row(f"constraint_{k + 1}", e, "angle", "position" if symbols_of([e]).isdisjoint(rates) else "velocity")
-        for k, e in enumerate(mechanism.lagrangian.constraints)
+        for k, e in enumerate(bare.constraints)
     ]

@@ -82,7 +82,7 @@ class ConstraintFunctions:
         self.n, self.m, self.k = len(kinematics.v), len(c.labels), len(loop.names)
         self.h = len(c.values)
         space = Space.of(self.n, kinematics.balls)
-        self.neutral = np.zeros(self.n) if space is None else space.neutral()
+        self.neutral = np.zeros(len(kinematics.names)) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
@@ -92,6 +92,10 @@ class ConstraintFunctions:
         (length,) = self._compile([kinematics.length_scale])(self.neutral)
         self.length_scale = float(length)
         self.scales = Scales.of_kinds(kinematics.velocity_kinds, c.kinds, self.length_scale, space)
+        self.place, self._slopes = self.scales, None  # positions move with velocities, unless q' is given
+        if kinematics.given_rates:
+            self.place = Scales.of_kinds(kinematics.kinds, c.kinds[: self.h], self.length_scale)
+            self._slopes = self._compile([*c.values, *_flat(c.slopes)])
 
     def _compile(self, outputs: list[Expr]):  # type: ignore[no-untyped-def]
         evaluator = compile_evaluator(outputs, self._names)
@@ -107,6 +111,17 @@ class ConstraintFunctions:
         """C (h,) of the holonomic rows and C_q (m, n) of all."""
         flat = self._position(q)
         return flat[: self.h], flat[self.h :].reshape(self.m, self.n)
+
+    def place_position(self, q: Array) -> tuple[Array, Array]:
+        """What positions are closed with: :meth:`position`, or C and dC/dq (h, n_q) where q' is given."""
+        if self._slopes is None:
+            return self.position(q)
+        flat = self._slopes(q)
+        return flat[: self.h], flat[self.h :].reshape(self.h, len(q))
+
+    def place_jacobian(self, q: Array) -> Array:
+        """J of the holonomic rows, scaled as positions are."""
+        return self.place.jacobian(self.place_position(q)[1][: self.h])
 
     def loop(self, q: Array) -> tuple[Array, Array]:
         """Coordinates y (k,) of cut joints and y_q (k, n)."""
@@ -155,17 +170,17 @@ class ConstraintFunctions:
         held = [j for j, n in enumerate(k.names) if n in given]
         rough = self._equations(guess)
         if rough is not None:  # come near the guessed coordinates of cut joints first
-            free = np.ones(self.n)
-            free[self.scales.velocities(held)] = 0.0
-            start = close(System(self.position, self.scales, free, rough), start)[0]
+            free = np.ones(len(self.place.q))
+            free[self.place.velocities(held)] = 0.0
+            start = close(System(self.place_position, self.place, free, rough), start)[0]
         for (name, _), value in zip(k.hints, self._hints(start), strict=True):
             if name not in given and name not in guess:
                 start[k.names.index(name)] = value
         equations = self._equations(given)
         return assemble(
-            self.position,
+            self.place_position,
             start,
-            self.scales,
+            self.place,
             held=held,
             equations=equations,
             alignment=self.aligned if k.constraints.aligned else None,
@@ -201,7 +216,8 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
         The chosen independent coordinates are too many, unknown or cannot move the mechanism.
     """
     mechanism = kinematics.mechanism
-    wanted = tuple(independent) or mechanism.independent
+    named = dict(zip(kinematics.velocity_names, kinematics.freedoms, strict=True)) if mechanism.given else {}
+    wanted = tuple(named.get(name, name) for name in tuple(independent) or mechanism.independent)
     _check_names(kinematics, wanted)
     values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
     missing = [n for n, x in values.items() if x is None]
@@ -227,6 +243,9 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
             remedy = f"choose the angular velocity instead, of {', '.join(kinematics.freedoms)}"
+            if kinematics.given_rates:
+                message = f"{name!r} is no velocity's own coordinate: its rate is given as a function of velocities"
+                remedy = f"choose of {', '.join(kinematics.freedoms)}"
             problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:
@@ -256,13 +275,13 @@ def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mob
         trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
         attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
         try:
-            bent = functions.scales.move(functions.neutral, 0.3 + 0.1 * np.arange(float(functions.n)))
+            bent = functions.place.move(functions.neutral, 0.3 + 0.1 * np.arange(float(len(functions.place.q))))
             q = attempt.close({}, dict(zip(functions.kinematics.names, bent, strict=True))).q
         except AssemblyError:
             continue
         return _partition(attempt, [q, *_probe(attempt, q)], wanted)
-    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, functions.n))
-    return _partition(functions, [functions.scales.move(zero, step) for step in generic.astype(float)], wanted)
+    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, len(functions.place.q)))
+    return _partition(functions, [functions.place.move(zero, step) for step in generic.astype(float)], wanted)
 
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
@@ -270,15 +289,15 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     found = []
     random = np.random.default_rng(1)
     if not functions.h:
-        return [functions.scales.move(q, random.uniform(0.2, 0.9, functions.n)) for _ in range(PROBES)]
+        return [functions.place.move(q, random.uniform(0.2, 0.9, len(functions.place.q))) for _ in range(PROBES)]
     for k in range(PROBES):
-        J = functions.scaled_jacobian(q)[: functions.h]
+        J = functions.place_jacobian(q)
         basis = np.linalg.svd(J)[2][rank(J).rank :]
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
         if length == 0.0:
             break
-        start = functions.scales.move(q, (0.1 + 0.1 * k) / length * step)
+        start = functions.place.move(q, (0.1 + 0.1 * k) / length * step)
         try:
             closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
         except AssemblyError:
@@ -293,6 +312,10 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     n = len(names)
     q = configurations[0]
     jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
+    if not np.isfinite(jacobians[0]).all():
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(kinematics.names, q, strict=True))
+        raise AssemblyError(f"the constraints are not finite at the initial configuration {place}; give another one")
+    jacobians = [J for J in jacobians if np.isfinite(J).all()]
     ranks = tuple(rank(J).rank for J in jacobians)
     r = max(ranks)
     n_dof = n - r
@@ -324,7 +347,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
-        n_positions=n - max(rank(J[: functions.h]).rank for J in jacobians),
+        n_positions=len(functions.place.q) - max(rank(functions.place_jacobian(x)).rank for x in configurations),
     )
 
 

@@ -128,7 +128,7 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
     m, c = kinematics.mechanism, kinematics.constraints
     names = ["ground", *(b.name for b in m.bodies)]
     spatial = planar = None
-    if m.lagrangian is None:
+    if not m.bare:
         freedoms = [j.joint.allows for j in m.joints]
         spatial = 6 * len(m.bodies) - sum(6 - f for f in freedoms) - len(kinematics.coupled)
         if _moves_in_a_plane(kinematics) and all(j.joint.role != "loop" for j in m.joints):

@@ -25,7 +25,8 @@ class StateLayout:
     """Names and kinds of the tree's coordinates and velocities.
 
     ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``balls`` says where Euler
-    parameters are, the other velocities being the rates of the other coordinates in the same order.
+    parameters are, the other velocities being the rates of the other coordinates in the same order.  ``given`` is q' of
+    given equations where it is not v itself.
     """
 
     names: tuple[str, ...]
@@ -34,9 +35,12 @@ class StateLayout:
     velocity_kinds: tuple[str, ...]
     parent: tuple[int, ...]
     balls: tuple[Ball, ...] = ()
+    given: tuple[Expr, ...] = ()
 
     def rates(self, graph: Graph, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[Expr, ...]:
         """q' = N(q) v."""
+        if self.given:
+            return self.given
         if not self.balls:
             return tuple(v)
         turning = {k for ball in self.balls for k in range(ball.velocity, ball.velocity + 3)}
@@ -61,6 +65,7 @@ class State:
     a: tuple[Expr, ...]
     t: Expr
     rates: tuple[Expr, ...]
+    in_order: bool = True  #: whether velocities are rates of coordinates, or angular velocities: not so if given
 
     @cached_property
     def along(self) -> dict[Expr, Expr]:
@@ -81,6 +86,11 @@ def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
         names = mechanism.lagrangian.coordinates
         kinds = ("angle",) * len(names)
         return StateLayout(names, kinds, tuple(n + "_dot" for n in names), kinds, tuple(range(-1, len(names) - 1)))
+    if mechanism.given is not None:
+        given, n = mechanism.given, len(mechanism.given.velocities)
+        rates = () if given.rates == tuple(map(mechanism.graph.symbol, given.velocities)) else given.rates
+        angles, turns = ("angle",) * len(given.coordinates), ("angle",) * n
+        return StateLayout(given.coordinates, angles, given.velocities, turns, tuple(range(-1, n - 1)), given=rates)
     names_list: list[str] = []
     kinds_list: list[str] = []
     velocity_names: list[str] = []

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import NonFiniteError, SingularMassMatrixError
 from .partitions import Partition, partition
 from .projection import minimum_norm, project, tangent_projector
-from .scales import Array, Indices, Position, Rate, Scales
+from .scales import Array, GivenRates, Indices, Position, Rate, Scales
 
 SINGULAR = 1e-13  #: smallest pivot of the embedded mass matrix, relative to its largest diagonal entry
 
@@ -98,12 +98,16 @@ def rhs(
     scales: Scales,
     rank: int,
     independent: Sequence[int] | Indices,
+    given: GivenRates | None = None,
 ) -> Array:
     """x' = [q', a] (n_x,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
-    q, v = project(position, rate, q, v, scales)
+    q, v = project(position, rate, q, v, scales, given)
     here = terms(q, v)
     return np.concatenate(
-        [scales.rates(q, v), accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent))]
+        [
+            scales.rates(q, v) if given is None else given.rates(q, v),
+            accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent)),
+        ]
     )
 
 
@@ -127,6 +131,7 @@ def jacobian(
     scales: Scales,
     rank: int,
     independent: Sequence[int] | Indices,
+    given: GivenRates | None = None,
 ) -> Array:
     """Derivative (n_x, n_x) of :func:`rhs` by [q; v], projection included.
 
@@ -138,7 +143,7 @@ def jacobian(
         A state on the manifold, where the result is exact; others are projected first.
     """
     n, n_q, s = len(v), len(q), scales.q
-    q, v = project(position, rate, q, v, scales)
+    q, v = project(position, rate, q, v, scales, given)
     here = terms(q, v)
     system = embed(here.M, here.C_q, scales, rank, independent)
     split = system.split
@@ -149,14 +154,20 @@ def jacobian(
     r = residuals(q, v, a, multipliers)
     dq, dv = np.eye(n_q, n_q + n), np.eye(n, n_q + n, n_q)
     if len(here.gamma):
-        turn = _project_directions(q, position(q), scales)
+        if given is None:
+            turn = _project_directions(q, position(q), scales)
+        else:  # q and the step back N d, d the smallest with C_q d = -dC
+            turn = np.eye(n_q)
+            if h := len(position(q)[0]):
+                turn = turn - given.moved(q, minimum_norm(here.C_q[:h], given.slopes(q, turn), scales))
         dq = np.hstack([turn, np.zeros((n_q, n))])
         dv = np.hstack([-minimum_norm(here.C_q, r.r3_q @ turn, scales), tangent_projector(here.C_q, scales)])
     a_p = split.particular(-(r.r2_q @ dq + r.r2_v @ dv) / scales.c[:, None])
     da = s[:, None] * (a_p - system.solve(s[:, None] * (r.r1_q @ dq + r.r1_v @ dv) + system.M @ a_p))
     if not np.isfinite(da).all():
         raise NonFiniteError("the Jacobian is not finite")
-    return np.vstack([dv if scales.space is None else scales.space.change(q, dq, v[:, None], dv), da])
+    space = given or scales.space
+    return np.vstack([dv if space is None else space.change(q, dq, v[:, None], dv), da])
 
 
 def _project_directions(q: Array, here: tuple[Array, Array], scales: Scales) -> Array:

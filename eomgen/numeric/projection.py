@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from .scales import Array, Position, Rate, Scales
+from .scales import Array, GivenRates, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
 TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
@@ -39,7 +39,9 @@ def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
     return np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
 
 
-def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Array, Array]:
+def correct_position(
+    position: Position, q: Array, scales: Scales, given: GivenRates | None = None
+) -> tuple[Array, Array]:
     """The nearest q with C(q) = 0, and C_q there.
 
     Parameters
@@ -49,6 +51,8 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
     q : (n,) array
         Coordinates near the manifold; not changed.
     scales : Scales
+    given : GivenRates, optional
+        Where q' is given as N(q, t) v + b(q, t).
 
     Returns
     -------
@@ -78,7 +82,7 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
         longest = largest(dz)
         if longest > DAMPING:
             dz *= DAMPING / longest
-        q = scales.move(q, -dz)
+        q = scales.move(q, -dz) if given is None else given.move(q, -scales.q * dz)
         before = size
     if size <= ACCEPTED:
         return q, C_q
@@ -93,7 +97,9 @@ def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
     return v
 
 
-def project(position: Position, rate: Rate, q: Array, v: Array, scales: Scales) -> tuple[Array, Array]:
+def project(
+    position: Position, rate: Rate, q: Array, v: Array, scales: Scales, given: GivenRates | None = None
+) -> tuple[Array, Array]:
     """The nearest state on the manifold, position level first, then velocity level.
 
     Parameters
@@ -116,7 +122,7 @@ def project(position: Position, rate: Rate, q: Array, v: Array, scales: Scales) 
     """
     if not scales.c.size:
         return q, v
-    q, C_q = correct_position(position, q, scales)
+    q, C_q = correct_position(position, q, scales, given)
     return q, correct_velocity(C_q, rate(q), v, scales)
 
 

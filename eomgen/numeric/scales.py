@@ -7,9 +7,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from .given_rates import GivenRates
 from .space import Array, Indices, Space
 
-__all__ = ["Array", "Indices", "Position", "Rate", "Scales", "Space"]
+__all__ = ["Array", "GivenRates", "Indices", "Position", "Rate", "Scales", "Space"]
 
 #: q (n_q,) -> C (h,) of the holonomic rows, C_q (m, n) of all rows, the holonomic ones first
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]

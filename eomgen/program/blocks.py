@@ -15,6 +15,8 @@ from .kernels import KERNELS, Sizes
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
 
+RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
+
 
 def flat(rows: Sequence[Row]) -> Row:
     """Rows one after the other."""
@@ -147,6 +149,7 @@ class BlockMaker:
             "centroidal": lambda: terms.centroidal,
             "constraints": lambda: terms.constraints,
             "constraint_jacobian": lambda: flat(terms.constraint_jacobian),
+            "coordinate_slopes": lambda: flat(terms.coordinate_slopes),
             "velocity_constraints": lambda: terms.velocity_constraints,
             "poses": lambda: terms.poses,
             "loop_coordinates": lambda: terms.loop_coordinates,
@@ -183,6 +186,9 @@ class BlockMaker:
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
+        return (*self._behind(name), *(RATES if self.terms.given_rates else ()))
+
+    def _behind(self, name: str) -> tuple[str, ...]:
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         if self.terms.by_columns:
             return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
@@ -223,6 +229,12 @@ class BlockMaker:
             case "mass_times":  # M a
                 along = {a: a for a in self._symbols(terms.a)}
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))
+            case "rates":  # q'
+                return self._internal(name, "q v", terms.rates)
+            case "moved" | "rates_along" | "slopes_along":  # N dv; dq' along (dq, dv); dC along dq
+                what = terms.constraints if name == "slopes_along" else terms.rates
+                held = dict.fromkeys(self._symbols(terms.q), terms.graph.zero) if name == "moved" else {}
+                return self._internal(name, "q v a multipliers dq dv", jvp(what, self._directions | held))
             case "acceleration_tangent":  # dv' along (dq, dv)
                 accelerations, checks = self._accelerations
                 return self._internal(name, "q v dq dv", jvp(accelerations, self._directions), checks)

@@ -60,7 +60,8 @@ def build_program(
     limits = limits or Limits()
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
-    wanted = [k for k in _select(kernels) if k.name != "kinematics" or terms.has_minimal_form]
+    has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
+    wanted = [k for k in _select(kernels) if has.get(k.name, True)]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}
@@ -109,6 +110,7 @@ def build_program(
         preferred=terms.preferred,
         parent=terms.parent,
         balls=terms.balls,
+        given_rates=terms.given_rates,
         coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
@@ -131,6 +133,7 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_a=len(terms.alignment),
         n_com=3 if terms.centroidal else 0,
         n_e=len(terms.finite_forces),
+        n_g=len(terms.coordinate_slopes),
     )
 
 

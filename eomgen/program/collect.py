@@ -14,6 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
+from .given_multipliers import multiplier_values
 from .program import Limits
 from .soundness import flag_forces
 from .terms import SystemTerms
@@ -57,7 +58,10 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         parent=kinematics.parent,
         centroidal=tuple(_centroidal(kinematics)),
         balls=kinematics.balls,
-        rates=kinematics.rates if kinematics.balls else (),
+        rates=kinematics.rates if kinematics.balls or kinematics.given_rates else (),
+        given_rates=kinematics.given_rates,
+        paired=kinematics.coordinate_of if kinematics.given_rates else (),
+        coordinate_slopes=c.slopes,
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
@@ -102,7 +106,7 @@ def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[E
         graph.symbol("potential_energy()"): equations.potential_energy,
         graph.symbol("total_energy()"): equations.kinetic_energy + equations.potential_energy,
     }
-    return substitute(expressions, energies)
+    return substitute(expressions, energies | multiplier_values(kinematics, equations))
 
 
 def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: TreeEquations) -> dict[str, Any]:
@@ -119,7 +123,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
     for _, j in kinematics.balls:
         for name in velocities[j : j + 3]:
             units |= {name: "rad/s", acceleration_name(name): "rad/s^2"}
-    if m.lagrangian is not None:
+    if m.bare:
         units = {}
     docs: dict[str, str] = {}
     described: list[Parameter | Input | Output] = [*m.parameters, *m.inputs, *m.outputs]
@@ -149,6 +153,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "coordinate_kinds": list(kinematics.kinds),
         "velocity_kinds": list(kinematics.velocity_kinds),
         "balls": [list(ball) for ball in kinematics.balls],
+        **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),

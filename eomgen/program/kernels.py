@@ -24,6 +24,7 @@ class Sizes:
     n_a: int
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
     n_e: int = 0
+    n_g: int = 0  #: holonomic rows where q' is given, else 0
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
+    Kernel("coordinate_slopes", ("q",), lambda s: (s.n_g, s.n_q), "dC/dq of the holonomic rows, where q' is given"),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows, nonholonomic ones last"),
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),

@@ -125,6 +125,7 @@ class Program:
     parent: tuple[int, ...]
     counts: Mapping[str, Operations]
     balls: tuple[tuple[int, int], ...] = ()
+    given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)
 

@@ -52,7 +52,11 @@ class SystemTerms:
     preferred: tuple[int, ...]  #: n_dof indices into v: independent velocities, in the order of v_i
     parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
     balls: tuple[tuple[int, int], ...] = ()  #: where Euler parameters start in q, and their angular velocity in v
-    rates: Row = ()  #: q' where there are balls
+    rates: Row = ()  #: q' where there are balls, or where it is given
+    given_rates: bool = False  #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with
+    #: each other
+    paired: tuple[int, ...] = ()  #: with ``given_rates``: per velocity the coordinate whose rate it is, -1 for none
+    coordinate_slopes: tuple[Row, ...] = ()  #: with ``given_rates``: (m_h, n_q) dC/dq
 
     centroidal: Row = ()  #: (18 + 3n,) of (q, v), all bodies, ground axes; empty for a system without mass: centre of
     #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
@@ -74,6 +78,8 @@ class SystemTerms:
     @property
     def coordinate_of(self) -> tuple[int, ...]:
         """Per velocity the coordinate whose rate it is, -1 for angular velocities of balls."""
+        if self.given_rates:
+            return self.paired
         turning = {k for _, j in self.balls for k in range(j, j + 3)}
         parameters = {k for i, _ in self.balls for k in range(i, i + 4)}
         plain = iter([k for k in range(len(self.q)) if k not in parameters])
@@ -82,7 +88,11 @@ class SystemTerms:
     @property
     def has_minimal_form(self) -> bool:
         """Whether positions follow from those of the independent velocities."""
-        return self.n_c == len(self.constraints) and all(self.coordinate_of[k] >= 0 for k in self.preferred)
+        return (
+            not self.given_rates
+            and self.n_c == len(self.constraints)
+            and all(self.coordinate_of[k] >= 0 for k in self.preferred)
+        )
 
     @property
     def n_k(self) -> int:
@@ -104,7 +114,7 @@ class SystemTerms:
         """
         n, m = self.n_v, self.n_c
         sizes = {
-            "q": (len(self.q), n + len(self.balls)),
+            "q": (len(self.rates) if self.given_rates else n + len(self.balls), len(self.q)),
             "a": (len(self.a), n),
             "multipliers": (len(self.multipliers), m),
             "mass_matrix": (len(self.mass_matrix), 0 if self.by_columns else n),

@@ -56,6 +56,8 @@ class Initial:
         self.layout = layout = kernels.layout
         self.t = t
         self.scales = layout.scales
+        self.place = layout.place_scales  #: of coordinates; those of the velocities unless q' is given
+        self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_g else None
         self._C = kernels.state("constraints", nan=True)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
         self._loop = kernels.motion("loop_coordinates") if layout.n_k else None
@@ -72,7 +74,8 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
                 wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
-                raise UnknownNameError(f"{name!r} follows from the angular velocity; give that instead, of {wanted}")
+                what = "angular velocity; give that" if layout.balls else "velocities; give those"
+                raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
@@ -82,8 +85,8 @@ class Initial:
     # functions of q
 
     def position(self, q: Array) -> tuple[Array, Array]:
-        """C (n_h,) of the holonomic rows, C_q (n_c, n) of all."""
-        return self._C(q, t=self.t), self._C_q(q, t=self.t)
+        """C (n_h,) of the holonomic rows, C_q (n_c, n) of all; dC/dq (n_h, n_q) where q' is given."""
+        return self._C(q, t=self.t), (self._slopes or self._C_q)(q, t=self.t)
 
     def rate(self, q: Array) -> Array:
         """C_t (n_c,)."""
@@ -125,7 +128,7 @@ class Initial:
         return assemble(
             self.position,
             start,
-            self.scales,
+            self.place,
             held=indices,
             equations=self._equations(held),
             alignment=None if self._alignment is None else partial(self._alignment, t=self.t),
@@ -139,7 +142,7 @@ class Initial:
         names = [name for name in held if name in self.layout.q]
         indices = np.array([self.layout.q.index(name) for name in names], dtype=np.intp)
         values = np.array([held[name] for name in names])
-        q = follow(self.position, start, self.scales, indices, values, self._equations(held))
+        q = follow(self.position, start, self.place, indices, values, self._equations(held))
         if not self.aligned(q):
             raise AssemblyError("a joint's axes flipped on the way")
         return q
@@ -203,11 +206,11 @@ class Initial:
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
         """Every position found that holds the given values; `first` comes first."""
         layout = self.layout
-        free = np.ones(layout.n_v)
-        free[self.scales.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
-        system = System(self.position, self.scales, free, self._equations(given))
+        free = np.ones(len(self.place.q))
+        free[self.place.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
+        system = System(self.position, self.place, free, self._equations(given))
         found = [first]
-        for start in starts(first, free, self.scales, tries):
+        for start in starts(first, free, self.place, tries):
             with np.errstate(all="ignore"):
                 q, residual = close(system, start)
             if closed(residual) and self.aligned(q) and all(self._apart(q, other) for other in found):
@@ -215,10 +218,10 @@ class Initial:
         return found
 
     def _apart(self, a: Array, b: Array) -> bool:
-        kinds = self.layout.velocity_kinds
+        kinds = self.layout.coordinate_kinds if self.layout.given_rates else self.layout.velocity_kinds
         gap = [
             abs((x + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x)
-            for x, kind in zip(self.scales.distance(a, b), kinds, strict=True)
+            for x, kind in zip(self.place.distance(a, b), kinds, strict=True)
         ]
         return largest(np.array(gap)) > SAME
 
@@ -309,11 +312,10 @@ class Initial:
         Nonholonomic constraints count for rates only, where `positions` is False.
         """
         layout = self.layout
-        C_q = self._C_q(q, t=self.t)
-        if positions:
-            C_q = C_q[: self.layout.n_h]
-        rows = [*self.scales.jacobian(C_q), *(row for name in given for row in self._row(q, name))]
-        basis: Array = np.empty((0, self.layout.n_v))
+        scales = self.place if positions else self.scales
+        C_q = self.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
+        rows = [*scales.jacobian(C_q), *(row for name in given for row in self._row(q, name))]
+        basis: Array = np.empty((0, len(scales.q)))
         if rows:
             stacked = np.array(rows)
             count = rank(stacked).rank
@@ -338,14 +340,14 @@ class Initial:
 
     def _row(self, q: Array, name: str) -> list[Array]:
         """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
-        layout, unit = self.layout, np.eye(self.layout.n_v)
+        layout = self.layout
         if name in layout.v:
-            return [unit[layout.v.index(name)]]
+            return [np.eye(layout.n_v)[layout.v.index(name)]]
         if name in layout.q:
-            index = layout.q.index(name)
+            index, unit = layout.q.index(name), np.eye(len(self.place.q))
             if any(i < index < i + 4 for i, _ in layout.balls):
                 return []
-            return [unit[k] for k in self.scales.velocities([index])]
+            return [unit[k] for k in self.place.velocities([index])]
         index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)
         return [np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])]
 
@@ -367,6 +369,7 @@ def start_from(module: Module, t: float, p: Any, u: Any) -> Initial:
     """
     for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
         scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
-        if scalar and name in module.layout.q + module.layout.loops:
-            raise UsageError(f"{name}= gives the {what}; the coordinate {name!r} goes in a dict: {{{name!r}: ...}}")
+        if scalar and name in module.layout.q + module.layout.loops + module.layout.v:
+            kind = "velocity" if name in module.layout.v else "coordinate"
+            raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
     return Initial((module if p is None and u is None else module.bind(p, u)).kernels, t)

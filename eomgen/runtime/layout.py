@@ -51,8 +51,16 @@ class Layout:
         self.balls: tuple[tuple[int, int], ...] = tuple((int(i), int(j)) for i, j in data.get("balls", ()))
         self.space = Space.of(self.n_v, self.balls)
         self.freedoms = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
+        coordinate_of: list[int] | None = data.get("coordinate_of")
+        if coordinate_of is not None:  # given equations name their velocities as they like
+            self.freedoms = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
+        #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
+        self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
+        self.n_g: int = data.get("n_g", 0)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.balls for name in self.q[i : i + 4])
+        if coordinate_of is not None:
+            self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_com: int = data.get("n_com", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
@@ -67,6 +75,12 @@ class Layout:
         self.scales = Scales.of_kinds(kinds, data.get("constraint_kinds", ()), self.length, self.space)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
+        #: the scales of coordinates and holonomic rows, where they are not those of the velocities
+        self.place_scales = (
+            Scales.of_kinds(self.coordinate_kinds, data.get("constraint_kinds", ())[: self.n_h], self.length)
+            if self.given_rates
+            else self.scales
+        )
         self.units: dict[str, str] = data.get("units", {})
         loop_kinds: Sequence[str] = data.get("loop_kinds") or [
             "length" if self.units.get(name) == "m" else "angle" for name in self.loops
@@ -89,14 +103,16 @@ class Layout:
         UsageError
         """
         turning = [self.v[i] for i in self.independent if self.freedoms[i] == self.v[i]]
-        if self.n_h < self.n_c:
+        if self.given_rates:
+            reason = "the rates of its coordinates are given as functions of velocities"
+        elif self.n_h < self.n_c:
             reason = "nonholonomic constraints restrict velocities and not positions"
         elif turning:
             reason = f"the independent {', '.join(turning)} are rates of no coordinate (rotation: euler_parameters)"
         else:
             return
         remedy = "work with the full state x = [q; v]: rhs, x0, simulate"
-        if turning:
+        if turning and not self.given_rates:
             remedy += "; or choose other independent coordinates, or rotation: euler_angles"
         raise UsageError(f"model {self.name!r} has no minimal form: {reason}; {remedy}")
 
@@ -186,6 +202,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "centroidal": ("x", ("n_centroidal",)),
     "constraints": ("q", ("n_h",)),
     "constraint_jacobian": ("q", ("n_c", "n_v")),
+    "coordinate_slopes": ("q", ("n_g", "n_q")),
     "velocity_constraints": ("x", ("n_c",)),
     "project": ("x", ("n_x",)),
     "poses": ("q", ("n_bodies", 4, 4)),

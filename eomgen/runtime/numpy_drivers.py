@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import SingularMassMatrixError
 from ..numeric import embedded, projection
 from ..numeric.dependent import kinematics as kinematics_of
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Array, GivenRates, Scales
 from .layout import Layout
 
 #: driver -> blocks it is made from; a tree needs neither position nor rate
@@ -129,12 +129,34 @@ class Drivers:
     def _bound(self, t: float, u: Array, c: Array) -> tuple[Any, Any, Any]:
         return (partial(f, t, u, c) for f in (self.terms, self.position, self.rate))  # type: ignore[return-value]
 
+    def given(self, t: float, u: Array, c: Array) -> GivenRates | None:
+        """The rates of the coordinates where they are given, else None."""
+        if not self.layout.given_rates:
+            return None
+        layout, blocks = self.layout, self.blocks
+        n_q, n, m = layout.n_q, layout.n_v, layout.n_c
+
+        def along(name: str, q: Array, v: Array, dq: Array, dv: Array) -> Array:
+            fixed = np.concatenate([q, v, np.zeros(n + m)])
+            changes = np.concatenate([dq, dv])
+            if changes.ndim == 2:
+                fixed = np.repeat(fixed[:, None], changes.shape[1], axis=1)
+            return np.asarray(blocks[name](t, np.concatenate([fixed, changes]), u, c), dtype=float)
+
+        return GivenRates(
+            lambda q, v: np.asarray(blocks["rates"](t, np.concatenate([q, v]), u, c), dtype=float),
+            lambda q, dv: along("moved", q, np.zeros(n), np.zeros((n_q, *dv.shape[1:])), dv),
+            partial(along, "rates_along"),
+            lambda q, dq: along("slopes_along", q, np.zeros(n), dq, np.zeros((n, *dq.shape[1:]))),
+        )
+
     # drivers
 
     def _rhs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, layout = self.layout.n_q, self.layout
         terms, position, rate = self._bound(t, u, c)
-        return embedded.rhs(terms, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent)
+        given = self.given(t, u, c)
+        return embedded.rhs(terms, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent, given)
 
     def _jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, layout = self.layout.n_q, self.layout
@@ -146,8 +168,9 @@ class Drivers:
             return np.vstack([dv if space is None else space.change(x[:n], dq, x[n:, None], dv), changes])
         terms, position, rate = self._bound(t, u, c)
         residuals = partial(self.residuals, t, u, c)
+        given, scales = self.given(t, u, c), self.scales(c)
         return embedded.jacobian(
-            terms, residuals, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent
+            terms, residuals, position, rate, x[:n], x[n:], scales, layout.rank, layout.independent, given
         )
 
     def _matrix(self, t: float, q: Array, u: Array, c: Array) -> Array:
@@ -186,7 +209,7 @@ class Drivers:
     def _project(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, space = self.layout.n_q, self.layout.space
         _, position, rate = self._bound(t, u, c)
-        q, v = projection.project(position, rate, x[:n], x[n:], self.scales(c))
+        q, v = projection.project(position, rate, x[:n], x[n:], self.scales(c), self.given(t, u, c))
         return np.concatenate([q if space is None else space.normalised(q), v])
 
     def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:

@@ -64,8 +64,8 @@ class Columns:
         return self.module.rhs(self.t, self.x, u=self._varying())
 
     def _parameter_rates(self) -> Array:
-        rows = [k for i, _ in self.module.layout.balls for k in range(i, i + 4)]
-        return self.slopes[rows]
+        layout = self.module.layout
+        return self.slopes[[layout.q.index(name[:-4]) for name in layout.parameter_rates]]
 
     def _outputs(self) -> Array:
         return self.module.outputs(self.t, self.x, u=self._varying())

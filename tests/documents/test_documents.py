@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import eomgen
-from eomgen.describe.fields import BODY, FORCE, FUNCTION, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
+from eomgen.describe.fields import BODY, EQUATIONS, FORCE, FUNCTION, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
 from eomgen.describe.names import FUNCTIONS, QUANTITIES, TOTALS
 from eomgen.describe.scope import ENERGIES
 from eomgen.joints import JOINTS
@@ -99,7 +99,7 @@ def test_links_lead_somewhere() -> None:
 def test_the_model_file_page_knows_every_key() -> None:
     text = (ROOT / "docs" / "model_file.md").read_text(encoding="utf-8")
     words = set(re.findall(r"\w+", text))
-    keys = {*MODEL, *LAGRANGIAN, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
+    keys = {*MODEL, *LAGRANGIAN, *EQUATIONS, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
     keys |= {key for fields in FORCE.values() for key in fields} | {o for j in JOINTS.values() for o in j.options}
     keys |= {*BODY, *SOLID, *TOTALS, *ENERGIES} | SOLID_KEYS
     assert keys - words == set()

@@ -1,0 +1,192 @@
+"""Stage describe, given equations of motion: the equations section -> GivenEquations on the graph."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute, symbols_of
+from .checks import check_keys
+from .description import items
+from .fields import EQUATIONS, MOTION
+from .mechanism import GivenEquations
+from .names import fault_of_name, nearest
+from .reading import Reader
+from .sympy_face import name_of
+
+PATH = "equations"
+LINEAR = "write it as a sum of terms a(q, t)*v and b(q, t), each velocity to the first power"
+
+
+def declare_equations(reader: Reader, given: Any, has_others: bool) -> dict[str, Any] | None:
+    """Check the section and take its names into the namespace; None if there is no section."""
+    faults = reader.faults
+    if given is None:
+        return None
+    if not isinstance(given, Mapping):
+        reader.wrong(PATH, given, "table")
+        return {}
+    if has_others:
+        faults.add(
+            PATH, "the model has bodies, joints or a Lagrangian too", "describe bodies, a Lagrangian or equations"
+        )
+    check_keys(PATH, given, EQUATIONS, faults)
+    values = dict(given)
+    q = values["coordinates"] = _names(reader, values, "coordinates", ())
+    v = values["velocities"] = _names(reader, values, "velocities", [f"{name}_dot" for name in q])
+    values["multipliers"] = _names(reader, values, "multipliers", ())
+    if not q and "coordinates" in given:
+        faults.add(f"{PATH}.coordinates", "there are no coordinates", "name at least one")
+    if not v and q:
+        faults.add(f"{PATH}.velocities", "there are no velocities", "name at least one")
+    for k, name in enumerate(q):  # the rate of one that no velocity is follows from the velocities
+        kind = "coordinate" if f"{name}_dot" in v else "parameter of rotation"
+        reader.names.declare(kind, name, f"{PATH}.coordinates[{k}]")
+    own = {f"{name}_dot" for name in q}
+    for k, name in enumerate(v):
+        if name not in own:
+            reader.names.declare("velocity", name, f"{PATH}.velocities[{k}]")
+    for k, name in enumerate(values["multipliers"]):
+        reader.names.declare("multiplier", name, f"{PATH}.multipliers[{k}]")
+    return values
+
+
+def _names(reader: Reader, values: Mapping[str, Any], key: str, default: Sequence[str]) -> list[str]:
+    given = values.get(key)
+    if given is None:
+        return list(default)
+    listed = items(given)
+    if listed is None:
+        reader.wrong(f"{PATH}.{key}", given, "names")
+        return list(default)
+    return [str(name_of(item)) for item in listed]
+
+
+def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquations | None:
+    """The equations of a checked section."""
+    if values is None:
+        return None
+    graph, faults = reader.graph, reader.faults
+    q, v, named = values.get("coordinates", []), values.get("velocities", []), values.get("multipliers", [])
+    local: dict[str, Expr] = {}
+    parts = values.get("intermediates", {})
+    if not isinstance(parts, Mapping):
+        reader.wrong(f"{PATH}.intermediates", parts, "rates")
+        parts = {}
+    for name, part in parts.items():
+        fault = fault_of_name(name, symbol=True)
+        if fault:
+            faults.add(f"{PATH}.intermediates.{name}", *fault)
+        elif name in reader.names.kinds:
+            message = f"the name is taken by the {reader.names.kinds[name]}"
+            faults.add(f"{PATH}.intermediates.{name}", message, "rename one")
+        local[name] = reader.expression(f"{PATH}.intermediates.{name}", part, MOTION, local)
+    rates = _rates(reader, values.get("rates"), q, v, local)
+    derived = {f"{name}_dot": rate for name, rate in zip(q, rates, strict=True) if f"{name}_dot" not in v}
+    mapping = {graph.symbol(name): rate for name, rate in derived.items()}
+
+    def read(path: str, value: Any) -> Expr:
+        expression = reader.expression(path, value, MOTION, local)
+        return substitute([expression], mapping)[0] if not symbols_of([expression]).isdisjoint(derived) else expression
+
+    def listed(key: str, size: int | None) -> tuple[Expr, ...]:
+        path, given = f"{PATH}.{key}", values.get(key, ())
+        parts = items(given)
+        if parts is None:
+            reader.wrong(path, given, "expressions")
+            return ()
+        if size is not None and len(parts) != size and key in values:
+            faults.add(path, f"{len(parts)} expressions for {size} velocities", "give one for each, in order")
+        return tuple(read(f"{path}[{k}]", part) for k, part in enumerate(parts))
+
+    rows: list[tuple[Expr, ...]] = []
+    given = values.get("mass_matrix", ())
+    lines = items(given)
+    if lines is None or any(items(line) is None for line in lines):
+        reader.wrong(f"{PATH}.mass_matrix", given, "matrix")
+        lines = []
+    for i, line in enumerate(lines):
+        parts = items(line) or []
+        rows.append(tuple(read(f"{PATH}.mass_matrix[{i}][{j}]", part) for j, part in enumerate(parts)))
+    if "mass_matrix" in values and {len(rows), *map(len, rows)} != {len(v)}:
+        if not faults.under(f"{PATH}.mass_matrix"):
+            shape = f"{len(rows)} x {max(map(len, rows), default=0)}"
+            faults.add(f"{PATH}.mass_matrix", f"is {shape} for {len(v)} velocities", f"give {len(v)} rows of {len(v)}")
+    elif not faults.under(f"{PATH}.mass_matrix"):
+        _check_mass_matrix(reader, rows, v)
+    constraints = listed("constraints", None)
+    for k, constraint in enumerate(constraints):
+        _check_linear(reader, f"{PATH}.constraints[{k}]", constraint, v)
+        if constraint.is_zero:
+            faults.add(f"{PATH}.constraints[{k}]", "is 0 whatever the motion", "leave it out")
+    if named and len(named) != len(constraints):
+        message = f"{len(named)} names for {len(constraints)} constraints"
+        faults.add(f"{PATH}.multipliers", message, "name one for each constraint, in order")
+    kinetic, potential = (read(f"{PATH}.{key}", values.get(key, 0)) for key in ("kinetic_energy", "potential_energy"))
+    forcing = listed("forcing", len(v))
+    return GivenEquations(
+        tuple(q), tuple(v), rates, tuple(rows), forcing, constraints, tuple(named), kinetic, potential
+    )
+
+
+def _rates(
+    reader: Reader, given: Any, q: Sequence[str], v: Sequence[str], local: Mapping[str, Expr]
+) -> tuple[Expr, ...]:
+    """q' in terms of the velocities."""
+    path, faults = f"{PATH}.rates", reader.faults
+    if given is None:
+        if len(q) != len(v):
+            faults.add(path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate")
+        return tuple(reader.graph.symbol(name) for name in v[: len(q)])
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, "rates")
+        return (reader.stand_in,) * len(q)
+    named = {name_of(key): value for key, value in given.items()}
+    for name in named:
+        if name not in q:
+            faults.add(f"{path}.{name}", f"no coordinate {name!r}", nearest(str(name), q, "coordinates"))
+    result = []
+    own = {f"{name}_dot" for name in q} - set(v)
+    for name in q:
+        value: Any = named.get(name, f"{name}_dot" if f"{name}_dot" in v else None)
+        if value is None:
+            faults.add(path, f"{name!r} has no rate", f"give the rate of {name!r}")
+        rate = reader.stand_in if value is None else reader.expression(f"{path}.{name}", value, MOTION, local)
+        if not symbols_of([rate]).isdisjoint(own):
+            faults.add(f"{path}.{name}", "depends on rates of coordinates", f"write it in {', '.join(v)}")
+        _check_linear(reader, f"{path}.{name}", rate, v)
+        result.append(rate)
+    return tuple(result)
+
+
+def _check_linear(reader: Reader, path: str, expression: Expr, v: Sequence[str]) -> None:
+    if symbols_of([expression]).isdisjoint(v):
+        return
+    slopes = jacobian([expression], [reader.graph.symbol(name) for name in v])
+    if not symbols_of(list(slopes.values())).isdisjoint(v):
+        reader.faults.add(path, "is not linear in the velocities", LINEAR)
+
+
+def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequence[str]) -> None:
+    """Note a mass matrix that depends on velocities or is not symmetric."""
+    flat = [entry for row in rows for entry in row]
+    used = symbols_of(flat)
+    moving = sorted(used & set(v))
+    if moving:
+        reader.faults.add(f"{PATH}.mass_matrix", f"depends on {', '.join(moving)}", "only q, t and parameters can")
+        return
+    n = len(rows)
+    values = {name: 0.37 + 0.61 * ((k * 0.618033988749895) % 1.0) for k, name in enumerate(sorted(used))}
+    numbers = [float(x) for x in evaluate(flat, values)]
+    size = max((abs(x) for x in numbers if math.isfinite(x)), default=0.0)
+    for i in range(n):
+        for j in range(i):
+            gap = abs(numbers[i * n + j] - numbers[j * n + i])
+            if gap > 1e-9 * size:  # false where an entry is not finite there
+                message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
+                reader.faults.add(f"{PATH}.mass_matrix", message, "give M of M v' = f with f all forces, as it is")
+                return

@@ -1,0 +1,87 @@
+"""Stage describe, SymPy's constraints: which constraints of velocities are derivatives of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..errors import ExpressionError, ModelError, Problem
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import jacobian, jvp
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute, symbols_of
+from .sympy_face import lower_sympy, name_of
+from .sympy_forms import Forms
+
+SMALL = 1e-9  #: part of a row's length that others may leave of it while it still counts as dependent
+TRIES = 5
+
+
+def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:
+    """Which rows of ``forms.motion`` are not derivatives of the configuration constraints nor follow from others.
+
+    Returns
+    -------
+    kept : list of int
+    independent : bool
+        Whether those and the configuration constraints are independent of each other.
+
+    Raises
+    ------
+    ModelError
+        A constraint contradicts the others.
+    """
+    import numpy as np
+
+    graph = Graph()
+    names = {name_of(x): graph.symbol(name_of(x)) for x in (*forms.q, *forms.v)}
+
+    def resolve(name: str) -> Expr:
+        return {**rates, **names}.get(name, graph.symbol(name))
+
+    rates: dict[str, Expr] = {}
+    try:
+        slopes = [lower_sympy(graph, rate, resolve) for rate in forms.rates.values()]
+        for x, rate in zip(forms.q, slopes, strict=True):
+            rates[f"{name_of(x)}_dot"] = rate
+        configuration = [lower_sympy(graph, row, resolve) for row in forms.configuration]
+        motion = [lower_sympy(graph, row, resolve) for row in forms.motion]
+    except ExpressionError:  # the check of the model tells what is wrong
+        return list(range(len(forms.motion))), False
+    along = {names[name_of(x)]: rate for x, rate in zip(forms.q, slopes, strict=True)}
+    rows = [*jvp(configuration, along | {graph.symbol("t"): graph.one}), *motion]
+    v = [names[name_of(x)] for x in forms.v]
+    entries = jacobian(rows, v)
+    constant = substitute(rows, dict.fromkeys(v, graph.zero))
+    used = symbols_of([*constant, *entries.values()])
+    random = np.random.default_rng(0)
+    for _ in range(TRIES):  # a place may lie outside the domain of a root
+        values = {name: float(random.uniform(0.3, 1.2)) for name in sorted(used)}
+        matrix = np.zeros((len(rows), len(v)))
+        for place, value in zip(entries, evaluate(list(entries.values()), values), strict=True):
+            matrix[place] = value
+        right = np.array(evaluate(constant, values), dtype=float)
+        if np.isfinite(matrix).all() and np.isfinite(right).all():
+            break
+    else:
+        return list(range(len(motion))), False
+    basis = np.empty((0, len(v)))
+    fresh: list[bool] = []
+    for row in matrix:
+        length = np.linalg.norm(row)
+        left = row - basis.T @ (basis @ row)
+        left -= basis.T @ (basis @ left)
+        size = np.linalg.norm(left)
+        fresh.append(bool(size > SMALL * length))
+        if fresh[-1]:
+            basis = np.vstack([basis, left / size])
+    h = len(configuration)
+    own = [k for k, new in enumerate(fresh) if new]
+    for k in [k for k, new in enumerate(fresh) if not new]:
+        factors = np.linalg.lstsq(matrix[own].T, matrix[k], rcond=None)[0]
+        if abs(right[k] - factors @ right[own]) > SMALL * max(
+            1.0, abs(right[k]), float(np.abs(factors).max(initial=0))
+        ):
+            which = f"configuration constraint {k + 1}" if k < h else f"velocity constraint {k - h + 1}"
+            message = f"{which} contradicts the others: its velocities are theirs, its remainder is not"
+            raise ModelError([Problem("equations.constraints", message, f"check the {which}")])
+    return [k for k in range(len(motion)) if fresh[h + k]], all(fresh[:h])

@@ -1,0 +1,254 @@
+"""Stage describe, equations that SymPy's mechanics formed: a method object -> Description with given equations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ModelError, Problem, UsageError
+from .description import Description
+from .names import nearest
+from .scope import RATES
+from .sympy_face import function_name, is_sympy, name_of
+from .sympy_forms import Forms, read_forms
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def from_sympy(
+    method: Any,
+    name: str = "system",
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | Sequence[Any] = (),
+    outputs: Mapping[str, Any] | None = None,
+    initial: Mapping[Any, Any] | None = None,
+    specified: Mapping[Any, Any] | None = None,
+    potential_energy: Any = None,
+) -> Model:
+    """A model from equations of motion that SymPy's mechanics has formed.
+
+    Coordinates, speeds, constants and inputs bear SymPy's names.  Configuration constraints and constraints of
+    velocities are kept as constraints, so that the module projects states, assembles initial values and takes any
+    independent coordinates; constraints of velocities that are derivatives of others are left out.  The multipliers of
+    the constraints become outputs ``lam1``, ``lam2``, ... in the order of the model's constraints, which is SymPy's:
+    M v' + C_q^T lam = f.  Noncontributing forces of auxiliary speeds become outputs too.
+
+    Parameters
+    ----------
+    method : KanesMethod, LagrangesMethod, System or JointsMethod
+        Of ``sympy.physics.mechanics``, with its equations formed.
+    name : str, optional
+        Identifier; the generated module bears it.
+    parameters : mapping, optional
+        Values of constants, by symbol or name.  Every constant becomes a parameter, those left out without a value.
+    inputs : mapping or sequence, optional
+        Symbols that are given over time, with the value that holds while none is given.  Functions of time that are
+        neither coordinates nor speeds are inputs anyway, their derivatives further ones (``f_dot`` of ``f``).
+    outputs : mapping of str to sympy.Expr, optional
+        Further named results, in anything the equations know and accelerations ``u'``.
+    initial : mapping, optional
+        Initial values of coordinates and speeds, by symbol or name.
+    specified : mapping, optional
+        Functions of time to replace by expressions in t: ``{f(t): a*sin(w*t)}``; derivatives follow.
+    potential_energy : sympy.Expr, optional
+        Potential energy (J), where SymPy's bodies do not have it.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    UsageError
+        Another object, or its equations are not formed yet.
+    ModelError
+        Names that clash or are not those of anything in the equations.
+    """
+    from .model import Model
+
+    return Model.from_description(
+        describe_method(method, name, parameters, inputs, outputs, initial, specified, potential_energy)
+    )
+
+
+def describe_method(
+    method: Any,
+    name: str = "system",
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | Sequence[Any] = (),
+    outputs: Mapping[str, Any] | None = None,
+    initial: Mapping[Any, Any] | None = None,
+    specified: Mapping[Any, Any] | None = None,
+    potential_energy: Any = None,
+) -> Description:
+    """The description behind :func:`from_sympy`, which see."""
+    forms = read_forms(method)
+    if potential_energy is not None:
+        forms.potential = potential_energy
+    extra = dict(outputs or {})
+    if specified:
+        _specify(forms, extra, specified)
+    known = _Known(forms)
+    given_parameters = {name_of(key): value for key, value in (parameters or {}).items()}
+    listed = dict(inputs) if isinstance(inputs, Mapping) else dict.fromkeys(inputs, 0.0)
+    given_inputs = {name_of(key): value for key, value in listed.items()}
+    contents = [*_contents(forms), *extra.values()]
+    constants, functions = known.sort(contents, given_inputs)
+    problems = known.problems
+    for key in given_parameters:
+        if key not in constants:
+            near = nearest(str(key), constants, "constants")
+            problems.append(Problem(f"parameters.{key}", f"no constant {key!r} in the equations", near))
+    if problems:
+        raise ModelError(problems)
+
+    taken = {*constants, *functions, *known.names}
+    configuration, motion, independent = _independent_rows(forms, constants, functions)
+    rows = [*configuration, *motion]
+    equations: dict[str, Any] = {
+        "coordinates": [name_of(x) for x in forms.q],
+        "velocities": [name_of(x) for x in forms.v],
+        "rates": {name_of(x): rate for x, rate in zip(forms.q, forms.rates.values(), strict=True)},
+        "mass_matrix": forms.mass_matrix,
+        "forcing": forms.forcing,
+        "kinetic_energy": forms.kinetic,
+        "potential_energy": forms.potential,
+    }
+    description = Description(values={"name": name, "equations": equations})
+    if rows:
+        equations["constraints"] = rows
+    if rows and independent:
+        names = forms.multipliers or [f"lam{k + 1}" for k in range(len(rows))]
+        if len(names) == len(rows) and taken.isdisjoint(names):
+            equations["multipliers"] = names
+            for multiplier in names:
+                if multiplier not in extra:
+                    extra[multiplier] = multiplier
+    for constant in constants:
+        value = given_parameters.get(constant)
+        description.add("parameters", constant, {} if value is None else {"value": value})
+    for function in functions:
+        description.add("inputs", function, {"value": given_inputs.get(function, 0.0)})
+    for output, expression in {**_noncontributing(forms, taken), **extra}.items():
+        description.add("outputs", output, {"expression": expression})
+    if initial:
+        description.values["initial"] = {name_of(key): value for key, value in initial.items()}
+    return description
+
+
+def _contents(forms: Forms) -> list[Any]:
+    """Everything the equations are made of."""
+    flat = [x for row in forms.mass_matrix for x in row]
+    rest = [forms.kinetic, forms.potential]
+    return [*forms.rates.values(), *flat, *forms.forcing, *forms.configuration, *forms.motion, *rest]
+
+
+class _Known:
+    """Coordinates and speeds by name, and what else stands in expressions."""
+
+    def __init__(self, forms: Forms) -> None:
+        self.problems: list[Problem] = []
+        self.names: dict[str, Any] = {}
+        for k, x in enumerate([*forms.q, *forms.v]):
+            name = name_of(x)
+            if not isinstance(name, str):
+                self.problems.append(Problem("equations", f"{x} is not a function of the time t", "use dynamicsymbols"))
+            elif name in self.names:
+                self.problems.append(Problem("equations", f"the name {name!r} is given twice", "rename one"))
+            self.names[str(name) if isinstance(name, str) else f"?{k}"] = x
+        motion = [f"{name_of(x)}{suffix}" for x in forms.q for suffix in RATES]
+        self.motion = {*motion, *(f"{name_of(x)}_dot" for x in forms.v), *self.names}
+
+    def sort(self, expressions: Iterable[Any], inputs: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+        """Names of the constants, and of what is given over time."""
+        import sympy
+        from sympy.core.function import AppliedUndef
+
+        symbols: dict[str, set[Any]] = {}
+        functions: set[str] = set()
+        for expression in expressions:
+            if not is_sympy(expression):
+                continue
+            walk = sympy.preorder_traversal(expression)
+            for part in walk:
+                if isinstance(part, sympy.Symbol):
+                    symbols.setdefault(part.name, set()).add(part)
+                elif isinstance(part, AppliedUndef | sympy.Derivative) and (found := function_name(part)) is not None:
+                    walk.skip()  # f' is not f
+                    if found not in self.motion:
+                        functions.add(found)
+        symbols.pop("t", None)
+        for symbol, different in symbols.items():
+            if symbol in self.names or symbol in functions:
+                what = "a coordinate or speed" if symbol in self.names else "a function of time"
+                message = f"{symbol!r} is a constant and {what} too"
+                self.problems.append(Problem(f"equations.{symbol}", message, "rename one"))
+            elif len(different) > 1:
+                message = f"{len(different)} different symbols are called {symbol!r}"
+                remedy = "make one symbol and use it everywhere (assumptions such as positive=True make another)"
+                self.problems.append(Problem(f"equations.{symbol}", message, remedy))
+        driven = [name for name in symbols if name in inputs]
+        for name in inputs:
+            if name not in functions and name not in symbols:
+                near = nearest(str(name), [*functions, *symbols], "known")
+                self.problems.append(Problem(f"inputs.{name}", f"no {name!r} in the equations", near))
+        constants = [name for name in symbols if name not in self.names and name not in driven]
+        return sorted(set(constants) - functions), sorted({*functions, *driven})
+
+
+def _specify(forms: Forms, outputs: dict[str, Any], specified: Mapping[Any, Any]) -> None:
+    """Replace functions of time by expressions, their derivatives by those of the expressions."""
+    import sympy
+
+    for key in specified:
+        if not is_sympy(key) or function_name(key) is None:
+            raise UsageError(f"specified takes functions of time f(t), not {key!r}")
+
+    def put(expression: Any) -> Any:
+        if not is_sympy(expression) or not expression.has(*specified):
+            return expression
+        given = {d: d.subs(specified).doit() for d in expression.atoms(sympy.Derivative) if d.has(*specified)}
+        return expression.xreplace(given).xreplace(dict(specified))
+
+    forms.rates = {dq: put(rate) for dq, rate in forms.rates.items()}
+    forms.mass_matrix = [[put(x) for x in row] for row in forms.mass_matrix]
+    forms.forcing, forms.configuration, forms.motion, forms.noncontributing = (
+        [put(x) for x in part] for part in (forms.forcing, forms.configuration, forms.motion, forms.noncontributing)
+    )
+    forms.kinetic, forms.potential = put(forms.kinetic), put(forms.potential)
+    outputs.update({name: put(expression) for name, expression in outputs.items()})
+
+
+def _independent_rows(
+    forms: Forms, constants: Sequence[str], functions: Sequence[str]
+) -> tuple[list[Any], list[Any], bool]:
+    """Constraints without those of velocities that follow from the others, and whether the rest are independent.
+
+    Judged on the graph at a generic place, where rows depend on each other only if they do everywhere.
+    """
+    from .constraint_rank import judge_rows
+
+    if not forms.motion and not forms.configuration:
+        return [], [], True
+    kept, independent = judge_rows(forms, constants, functions)
+    return forms.configuration, [forms.motion[k] for k in kept], independent
+
+
+def _noncontributing(forms: Forms, taken: set[str]) -> dict[str, Any]:
+    """Forces that only the equations of auxiliary speeds know, solved from them."""
+    if not forms.noncontributing:
+        return {}
+    import sympy
+    from sympy.core.function import AppliedUndef
+
+    unknown: dict[str, Any] = {}
+    for equation in forms.noncontributing:
+        for part in equation.atoms(sympy.Symbol, AppliedUndef):
+            name = name_of(part)
+            if isinstance(name, str) and name not in taken and name != "t":
+                unknown.setdefault(name, part)
+    if len(unknown) != len(forms.noncontributing):
+        return {}
+    matrix, right = sympy.linear_eq_to_matrix(forms.noncontributing, list(unknown.values()))
+    return dict(zip(unknown, matrix.LUsolve(right), strict=True))

@@ -1,0 +1,130 @@
+"""Given equations with q' = N(q, t) v + b(q, t): every target, small and large, with and without constraints."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.describe import Description
+from eomgen.pipeline import generate
+
+TARGETS = ["numpy", pytest.param("cython", marks=pytest.mark.slow)]
+
+
+def given(name: str, **equations: Any) -> eg.Model:
+    model = eg.Model.from_description(Description(values={"name": name, "equations": equations}))
+    model.parameter("w", 1.3)
+    return model
+
+
+def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
+    return np.array([(call(x + h * e) - call(x - h * e)) / (2 * h) for e in np.eye(len(x))]).T
+
+
+def tied() -> eg.Model:
+    """Three coordinates, two speeds that move one each and one that moves two; a surface and a blade, both moving."""
+    return given(
+        "tied",
+        coordinates=["a", "b", "c"],
+        velocities=["r", "v", "s", "z"],
+        rates={"a": "w*cos(c)*r + 0.1*sin(t)", "b": "v + r*sin(a)", "c": "s + 0.2*b"},
+        mass_matrix=[[2, 0.1, 0, 0], [0.1, "1 + b**2", 0, 0], [0, 0, "w", 0.3], [0, 0, 0.3, 1]],
+        forcing=["-4*a - r*v", "-b + s*z", "sin(t) - c", "-0.1*z + r*s"],
+        constraints=["a**2 + b - 0.3*c - 0.1*t - 0.5", "z - 0.2*s*cos(a) - 0.1*t"],
+        kinetic_energy="r**2",
+    )
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_constraints_with_given_rates(target: str) -> None:
+    module = tied().compile(target=target)
+    assert (module.n_q, module.n_v, module.n_dof) == (3, 4, 2)
+    t = 0.4
+    x = module.x0(a=0.3, c=0.2, r=0.5, t=t)
+    a, b, c, u, v, s, z = x
+    assert (a, c, u) == pytest.approx((0.3, 0.2, 0.5), abs=1e-15)
+    rates = [1.3 * np.cos(c) * u + 0.1 * np.sin(t), v + u * np.sin(a), s + 0.2 * b]
+    x_dot = module.rhs(t, x)
+    assert x_dot[:3] == pytest.approx(rates, rel=1e-13)
+    assert a**2 + b - 0.3 * c - 0.1 * t == pytest.approx(0.5)
+    assert 2 * a * rates[0] + rates[1] - 0.3 * rates[2] == pytest.approx(0.1)
+    assert z == pytest.approx(0.2 * s * np.cos(a) + 0.1 * t)
+    # an augmented solve of its own: [M C_q^T; C_q 0] [a; l] = [f; -gamma], gamma by differences along the motion
+    C_q = np.array([[2 * a * 1.3 * np.cos(c) + np.sin(a), 1.0, -0.3, 0.0], [0.0, 0.0, -0.2 * np.cos(a), 1.0]])
+    assert module.constraint_jacobian(x[:3]) == pytest.approx(C_q, rel=1e-12)
+
+    def level(y: np.ndarray, time: float) -> np.ndarray:
+        return np.asarray(module.velocity_constraints(y, t=time))
+
+    h, flow = 1e-5, np.concatenate([x_dot[:3], np.zeros(4)])
+    gamma = (level(x + h * flow, t + h) - level(x - h * flow, t - h)) / (2 * h)
+    M = np.array([[2, 0.1, 0, 0], [0.1, 1 + b**2, 0, 0], [0, 0, 1.3, 0.3], [0, 0, 0.3, 1]])
+    f = np.array([-4 * a - u * v, -b + s * z, np.sin(t) - c, -0.1 * z + u * s])
+    solved = np.linalg.solve(np.block([[M, C_q.T], [C_q, np.zeros((2, 2))]]), np.concatenate([f, -gamma]))
+    assert x_dot[3:] == pytest.approx(solved[:4], abs=1e-9)
+    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
+    run = module.simulate((0.0, 0.5), initial={"a": 0.3, "c": 0.2, "r": 0.5})
+    assert run["a_dot"] == pytest.approx(1.3 * np.cos(run["c"]) * run["r"] + 0.1 * np.sin(run.t))
+    assert run.residuals.raw_position < 1e-8
+    assert run["a"] ** 2 + run["b"] - 0.3 * run["c"] - 0.1 * run.t == pytest.approx(0.5, abs=1e-12)
+    off = module.project(x + 0.01, t=t)
+    assert off[0] ** 2 + off[1] - 0.3 * off[2] - 0.1 * t == pytest.approx(0.5, abs=1e-12)
+    with pytest.raises(eg.UsageError, match="the rates of its coordinates are given as functions of velocities"):
+        _ = module.minimal.names
+    with pytest.raises(eg.ModelError, match="'a' is no velocity's own coordinate.*choose of r, v, s, z"):
+        tied().derive(independent=["a", "v"])
+    with pytest.raises(eg.UsageError, match="'a_dot' follows from the velocities; give those instead, of r, v, s, z"):
+        module.x0(a_dot=1.0)
+    with pytest.raises(eg.UsageError, match="p= gives the parameters; the velocity 'p'"):
+        given("named", coordinates=["a"], velocities=["p"], mass_matrix=[[1]], forcing=[0]).compile(target="numpy").x0(
+            p=1.0
+        )
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("n", [2, 30])
+def test_no_constraints_small_and_large(n: int, target: str) -> None:
+    q, v = [f"q{k}" for k in range(n)], [f"u{k}" for k in range(n)]
+    rates = {q[k]: f"(1.5 + sin(q{k - 1}))*u{k} + w*cos(t)" if k else "u0" for k in range(n)}
+    mass = [[3.0 if i == j else "0.3*cos(q0)" if abs(i - j) == 1 else 0 for j in range(n)] for i in range(n)]
+    forcing = [f"-q{k} - 0.1*u{k}*u{(k + 1) % n}" for k in range(n)]
+    model = given(f"free{n}", coordinates=q, velocities=v, rates=rates, mass_matrix=mass, forcing=forcing)
+    module = model.compile(target=target)
+    x = np.random.default_rng(n).uniform(-1.0, 1.0, 2 * n)
+    p, u, t = x[:n], x[n:], 0.7
+    expected = np.concatenate([[u[0]], (1.5 + np.sin(p[:-1])) * u[1:] + 1.3 * np.cos(t)])
+    M = 3.0 * np.eye(n) + 0.3 * np.cos(p[0]) * (np.eye(n, k=1) + np.eye(n, k=-1))
+    f = -p - 0.1 * u * np.roll(u, -1)
+    assert module.rhs(t, x) == pytest.approx(np.concatenate([expected, np.linalg.solve(M, f)]), rel=1e-12)
+    assert module.jacobian(t, x) == pytest.approx(slopes(lambda y: module.rhs(t, y), x), abs=1e-8)
+    batch = np.column_stack([x, 0.5 * x])
+    assert module.rhs(t, batch)[:, 1] == pytest.approx(module.rhs(t, 0.5 * x))
+
+
+@pytest.mark.slow
+def test_strict_c(tmp_path: Path) -> None:
+    folder = generate(tied(), tmp_path, target="c")
+    sources = [str(path) for path in folder.rglob("*.c")]
+    flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-fsyntax-only"]
+    done = subprocess.run(["gcc", *flags, *sources], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_an_exported_package_stands_alone(tmp_path: Path) -> None:
+    generate(tied(), tmp_path, target="numpy")
+    call = (
+        "import sys, tied; x = tied.x0(a=0.3, c=0.2, r=0.5); r = tied.rhs(0.0, x); J = tied.jacobian(0.0, x); "
+        "assert 'sympy' not in sys.modules and 'eomgen' not in sys.modules; print(*r)"
+    )
+    done = subprocess.run([sys.executable, "-c", call], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    module = tied().compile(target="numpy")
+    x = module.x0(a=0.3, c=0.2, r=0.5)
+    assert [float(word) for word in done.stdout.split()] == pytest.approx(module.rhs(0.0, x), rel=1e-13)

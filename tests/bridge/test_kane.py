@@ -1,0 +1,182 @@
+"""SymPy's own numbers through from_sympy: Kane's method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sympy_systems import bicycle, bicycle_numbers, double_pendulum, pulled_pendulum, rolling_disc
+
+import eomgen as eg
+
+
+def slopes(call: Any, x: np.ndarray, h: float = 1e-6) -> np.ndarray:
+    """Derivative of a function of the state by central differences."""
+    columns = [(call(x + h * e) - call(x - h * e)) / (2 * h) for e in np.eye(len(x))]
+    return np.array(columns).T
+
+
+#: SymPy 1.14, test_kane5.py: q, independent u -> q' and u' at g = 9.81, r = 0.26, m = 3.43
+DISC = [
+    (
+        (0.3, 0.1, 1.97, -0.35, 2.27, -0.2, 1.3, 0.15),
+        (0.126603940595934, 0.215942571601660, 1.28736069604936, 0.319764288376543, 0.0989146857254898,
+         -0.925848952664489, -0.0181350656532944, 2.91695398184589, -0.00992793421754526, 0.0412861634829171),
+    ),
+    (
+        (3.97, -0.28, 8.2, -0.35, 2.27, -0.25, -2.2, 0.62),
+        (0.0259159090798597, 0.668041660387416, -2.19283799213811, 0.385441810852219, 0.420109283790573,
+         1.45030568179066, -0.0110924422400793, -8.35617840186040, -0.154098542632173, -0.146102664410010),
+    ),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def disc() -> eg.Model:
+    return eg.from_sympy(
+        rolling_disc(), "disc", parameters={"g": 9.81, "r": 0.26, "m": 3.43}, initial={"q2": 0.1, "q3": 1.97}
+    )
+
+
+@pytest.mark.parametrize("target", ["numpy", pytest.param("cython", marks=pytest.mark.slow)])
+def test_rolling_disc(disc: eg.Model, target: str) -> None:
+    module = disc.compile(target=target)
+    assert module.q_names == ("q1", "q2", "q3", "q4", "q5")
+    assert module.v_names == ("u1", "u2", "u3", "u4", "u5")
+    assert module.n_dof == 3
+    for given, expected in DISC:
+        names = ("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3")
+        x = module.x0(**dict(zip(names, given, strict=True)))
+        assert module.rhs(0.0, x) == pytest.approx(expected, abs=1e-10)
+        assert np.abs(module.jacobian(0.0, x) - slopes(lambda z: module.rhs(0.0, z), x)).max() < 1e-7
+        assert module.mass_matrix(x[:5]).shape == (5, 5)
+        assert module.bias(0.0, x).shape == (5,)
+        assert np.abs(module.velocity_constraints(x)).max() < 1e-13
+        off = module.project(x + 0.01)
+        assert np.abs(module.velocity_constraints(off)).max() < 1e-13
+        assert off[:5] == pytest.approx(x[:5] + 0.01)
+    run = module.simulate((0.0, 1.0), initial={"q2": 0.1, "u2": -6.0, "u1": 0.2, "q3": 0.5}, rtol=1e-10, atol=1e-12)
+    height = 0.26 * np.cos(run["q2"])
+    energy = run["T"] + 3.43 * 9.81 * height  # SymPy's bodies know no potential energy of their loads
+    assert np.abs(energy - energy[0]).max() < 1e-8 * energy[0]
+    spin = np.cos(run["q3"]) * run["u3"] - np.sin(run["q3"]) * run["u1"]  # of the turned axes about the plane's normal
+    assert run["q1_dot"] == pytest.approx(spin / np.cos(run["q2"]))
+
+
+def test_a_solver_that_fails_at_zero_is_told(disc: eg.Model) -> None:
+    model = eg.from_sympy(rolling_disc(), "disc", parameters={"g": 9.81, "r": 0.26, "m": 3.43})
+    with pytest.raises(eg.AssemblyError, match="not finite at the initial configuration q1 = 0, q2 = 0, q3 = 0"):
+        model.derive()
+
+
+def test_rolling_disc_is_regular_where_the_kinematics_are() -> None:
+    model = eg.from_sympy(rolling_disc("CRAMER"), "disc", parameters={"g": 9.81, "r": 0.26, "m": 3.43})
+    module = model.compile(target="numpy")
+    assert np.abs(module.rhs(0.0, np.zeros(10))).max() == 0.0
+    x = module.x0(**dict(zip(("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3"), DISC[0][0], strict=True)))
+    assert module.rhs(0.0, x) == pytest.approx(DISC[0][1], abs=1e-10)
+
+
+@pytest.fixture(scope="module")
+def whipple() -> eg.Model:
+    return eg.from_sympy(bicycle(), "bicycle", parameters=bicycle_numbers())
+
+
+#: eigenvalues of the benchmark (Meijaard and others 2007, table 2): speed -> capsize, castering, weave (re, im)
+EIGENVALUES = {
+    0.0: [-5.530943717653935, -3.131643247906567, 3.131643247906567, 5.530943717653935],
+    1.0: [-7.110080146374418, -3.134231250665537, 3.526961709900699 + 0.807740275199301j],
+    3.0: [-2.633661372536675, -10.351014672459186, 1.706756056639746 + 2.315824473843249j],
+    5.0: [-0.322866429004087, -14.078389692798217, -0.775341882195846 + 4.464867713788228j],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_bicycle(whipple: eg.Model, target: str) -> None:
+    equations = whipple.derive()
+    assert equations.operations["mass_matrix and bias"].total < 2500  # SymPy: 1.6 million before common subexpressions
+    module = equations.compile(target=target)
+    assert module.n_dof == 3
+    chosen = [module.x_names.index(name) for name in ("q2", "q5", "u2", "u5")]
+    for speed, expected in EIGENVALUES.items():
+        x = module.x0(q1=0.0, q2=0.0, q5=0.0, u2=0.0, u5=0.0, u3=speed / 0.3)
+        jacobian = module.jacobian(0.0, x)
+        found = np.linalg.eigvals(jacobian)
+        for value in expected:
+            assert np.abs(found - value).min() < 1e-7
+        # SymPy, test_kane3.py: the same in independent coordinates, the others following the constraints
+        v = speed
+        wanted = [
+            [0, 0, 1, 0],
+            [0, 0, 0, 1],
+            [9.48977444677355, -0.891197738059089 * v**2 - 0.571523173729245, -0.105522449805691 * v,
+             -0.330515398992311 * v],
+            [11.7194768719633, -1.97171508499972 * v**2 + 30.9087533932407, 3.67680523332152 * v,
+             -3.08486552743311 * v],
+        ]  # fmt: skip
+        tangent = slopes(module.project, x, 1e-5)
+        free = [module.x_names.index(name) for name in ("q1", "q2", "q5", "u2", "u3", "u5")]
+        basis = np.linalg.svd(tangent)[0][:, :6]
+        basis = basis @ np.linalg.inv(basis[free])
+        found = (jacobian @ basis)[np.ix_(chosen, [free.index(k) for k in chosen])]
+        assert np.abs(found - wanted).max() < 1e-7
+
+
+@pytest.mark.slow
+def test_bicycle_far_from_upright(whipple: eg.Model, tmp_path: Path) -> None:
+    whipple.save(tmp_path / "bicycle.yaml")  # with intermediates: entries are longer than a file may have them
+    again = eg.load(tmp_path / "bicycle.yaml")
+    assert len(again.description.values["equations"]["intermediates"]) > 100
+    module = whipple.compile(target="numpy")
+    x = module.x0(q1=0.2, q2=0.1, q5=0.2, u2=0.3, u5=-0.2, u3=5.0)
+    assert abs(module.constraints(x[:4])[0]) < 1e-12
+    exact = module.jacobian(0.0, x)
+    assert np.abs(exact - slopes(lambda z: module.rhs(0.0, z), x)).max() < 1e-7
+    assert again.compile(target="numpy").rhs(0.0, x) == pytest.approx(module.rhs(0.0, x), rel=1e-10, abs=1e-10)
+    numbers = dict(zip(module.x_names, x, strict=True))
+    assert numbers["q4"] != 0.0
+    off = module.project(x + 1e-3 * np.arange(1.0, len(x) + 1.0))
+    assert abs(module.constraints(off[:4])[0]) < 1e-12
+    assert np.abs(module.velocity_constraints(off)).max() < 1e-11
+
+
+def reference() -> eg.Model:
+    """The double pendulum in our own bodies and joints, in relative angles."""
+    m = eg.Model("pendulums", gravity=(0, -9.81, 0))
+    one = m.body("one", mass=0.7, com=(0, -0.4, 0))
+    two = m.body("two", mass=1.1, com=(0, -0.9, 0))
+    m.revolute("A", m.ground, one, coordinate="a")
+    m.revolute("B", one.at(0, -0.4, 0), two, coordinate="b")
+    return m
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_double_pendulum(swap: bool) -> None:
+    values = {"l1": 0.4, "l2": 0.9, "m1": 0.7, "m2": 1.1, "g": 9.81}
+    module = eg.from_sympy(double_pendulum(swap), "kane", parameters=values).compile(target="numpy")
+    own = reference().compile(target="numpy")
+    assert module.v_names == (("w2", "w1") if swap else ("w1", "w2"))  # in the order of q1 and q2
+    for q1, q2, w1, w2 in np.random.default_rng(3).uniform(-2.0, 2.0, (5, 4)):
+        ours = own.rhs(0.0, [q1, q2 - q1, w1, w2 - w1])
+        assert module.rhs(0.0, [q1, q2, w1, w2]) == pytest.approx(
+            [w1, w2, ours[2], ours[2] + ours[3]], rel=1e-11, abs=1e-11
+        )
+        kinetic, _ = module.energy([q1, q2, w1, w2])
+        assert kinetic == pytest.approx(own.energy([q1, q2 - q1, w1, w2 - w1])[0])
+    assert module.minimal.rhs(0.0, [0.1, 0.2, 0.3, 0.4]) == pytest.approx(module.rhs(0.0, [0.1, 0.2, 0.3, 0.4]))
+
+
+def test_auxiliary_speeds_and_inputs() -> None:
+    values = {"m": 2.0, "l": 0.8, "g": 9.81}
+    model = eg.from_sympy(pulled_pendulum(), "pulled", parameters=values, initial={"theta": 0.4})
+    module = model.compile(target="numpy")
+    assert module.u_names == ("torque",)
+    assert module.y_names == ("pull",)
+    run = module.simulate((0.0, 2.0), initial={"theta": 0.4, "omega": 1.0}, inputs={"torque": lambda t, x: np.sin(t)})
+    theta, omega = run["theta"], run["omega"]
+    assert run["pull"] == pytest.approx(2.0 * (9.81 * np.cos(theta) + 0.8 * omega**2), rel=1e-9)
+    expected = -9.81 / 0.8 * np.sin(theta) + np.sin(run.t) / (2.0 * 0.8**2)
+    assert run["omega_dot"] == pytest.approx(expected, rel=1e-9, abs=1e-9)
