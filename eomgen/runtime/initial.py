@@ -269,8 +269,8 @@ class Initial:
                     f"give {' or '.join(others[:2])} instead, or another position" if others else "nothing can move"
                 )
                 raise AssemblyError(
-                    f"{name} = {value:.6g} cannot be reached where that coordinate stands still, "
-                    f"as at this dead centre{place(layout.q, q)}; {remedy}"
+                    f"{name} = {value:.6g} cannot be reached: the constraints hold that coordinate still here, as at "
+                    f"a dead centre or across a blade{place(layout.q, q)}; {remedy}"
                 )
 
     def _solve_rates(self, q: Array, held: Mapping[str, float]) -> Rates:
