@@ -24,6 +24,8 @@ def describe_calls(program: Program) -> list[Call]:
     calls = [
         Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
         Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs"),
+        Call("input_jacobian(t, x)", _shape(s.n_x, s.n_u), "dx'/du of the complete rhs"),
+        Call("parameter_jacobian(t, x)", _shape(s.n_x, s.n_p), "dx'/dp of the complete rhs"),
         Call("mass_matrix(q)", _shape(s.n_v, s.n_v), "M of the spanning tree"),
         Call("embedded_mass_matrix(q)", _shape(s.n_dof, s.n_dof), "M of the independent coordinates"),
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),

@@ -19,7 +19,7 @@ from .sources import SourceSet, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
-    *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs")),
+    *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")),
     *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
     *((name, "State") for name in ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
     ("inverse_dynamics", "Motion"),

@@ -61,6 +61,7 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     wanted = [k for k in _select(kernels) if k.name != "kinematics" or terms.has_minimal_form]
+    wanted = [k for k in wanted if not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}
