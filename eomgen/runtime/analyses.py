@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
+    from ..analysis.linearisation import Linearisation
     from .kernels import Kernels
     from .protocols import Timed
 
@@ -22,5 +26,55 @@ class Analyses:
 
     @cached_property
     def parameter_jacobian(self) -> Timed:
-        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters."""
+        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters.
+
+        The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
+        nearest one on them.  Exact at states on the constraints; others are projected first.
+        """
         return self.kernels.timed("parameter_jacobian")
+
+    def linearise(
+        self,
+        x: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        form: str = "minimal",
+        independent: Sequence[str] | None = None,
+    ) -> Linearisation:
+        """Linearise the equations of motion about any state.
+
+        Parameters
+        ----------
+        x : (n_x,) array, optional
+            A state, projected onto the constraints; by default the declared initial values, assembled.
+        t : float
+            Time (s), held fixed.
+        p, u : optional
+            As for ``bind``.
+        form : {'minimal', 'full'}
+            ``minimal``: states are the independent displacements and velocities along the constraints, nonholonomic
+            ones included, so that constraints add no eigenvalues.  ``full``: A is ``jacobian(t, x)``.
+        independent : sequence of str, optional
+            Coordinates of the tree to take as the n_dof independent ones.
+
+        Returns
+        -------
+        Linearisation
+            A, B, C, D, names, eigenvalues, ``mass``, ``damping``, ``stiffness``, ``drift``, ``state_space()``.
+
+        Raises
+        ------
+        UsageError
+            Unknown names or a wrong shape.
+        PartitionError
+            The rank of the constraints drops here, or the chosen coordinates are not independent.
+
+        Notes
+        -----
+        All matrices are exact derivatives of the complete right-hand side (implicit differentiation; no differences).
+        """
+        from ..analysis.linear import linearise
+
+        return linearise(self, x, t, p=p, u=u, form=form, independent=independent)  # type: ignore[arg-type]
