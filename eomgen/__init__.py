@@ -20,6 +20,7 @@ _HOMES = {"Model": "describe", "load": "describe", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
     "EomgenError",
+    "EquilibriumError",
     "EvaluationError",
     "ExpressionError",
     "MissingDependencyError",

@@ -21,6 +21,13 @@ MARGIN = 1e-6  #: real parts below this part of the largest eigenvalue (at least
 COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
 
 
+def judge(eigenvalues: Any) -> str:
+    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part."""
+    margin = MARGIN * max(1.0, float(np.abs(eigenvalues).max(initial=0.0)))
+    largest = float(eigenvalues.real.max(initial=-np.inf))
+    return "unstable" if largest > margin else "marginal" if largest >= -margin else "asymptotically stable"
+
+
 class Linearisation:
     """The motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
 
@@ -113,12 +120,7 @@ class Linearisation:
 
         'marginal' where it vanishes within 1e-6 of the largest eigenvalue: the linear equations do not decide.
         """
-        values = self.eigenvalues
-        if not values.size:
-            return "asymptotically stable"
-        margin = MARGIN * max(1.0, float(np.abs(values).max()))
-        largest = float(values.real.max())
-        return "unstable" if largest > margin else "marginal" if largest >= -margin else "asymptotically stable"
+        return judge(self.eigenvalues)
 
     def second_order(self, *names: str) -> tuple[Array, Array, Array]:
         """M, C, K of ``M z'' + C z' + K z = 0``, square.

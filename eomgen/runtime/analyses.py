@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
+    from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
+    from ..analysis.modes import Modes
     from .kernels import Kernels
     from .protocols import Timed
 
@@ -78,3 +80,84 @@ class Analyses:
         from ..analysis.linear import linearise
 
         return linearise(self, x, t, p=p, u=u, form=form, independent=independent)  # type: ignore[arg-type]
+
+    def modes(
+        self,
+        x: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        independent: Sequence[str] | None = None,
+    ) -> Modes:
+        """Natural frequencies, mode shapes and damping ratios of small motions about an equilibrium.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_q,) array, optional
+            The equilibrium; by default the one that :meth:`equilibrium` finds from the declared initial position.
+        t : float
+        p, u : optional
+            As for ``bind``.
+        independent : sequence of str, optional
+            Coordinates to give the shapes in.
+
+        Returns
+        -------
+        Modes
+            ``frequencies`` (rad/s), ``hertz``, ``shapes``, ``motions``, ``rigid``, ``damped``.
+
+        Raises
+        ------
+        UsageError
+            The state is no equilibrium.
+        EquilibriumError
+            None was found.
+        """
+        from ..analysis.modes import find_modes
+
+        return find_modes(self, x, t, p=p, u=u, independent=independent)  # type: ignore[arg-type]
+
+    def equilibrium(
+        self,
+        guess: Mapping[str, float] | ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        hold: Mapping[str, float] | Sequence[str] = (),
+        unknowns: Sequence[str] = (),
+    ) -> Equilibrium:
+        """Find a position at rest in which all forces are in balance (virtual work, Newton's iteration).
+
+        Parameters
+        ----------
+        guess : mapping of str to float, or (n_q,) array, optional
+            Where to start: coordinates by name, or all of them; the declared initial position by default.
+        t : float
+            Time (s), held fixed.  Constraints that move in time move with the velocities they have then.
+        p, u : optional
+            As for ``bind``.
+        hold : mapping of str to float, or sequence of str
+            Coordinates, of the tree or of cut joints, and where they are held; names alone: where the guess is.  With
+            ``unknowns`` the parameters balance them, without they are supported (``supports`` says by what force).
+        unknowns : sequence of str
+            Parameters or inputs to solve for, such as a spring's free length: at least as many as held coordinates.
+
+        Returns
+        -------
+        Equilibrium
+            ``x``, ``q``, ``eq["theta"]``, ``unknowns``, ``supports``, ``eigenvalues``, ``stability``, ``linear``.
+
+        Raises
+        ------
+        EquilibriumError
+            None was found from the guess; the message names the coordinate with the largest force left.
+        AssemblyError
+            The loops do not close with the held values.
+        UsageError
+            An unknown name, or too few unknowns.
+        """
+        from ..analysis.equilibrium import find_equilibrium
+
+        return find_equilibrium(self, guess, t, p=p, u=u, hold=hold, unknowns=unknowns)  # type: ignore[arg-type]
