@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
+    from ..analysis.sensitivities import Sensitivities
     from .kernels import Kernels
     from .protocols import Timed
 
@@ -161,3 +162,45 @@ class Analyses:
         from ..analysis.equilibrium import find_equilibrium
 
         return find_equilibrium(self, guess, t, p=p, u=u, hold=hold, unknowns=unknowns)  # type: ignore[arg-type]
+
+    def sensitivities(
+        self,
+        names: Sequence[str],
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Mapping[str, Any] | None = None,
+        *,
+        hold: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Sensitivities:
+        """Integrate a run together with its derivatives by parameters, inputs and initial values.
+
+        Parameters
+        ----------
+        names : sequence of str
+            What to differentiate by: parameters, inputs (a constant added to each) and initial values that are held.
+        span, initial, parameters, inputs : optional
+            As for ``simulate``.
+        hold : sequence of str, optional
+            Coordinates and rates that keep their initial values when something else changes; the constraints give the
+            rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
+            declared ones, then the independent ones, while they leave each other room.
+        **options
+            method (of SciPy, DOP853), rtol (1e-9), atol (1e-11), t_eval, max_step, first_step.
+
+        Returns
+        -------
+        Sensitivities
+            ``s["theta", "k"]``, ``s.dx`` (n_x, k, n_t), ``s.dy`` (n_y, k, n_t), ``s.trajectory``.
+
+        Raises
+        ------
+        UsageError
+            An unknown name, or one that is not held.
+        SimulationError, AssemblyError, MissingDependencyError
+            As for ``simulate``.
+        """
+        from ..analysis.sensitivities import differentiate_run
+
+        return differentiate_run(self, names, span, initial, parameters, inputs, hold=hold, **options)  # type: ignore[arg-type]

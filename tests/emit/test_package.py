@@ -135,7 +135,7 @@ for call, shape in re.findall(r"^    (\\w.*\\)) -> (\\(.*?\\)|Module|Trajectory)
     sizes = str(tuple(np.shape(part) for part in found))[1:-1] if isinstance(found, tuple) else str(np.shape(found))
     assert sizes == shape, (call, sizes, shape)
     tried += 1
-assert tried == 21, tried
+assert tried >= 21, tried
 """
 
 
