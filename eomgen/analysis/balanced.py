@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..numeric.scales import Array
+from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import force_slopes, weigh
 from .linear import linearise
@@ -15,7 +16,7 @@ from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-    from .equilibrium import Search
+    from .search import Search
 
 
 class Equilibrium:
@@ -82,8 +83,6 @@ class Equilibrium:
 
 def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: int) -> Equilibrium:
     """The result at a balanced position."""
-    from .equilibrium import read_coordinates
-
     t, layout = search.t, module.layout
     held = search.gradients(module, q) if search.supported else None
     here = weigh(module, t, q, held)
@@ -118,3 +117,12 @@ def _held_eigenvalues(search: Search, module: Module, here: Any, t: float) -> An
     n = len(M)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
     return np.sort_complex(np.linalg.eigvals(A))
+
+
+def read_coordinates(module: Module, q: Array, t: float) -> dict[str, float]:
+    """All coordinates by name, those of cut joints included."""
+    values = dict(zip(module.q_names, q.tolist(), strict=True))
+    if module.layout.n_k:
+        y = Initial(module.kernels, t).loops(q)[0]
+        values |= dict(zip(module.layout.loops, y.tolist(), strict=True))
+    return values

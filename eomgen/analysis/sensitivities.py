@@ -7,6 +7,7 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,7 +44,9 @@ class Sensitivities:
         Coordinates and rates that keep their initial values when something else changes.
     """
 
-    def __init__(self, trajectory: Trajectory, names: tuple[str, ...], dx: Array, dy: Array, held: Sequence[str]) -> None:
+    def __init__(
+        self, trajectory: Trajectory, names: tuple[str, ...], dx: Array, dy: Array, held: Sequence[str]
+    ) -> None:
         self.trajectory, self.t, self.names = trajectory, trajectory.t, names
         self.dx, self.dy, self.held = dx, dy, tuple(held)
         self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
@@ -58,6 +61,28 @@ class Sensitivities:
         if name not in self.names:
             raise unknown("parameter that was differentiated by", name, self.names)
         return np.asarray(self._rows[what][self.names.index(name)])
+
+    def save(self, path: str | Path) -> Path:
+        """Write all derivatives: t, names, x_names, y_names, dx and dy to ``.npz`` (added if there is no ending), or
+        columns ``d(theta)/d(k)`` to ``.csv``.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        target = Path(path)
+        target = target.with_suffix(".npz") if not target.suffix else target
+        if target.suffix not in (".npz", ".csv"):
+            raise UsageError(f"{target}: sensitivities are written as .npz or .csv")
+        if target.suffix == ".npz":
+            x_names, y_names = self.trajectory.x_names, self.trajectory.metadata["y_names"]
+            np.savez(target, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)
+            return target
+        columns = {f"d({row})/d({name})": self[row, name] for row in self._rows for name in self.names}
+        table = np.column_stack([self.t, *columns.values()])
+        np.savetxt(target, table, delimiter=",", header=",".join(["t", *columns]), comments="", fmt="%.17g")
+        return target
 
     def __repr__(self) -> str:
         return f"<Sensitivities of {self.trajectory.name} to {', '.join(self.names)}: {len(self.t)} points>"

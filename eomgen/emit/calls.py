@@ -55,6 +55,10 @@ def describe_calls(program: Program) -> list[Call]:
         Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
+        Call("linearise(x=None, t=0.0)", "Linearisation", "A, B, C, D along the constraints, eigenvalues"),
+        Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
+        Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
+        Call("sensitivities(names, span)", "Sensitivities", "a run with its derivatives; needs SciPy"),
     ]
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
     calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]

@@ -15,7 +15,6 @@ from .kernels import KERNELS, Sizes
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
 
-
 #: Kernels that are derivatives by something other than the state -> what.
 SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
 

@@ -11,7 +11,6 @@ from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from .kernels import Sizes
 
-
 #: Blocks that only trees have whose accelerations are known without their mass matrix.
 BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
 

@@ -126,7 +126,7 @@ class Analyses:
         *,
         p: Any = None,
         u: Any = None,
-        hold: Mapping[str, float] | Sequence[str] = (),
+        hold: Mapping[str, float | None] | Sequence[str] = (),
         unknowns: Sequence[str] = (),
     ) -> Equilibrium:
         """Find a position at rest in which all forces are in balance (virtual work, Newton's iteration).
@@ -139,8 +139,8 @@ class Analyses:
             Time (s), held fixed.  Constraints that move in time move with the velocities they have then.
         p, u : optional
             As for ``bind``.
-        hold : mapping of str to float, or sequence of str
-            Coordinates, of the tree or of cut joints, and where they are held; names alone: where the guess is.  With
+        hold : mapping of str to float or None, or sequence of str
+            Coordinates, of the tree or of cut joints, and where they are held; None: where the guess is.  With
             ``unknowns`` the parameters balance them, without they are supported (``supports`` says by what force).
         unknowns : sequence of str
             Parameters or inputs to solve for, such as a spring's free length: at least as many as held coordinates.
