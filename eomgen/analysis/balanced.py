@@ -9,7 +9,7 @@ import numpy as np
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
-from .balance import force_slopes, weigh
+from .balance import Balance, force_slopes, weigh
 from .linear import linearise
 from .linearisation import Linearisation, judge
 from .tables import as_html, as_text, number
@@ -102,21 +102,20 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
         pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=1e-10)[0]
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
-        values = _held_eigenvalues(search, module, here, t)
-        found |= {"eigenvalues": values, "stability": judge(values)}
+        A = _held_motion(search, module, here, t)
+        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": judge(A)}
     return Equilibrium(module, t, here.x, found)
 
 
-def _held_eigenvalues(search: Search, module: Module, here: Any, t: float) -> Any:
-    """Eigenvalues with the held coordinates held."""
+def _held_motion(search: Search, module: Module, here: Balance, t: float) -> Array:
+    """A of the motion with the held coordinates held."""
     n_q = module.n_q
     M = here.B.T @ module.mass_matrix(here.x[:n_q], t=t) @ here.B
     K = -force_slopes(module, t, here, lambda q: search.gradients(module, q))
     tree = module.mass_matrix(here.x[:n_q], t=t)
     C = -here.B.T @ tree @ module.jacobian(t, here.x)[n_q:, n_q:] @ here.B
     n = len(M)
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
-    return np.sort_complex(np.linalg.eigvals(A))
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
 
 
 def read_coordinates(module: Module, q: Array, t: float) -> dict[str, float]:

@@ -31,7 +31,7 @@ def find_equilibrium(
 ) -> Equilibrium:
     """See :meth:`~..runtime.analyses.Analyses.equilibrium`."""
     module = module if p is None and u is None else module.bind(p, u)
-    layout, time = module.layout, float(t)
+    time = float(t)
     unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
     names = (hold,) if isinstance(hold, str) else hold
     wanted: dict[str, float | None] = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)

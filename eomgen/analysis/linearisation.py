@@ -18,14 +18,30 @@ if TYPE_CHECKING:
 
 STILL = 1e-7  #: scaled rates below which a state counts as an equilibrium
 MARGIN = 1e-6  #: real parts below this part of the largest eigenvalue (at least 1/s) count as zero
+LOOSEST = 1e-4  #: the same for eigenvalues that rounding moves far
 COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
 
 
-def judge(eigenvalues: Any) -> str:
-    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part."""
-    margin = MARGIN * max(1.0, float(np.abs(eigenvalues).max(initial=0.0)))
-    largest = float(eigenvalues.real.max(initial=-np.inf))
-    return "unstable" if largest > margin else "marginal" if largest >= -margin else "asymptotically stable"
+def judge(A: Array) -> str:
+    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
+
+    Eigenvalues that rounding can move far, such as repeated zeros, count as zero within ten times that distance (their
+    condition numbers: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., section 7.2.2).
+    """
+    if not A.size:
+        return "asymptotically stable"
+    values, vectors = np.linalg.eig(A)
+    size = max(1.0, float(np.abs(values).max()))
+    with np.errstate(over="ignore", invalid="ignore"):
+        try:
+            condition = np.linalg.norm(np.linalg.inv(vectors), axis=1)
+        except np.linalg.LinAlgError:
+            condition = np.full(len(A), np.inf)
+        rounding = 10.0 * np.finfo(float).eps * float(np.linalg.norm(A, 2)) * condition
+    margin = np.minimum(np.maximum(MARGIN * size, rounding), LOOSEST * size)
+    if (values.real > margin).any():
+        return "unstable"
+    return "marginal" if (values.real >= -margin).any() else "asymptotically stable"
 
 
 class Linearisation:
@@ -118,9 +134,10 @@ class Linearisation:
     def stability(self) -> str:
         """By the largest real part of the eigenvalues: 'asymptotically stable', 'marginal' or 'unstable'.
 
-        'marginal' where it vanishes within 1e-6 of the largest eigenvalue: the linear equations do not decide.
+        'marginal' where it vanishes within 1e-6 of the largest eigenvalue, or of what rounding can do to repeated ones:
+        the linear equations do not decide.
         """
-        return judge(self.eigenvalues)
+        return judge(self.A)
 
     def second_order(self, *names: str) -> tuple[Array, Array, Array]:
         """M, C, K of ``M z'' + C z' + K z = 0``, square.

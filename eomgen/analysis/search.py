@@ -145,13 +145,14 @@ class Search:
         """From a position: Newton's iteration; where it stalls, downhill along the forces first."""
         start = self.at(q, self.initial_unknowns())
         point, steps, found = self._newton(start)
-        if not found and not self.names:
+        if found:
+            return point, steps
+        if not self.names:
             lower, more = self._descend(start)
-            point, again, found = self._newton(lower)
-            steps += more + again
-        if not found:
-            raise self._failure(point)
-        return point, steps
+            lowest, again, found = self._newton(lower)
+            if found:
+                return lowest, steps + more + again
+        raise self._failure(point)
 
     def _newton(self, point: _Point) -> tuple[_Point, int, bool]:
         """The last iterate, the number of steps, and whether it is balanced."""

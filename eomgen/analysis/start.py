@@ -61,8 +61,10 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
         elif name in held:
             initial.append((column, name))
         elif name in (*layout.x, *layout.loops, *layout.loop_rates):
-            raise UsageError(f"{name} is not held at the start ({', '.join(held)} are), so nothing depends on it alone; "
-                             f"name it in hold=")  # fmt: skip
+            raise UsageError(
+                f"{name} is not held at the start ({', '.join(held)} are), so nothing depends on it alone; name it in "
+                "hold="
+            )
         else:
             raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
     if len(set(names)) != len(names):
@@ -151,8 +153,8 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     bad = np.flatnonzero(left > CONSISTENT * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:
         raise UsageError(
-            f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values leave no "
-            "room for it; hold fewer values"
+            f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values leave "
+            "no room for it; hold fewer values"
         )
     return np.asarray(found)
 

@@ -45,32 +45,35 @@ class Prepared(NamedTuple):
 time_option = click.option("--time", "t", type=float, default=0.0, show_default=True, metavar="T", help="Time in s.")
 
 
+_OPTIONS: tuple[Callable[..., Any], ...] = (
+    robot_options,
+    json_option,
+    click.option(
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Value of a parameter, an input, a coordinate or a rate; repeat it for more.",
+    ),
+    target_option("cython", "numpy"),
+    independent_option,
+    method_option,
+    native_option,
+    model_argument,
+)
+
+
 def analysis_options(verb: Callable[..., Any]) -> Callable[..., Any]:
     """The options of every analysis; the verb gets a :class:`Prepared` as its first argument."""
 
-    @reports_failures
     @functools.wraps(verb)
-    def wrapped(**given: Any) -> Any:
+    def prepared(**given: Any) -> Any:
         words = ("model", "allow_native", "method", "independent", "target", "settings", "robot")
         own = {key: value for key, value in given.items() if key not in words}
         return verb(prepare(*(given[word] for word in words)), **own)
 
-    for option in (
-        robot_options,
-        json_option,
-        click.option(
-            "--set",
-            "settings",
-            multiple=True,
-            metavar="NAME=VALUE",
-            help="Value of a parameter, an input, a coordinate or a rate; repeat it for more.",
-        ),
-        target_option("cython", "numpy"),
-        independent_option,
-        method_option,
-        native_option,
-        model_argument,
-    ):
+    wrapped: Callable[..., Any] = reports_failures(prepared)
+    for option in _OPTIONS:
         wrapped = option(wrapped)
     return wrapped
 
