@@ -67,6 +67,8 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
             )
         else:
             raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
+    if not names:
+        raise UsageError("name at least one parameter, input or initial value")
     if len(set(names)) != len(names):
         raise UsageError(f"each name counts once: {', '.join(names)}")
     return Columns(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))

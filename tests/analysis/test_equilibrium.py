@@ -74,7 +74,7 @@ def test_what_is_held_is_supported(compiled: Compiled) -> None:
 
 
 def test_a_chain_between_two_walls_is_a_minimum_of_the_potential() -> None:
-    """Six bars hung at both ends, one support held aside: SciPy minimises the height of the centres under constraints."""
+    """Six bars hung at both ends, the first one held aside: SciPy minimises the height under constraints."""
     m = eg.Model("catenary", gravity=(0, -9.81, 0))
     previous = m.ground
     for k in range(6):

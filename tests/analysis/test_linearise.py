@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import judges
@@ -80,7 +81,7 @@ def test_the_full_form(compiled: Compiled) -> None:
         full = mod.linearise(x, form="full")
         np.testing.assert_allclose(full.A, mod.jacobian(0.0, x), rtol=0, atol=1e-12 * np.abs(full.A).max())
         np.testing.assert_array_equal(full.B, mod.input_jacobian(0.0, full.x))
-        expected = np.stack([judges.first(lambda c: mod.outputs(0.0, c), x, e, h=1e-4) for e in np.eye(mod.n_x)], 1)
+        expected = np.stack([judges.first(partial(mod.outputs, 0.0), x, e, h=1e-4) for e in np.eye(mod.n_x)], 1)
         np.testing.assert_allclose(full.C, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
         assert full.states == mod.x_names
         with pytest.raises(eg.UsageError, match="full form"):

@@ -16,7 +16,7 @@ Compiled = Callable[..., Any]
 
 
 def test_a_double_pendulum(compiled: Compiled) -> None:
-    """Equal point masses on equal rods: omega^2 = g/l (2 -+ sqrt 2), amplitudes 1 : +-sqrt 2 (Landau, Lifshitz, par. 23)."""
+    """Equal point masses on equal rods: omega^2 = g/l (2 -+ sqrt 2), amplitudes 1 : +-sqrt 2 (Landau and Lifshitz)."""
     mod = compiled("double_pendulum")
     p = dict(zip(mod.p_names, mod.p, strict=True))
     same = dict.fromkeys(("m1", "m2"), 0.7) | dict.fromkeys(("l1", "l2"), 0.6)
