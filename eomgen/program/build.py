@@ -61,7 +61,7 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
-    wanted = [k for k in _select(kernels) if has.get(k.name, True)]
+    wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}

@@ -77,5 +77,23 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
+    Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
+    Kernel(
+        "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
+    ),
+    Kernel(
+        "assembly_jacobian",
+        ("q", "v"),
+        lambda s: (s.n_h + s.n_c + 2 * s.n_k, s.n_x + s.n_u + s.n_p),
+        "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
+        late=True,
+    ),
+    Kernel(
+        "output_derivatives",
+        ("q", "v", "a"),
+        lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
+        "outputs by [q, v, a, u, p], each at fixed others",
+        late=True,
+    ),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

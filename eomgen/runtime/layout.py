@@ -128,6 +128,9 @@ class Layout:
             "n_q+2n_v": self.n_q + 2 * self.n_v,
             "n_v+n_c": self.n_v + self.n_c,
             "n_centroidal": self.n_com * (self.n_v + 6),
+            "n_assembly": self.n_h + self.n_c + 2 * self.n_k,
+            "n_x+n_u+n_p": self.n_x + self.n_u + self.n_p,
+            "n_motion+n_u+n_p": self.n_x + self.n_v + self.n_u + self.n_p,
         }
         return tuple(
             size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
@@ -212,5 +215,9 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
     "alignment": ("q", ("n_a",)),
     "finite_forces": ("x", ("n_e",)),
+    "input_jacobian": ("x", ("n_x", "n_u")),
+    "parameter_jacobian": ("x", ("n_x", "n_p")),
+    "assembly_jacobian": ("x", ("n_assembly", "n_x+n_u+n_p")),
+    "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
     "scales": ("none", ("n_v+n_c",)),
 }
