@@ -163,6 +163,8 @@ class BlockMaker:
             "finite_forces": lambda: terms.finite_forces,
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,
+            "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
+            "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {

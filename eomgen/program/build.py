@@ -134,6 +134,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_com=3 if terms.centroidal else 0,
         n_e=len(terms.finite_forces),
         n_g=len(terms.coordinate_slopes),
+        n_s=terms.wrenches.needed_size if terms.wrenches else 0,
+        n_w=terms.wrenches.size if terms.wrenches else 0,
     )
 
 

@@ -25,6 +25,8 @@ class Sizes:
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
     n_e: int = 0
     n_g: int = 0  #: holonomic rows where q' is given, else 0
+    n_s: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
+    n_w: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,20 @@ KERNELS: tuple[Kernel, ...] = (
         ("q", "v", "a"),
         lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
         "outputs by [q, v, a, u, p], each at fixed others",
+        late=True,
+    ),
+    Kernel(
+        "needed_wrenches",
+        ("q", "v", "a"),
+        lambda s: (s.n_s,),
+        "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
+        late=True,
+    ),
+    Kernel(
+        "wrench_geometry",
+        ("q",),
+        lambda s: (s.n_w,),
+        "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
         late=True,
     ),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),

@@ -57,6 +57,8 @@ class Layout:
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
         self.n_g: int = data.get("n_g", 0)
+        self.n_s: int = data.get("n_s", 0)
+        self.n_w: int = data.get("n_w", 0)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.balls for name in self.q[i : i + 4])
         if coordinate_of is not None:
@@ -219,5 +221,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "parameter_jacobian": ("x", ("n_x", "n_p")),
     "assembly_jacobian": ("x", ("n_assembly", "n_x+n_u+n_p")),
     "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
+    "needed_wrenches": ("motion", ("n_s",)),
+    "wrench_geometry": ("q", ("n_w",)),
     "scales": ("none", ("n_v+n_c",)),
 }
