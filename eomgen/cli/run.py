@@ -87,14 +87,14 @@ def run(
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
-        _complete(described, chosen)
+        complete_parameters(described, chosen)
         equations = pipeline.derive(described, method, independent or None)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)
         module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
-    initial, parameters, inputs = _sort(module, chosen)
+    initial, parameters, inputs = sort_settings(module, chosen)
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
@@ -123,14 +123,16 @@ def run(
         click.echo(f"wrote {file}")
 
 
-def _complete(model: Model, settings: dict[str, float]) -> None:
+def complete_parameters(model: Model, settings: dict[str, float]) -> None:
     """Give values to parameters that the model leaves open; others change without compiling anew."""
     for entry in model.description.sections["parameters"]:
         if entry.name in settings and entry.values.get("value") is None:
             entry.values["value"] = settings[entry.name]
 
 
-def _sort(module: Module, settings: dict[str, float]) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+def sort_settings(
+    module: Module, settings: dict[str, float]
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Which settings are initial values, parameters and inputs; one namespace holds them all."""
     loops = [*module.loop_names, *(f"{name}_dot" for name in module.loop_names)]
     groups = [[*module.x_names, *loops], module.p_names, module.u_names]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..program import Program
+from ..program.blocks import SHIFTS
 
 LOOPS: dict[str, tuple[str, ...]] = {
     "project": ("scaled", "cholesky", "project", "close", "project_drive"),
@@ -26,6 +27,15 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 }
 
 
+def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """The files of a derivative by inputs or parameters."""
+    if program.by_columns:
+        return ("shift_columns", name)
+    if not program.has_loops:
+        return ("tree", "shift_tree", name)
+    return (*LOOPS["rhs"][:-1], "multipliers", direct, "shift_loops", name)
+
+
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
@@ -36,7 +46,9 @@ def driver_files(program: Program) -> list[str]:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
         files.update(dict.fromkeys(space if program.balls or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
-        if program.by_columns:
+        if driver.name in SHIFTS:
+            needed = shift_files(program, driver.name, direct)
+        elif program.by_columns:
             needed = COLUMNS[driver.name]
         elif not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
@@ -71,13 +83,16 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     n_q, h = program.sizes.n_q, program.sizes.n_h
     names = program.block_names
     residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
+    shifted = {SHIFTS[d.name] for d in program.drivers if d.name in SHIFTS}
+    seeds = max((program.sizes.n_u if what == "input" else program.sizes.n_p for what in shifted), default=0)
     lengths = [
-        ("X", 2 * n_q + 3 * n + m),  # q, v, a, multipliers, dq, dv
+        ("X", n_q + 2 * n + m + max(n_q + n, seeds)),  # q, v, a, multipliers, dq, dv; or du or dp in place of these
         ("SCALES", n + m),
         ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
         ("RATES", n_q),
+        ("SHIFT", h + n + 2 * m if shifted else 0),  # C, r1, r2, r3 along du or dp
     ]
     if program.composes_terms:
         lengths.append(("FULL", n * n))

@@ -24,6 +24,8 @@ def describe_calls(program: Program) -> list[Call]:
     calls = [
         Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
         Call("jacobian(t, x)", _shape(s.n_x, s.n_x), "dx'/dx of the complete rhs"),
+        Call("input_jacobian(t, x)", _shape(s.n_x, s.n_u), "dx'/du of the complete rhs"),
+        Call("parameter_jacobian(t, x)", _shape(s.n_x, s.n_p), "dx'/dp of the complete rhs"),
         Call("mass_matrix(q)", _shape(s.n_v, s.n_v), "M of the spanning tree"),
         Call("embedded_mass_matrix(q)", _shape(s.n_dof, s.n_dof), "M of the independent coordinates"),
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
@@ -53,6 +55,10 @@ def describe_calls(program: Program) -> list[Call]:
         Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
+        Call("linearise(x=None, t=0.0)", "Linearisation", "A, B, C, D along the constraints, eigenvalues"),
+        Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
+        Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
+        Call("sensitivities(names, span)", "Sensitivities", "a run with its derivatives; needs SciPy"),
     ]
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
     calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]

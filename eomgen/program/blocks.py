@@ -17,6 +17,9 @@ from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
 
+#: Kernels that are derivatives by something other than the state -> what.
+SHIFTS = {"input_jacobian": "input", "parameter_jacobian": "parameter"}
+
 
 def flat(rows: Sequence[Row]) -> Row:
     """Rows one after the other."""
@@ -130,6 +133,8 @@ class BlockMaker:
             "multipliers": terms.multipliers,
             "dq": tuple(f"d({q})" for q in terms.q),
             "dv": tuple(f"d({v})" for v in terms.v),
+            "du": tuple(f"d({u})" for u in terms.u),
+            "dp": tuple(f"d({p})" for p in terms.p),
         }
         return Port(name, symbols[name])
 
@@ -156,6 +161,10 @@ class BlockMaker:
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
             "alignment": lambda: terms.alignment,
             "finite_forces": lambda: terms.finite_forces,
+            "assembly_jacobian": self._assembly_jacobian,
+            "output_derivatives": self._output_derivatives,
+            "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
+            "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }
         trees: dict[str, Callable[[], Sequence[Expr]]] = {
@@ -190,6 +199,13 @@ class BlockMaker:
 
     def _behind(self, name: str) -> tuple[str, ...]:
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
+        shift = SHIFTS.get(name)
+        if shift and self.terms.by_columns:
+            return (f"{shift}_acceleration",)
+        if shift and not self.has_loops:
+            return ("mass_matrix", "bias", "scales", f"{shift}_shift")
+        if shift:
+            return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
         if self.terms.by_columns:
             return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
@@ -241,7 +257,36 @@ class BlockMaker:
             case "residual_tangent":  # dr1, dr2, dr3 along (dq, dv)
                 residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
                 return self._internal(name, "q v a multipliers dq dv", jvp(residuals, self._directions))
+            case "input_shift" | "parameter_shift":  # dC, dr1, dr2, dr3 along du or dp
+                residuals = [*terms.constraints, *self._force_residual, *self._acceleration_residual]
+                residuals += terms.velocity_constraints
+                port, seeds = self._seeds(name.removesuffix("_shift"))
+                return self._internal(name, f"q v a multipliers {port}", jvp(residuals, seeds))
+            case "input_acceleration" | "parameter_acceleration":  # dv' along du or dp
+                accelerations, checks = self._accelerations
+                port, seeds = self._seeds(name.removesuffix("_acceleration"))
+                return self._internal(name, f"q v {port}", jvp(accelerations, seeds), checks)
         raise KeyError(name)
+
+    def _seeds(self, what: str) -> tuple[str, dict[Expr, Expr]]:
+        """The port of the changes of inputs or parameters, and what changes -> the symbol of its change."""
+        port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
+        return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
+
+    def _derivatives(self, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
+        """All derivatives of rows by symbols, row-major."""
+        entries, zero = jacobian(rows, self._symbols(names)), self.terms.graph.zero
+        return [entries.get((i, k), zero) for i in range(len(rows)) for k in range(len(names))]
+
+    def _assembly_jacobian(self) -> list[Expr]:
+        terms = self.terms
+        held = terms.loop_coordinates[: 2 * self.sizes.n_k]
+        rows = [*terms.constraints, *terms.velocity_constraints, *held]
+        return self._derivatives(rows, (*terms.q, *terms.v, *terms.u, *terms.p))
+
+    def _output_derivatives(self) -> list[Expr]:
+        terms = self.terms
+        return self._derivatives(terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
 
     @property
     def _directions(self) -> dict[Expr, Expr]:

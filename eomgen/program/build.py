@@ -61,7 +61,7 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
-    wanted = [k for k in _select(kernels) if has.get(k.name, True)]
+    wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}
@@ -134,6 +134,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_com=3 if terms.centroidal else 0,
         n_e=len(terms.finite_forces),
         n_g=len(terms.coordinate_slopes),
+        n_s=terms.wrenches.needed_size if terms.wrenches else 0,
+        n_w=terms.wrenches.size if terms.wrenches else 0,
     )
 
 

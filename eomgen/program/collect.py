@@ -14,6 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
+from ..kinematics.wrenches import find_wrenches
 from .given_multipliers import multiplier_values
 from .program import Limits
 from .soundness import flag_forces
@@ -65,6 +66,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         finite_forces=tuple(flag for _, flag in flag_forces(kinematics)),
         accelerations=equations.accelerations,
         pivots=equations.pivots,
+        wrenches=find_wrenches(kinematics),
     )
 
 
@@ -147,6 +149,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "masses": dict(_mass_parameters(kinematics)),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),
+        "wrenches": wrenches.metadata() if (wrenches := find_wrenches(kinematics)) else None,
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),
         "loop_kinds": list(loop.kinds),

@@ -11,6 +11,9 @@ from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from .kernels import Sizes
 
+#: Blocks that only trees have whose accelerations are known without their mass matrix.
+BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -164,7 +167,7 @@ class Program:
     @property
     def by_columns(self) -> bool:
         """Whether drivers make the mass matrix and the Jacobian of a tree column by column."""
-        return not self.block_names.isdisjoint(("mass_times", "acceleration_tangent"))
+        return not self.block_names.isdisjoint(BY_COLUMNS)
 
     @property
     def kernels(self) -> tuple[Block | Driver, ...]:

