@@ -13,7 +13,6 @@ from eomgen.graph.substitute import symbols_of
 from eomgen.program import KERNELS, Limits, build_program
 from eomgen.program.hoist import count_apart, hoist
 
-
 DERIVATIVES = ["input_jacobian", "parameter_jacobian"]
 
 
