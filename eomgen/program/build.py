@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
-from .blocks import BlockMaker
+from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
@@ -61,7 +61,10 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     wanted = [k for k in _select(kernels) if k.name != "kinematics" or terms.has_minimal_form]
-    wanted = [k for k in wanted if not (k.late and 0 in k.shape(sizes))]
+    empty = {k.name for k in wanted if k.late and 0 in k.shape(sizes)}
+    if getattr(terms, "given_rates", False):  # their derivatives by inputs and parameters are not derived
+        empty |= SHIFTS.keys()
+    wanted = [k for k in wanted if k.name not in empty]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}

@@ -8,13 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from ..errors import UsageError
+
 if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
     from ..analysis.sensitivities import Sensitivities
     from .kernels import Kernels
+    from .layout import Layout
     from .protocols import Timed
+
+
+def require_velocities(layout: Layout) -> None:
+    """Refuse a model whose q' is given as functions of other velocities.
+
+    Raises
+    ------
+    UsageError
+    """
+    if getattr(layout, "given_rates", False):
+        raise UsageError(
+            f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
+            "analyses are not derived; rhs, jacobian and simulate are there"
+        )
 
 
 class Analyses:
@@ -25,6 +42,7 @@ class Analyses:
     @cached_property
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
+        require_velocities(self.kernels.layout)
         return self.kernels.timed("input_jacobian")
 
     @cached_property
@@ -34,6 +52,7 @@ class Analyses:
         The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
+        require_velocities(self.kernels.layout)
         return self.kernels.timed("parameter_jacobian")
 
     def linearise(
