@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
+from ..runtime.analyses import require_velocities
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balanced import Equilibrium, describe, read_coordinates
@@ -30,6 +31,7 @@ def find_equilibrium(
     unknowns: Sequence[str] = (),
 ) -> Equilibrium:
     """See :meth:`~..runtime.analyses.Analyses.equilibrium`."""
+    require_velocities(module.layout)
     module = module if p is None and u is None else module.bind(p, u)
     time = float(t)
     unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.analyses import require_velocities
 from .linearisation import Linearisation
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
@@ -30,6 +31,7 @@ def linearise(
     independent: Sequence[str] | None = None,
 ) -> Linearisation:
     """See :meth:`~..runtime.analyses.Analyses.linearise`."""
+    require_velocities(module.layout)
     if form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)

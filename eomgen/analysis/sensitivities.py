@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
+from ..runtime.analyses import require_velocities
 from ..runtime.integrate import choose_solver, integrate
 from ..runtime.names import unknown
 from ..runtime.recording import record
@@ -132,6 +133,7 @@ def differentiate_run(
     **options: Any,
 ) -> Sensitivities:
     """See :meth:`~..runtime.analyses.Analyses.sensitivities`."""
+    require_velocities(module.layout)
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u

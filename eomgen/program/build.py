@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
-from .blocks import BlockMaker
+from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
@@ -61,6 +61,8 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
+    if terms.given_rates:  # their derivatives by inputs and parameters are not derived
+        has |= dict.fromkeys(SHIFTS, False)
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from ..errors import UsageError
+
 if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
@@ -15,7 +17,22 @@ if TYPE_CHECKING:
     from ..analysis.sensitivities import Sensitivities
     from ..numeric.scales import Array
     from .kernels import Kernels
+    from .layout import Layout
     from .protocols import Timed
+
+
+def require_velocities(layout: Layout) -> None:
+    """Refuse a model whose q' is given as functions of other velocities.
+
+    Raises
+    ------
+    UsageError
+    """
+    if getattr(layout, "given_rates", False):
+        raise UsageError(
+            f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
+            "analyses are not derived; rhs, jacobian and simulate are there"
+        )
 
 
 class Analyses:
@@ -26,6 +43,7 @@ class Analyses:
     @cached_property
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
+        require_velocities(self.kernels.layout)
         return self.kernels.timed("input_jacobian")
 
     @cached_property
@@ -35,6 +53,7 @@ class Analyses:
         The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
+        require_velocities(self.kernels.layout)
         return self.kernels.timed("parameter_jacobian")
 
     def linearise(

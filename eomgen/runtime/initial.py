@@ -104,6 +104,14 @@ class Initial:
         """Whether no joint closes with its axes flipped."""
         return self._alignment is None or bool((self._alignment(q, t=self.t) > 0.0).all())
 
+    def gradients(self, q: Array, name: str) -> list[Array]:
+        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
+        return self._row(q, name)
+
+    def with_values(self, q: Array, values: Mapping[str, float]) -> Array:
+        """A position with coordinates of the tree replaced; loops are not closed."""
+        return self._with(q, values)
+
     def _equations(self, values: Mapping[str, float]) -> Equations | None:
         layout = self.layout
         names = [name for name in values if name in layout.loops]
@@ -123,7 +131,7 @@ class Initial:
     def close(self, guess: Array, held: Mapping[str, float], restarts: int = 24) -> Assembly:
         """Close the loops from a guess with some values exact."""
         layout = self.layout
-        start = self.with_values(guess, held)
+        start = self._with(guess, held)
         indices = [layout.q.index(name) for name in held if name in layout.q]
         return assemble(
             self.position,
@@ -160,7 +168,7 @@ class Initial:
         layout = self.layout
         declared = self.sort(layout.initial).positions
         if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
-            return self.with_values(self.with_values(layout.q_reference, declared), given)
+            return self._with(self._with(layout.q_reference, declared), given)
         if not given:
             return self.close(layout.q_reference, declared).q
         rest = {name: value for name, value in declared.items() if name not in given}
@@ -194,7 +202,7 @@ class Initial:
             except AssemblyError:
                 pass
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
-        start = self.with_values(self.with_values(layout.q_reference, declared), guess)
+        start = self._with(self._with(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
             try:
@@ -259,7 +267,7 @@ class Initial:
         for name, value in given.items():
             scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
-            row = self.gradients(q, name)[0]
+            row = self._row(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
             if still and abs(row @ driven) < 1e-12 and abs(value / scale) > 1e-8:
                 moves = np.linalg.norm(basis, axis=0)
@@ -314,7 +322,7 @@ class Initial:
         layout = self.layout
         scales = self.place if positions else self.scales
         C_q = self.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
-        rows = [*scales.jacobian(C_q), *(row for name in given for row in self.gradients(q, name))]
+        rows = [*scales.jacobian(C_q), *(row for name in given for row in self._row(q, name))]
         basis: Array = np.empty((0, len(scales.q)))
         if rows:
             stacked = np.array(rows)
@@ -323,7 +331,7 @@ class Initial:
         kept = {}
         for name, value in rest.items():
             added = basis
-            for row in self.gradients(q, name):
+            for row in self._row(q, name):
                 length = np.linalg.norm(row)
                 left = row - added.T @ (added @ row)
                 left -= added.T @ (added @ left)
@@ -338,7 +346,7 @@ class Initial:
         torn = {name for four in whole if not all(name in kept for name in four) for name in four}
         return {name: value for name, value in kept.items() if name not in torn}
 
-    def gradients(self, q: Array, name: str) -> list[Array]:
+    def _row(self, q: Array, name: str) -> list[Array]:
         """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
         layout = self.layout
         if name in layout.v:
@@ -351,8 +359,7 @@ class Initial:
         index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)
         return [np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])]
 
-    def with_values(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A position with coordinates of the tree replaced; loops are not closed."""
+    def _with(self, q: Array, values: Mapping[str, float]) -> Array:
         result = np.array(q)
         for name, value in values.items():
             if name in self.layout.q:
