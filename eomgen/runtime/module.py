@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .analyses import Analyses
 from .kernels import Kernels, Rows
 from .layout import Layout, number
 from .momenta import Momenta
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module(Momenta):
+class Module(Analyses, Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
