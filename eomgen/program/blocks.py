@@ -140,6 +140,7 @@ class BlockMaker:
             "loop_coordinates": lambda: terms.loop_coordinates,
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
             "alignment": lambda: terms.alignment,
+            "motion_outputs": lambda: terms.outputs,
             "finite_forces": lambda: terms.finite_forces,
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from ..analysis.motions import KinematicAnalysis
     from .kernels import Kernels
     from .protocols import Timed
 
@@ -24,3 +29,54 @@ class Analyses:
     def parameter_jacobian(self) -> Timed:
         """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters."""
         return self.kernels.timed("parameter_jacobian")
+
+    def kinematic_analysis(
+        self,
+        t: ArrayLike | None = None,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Any = None,
+        *,
+        partial: bool = False,
+        **led: ArrayLike,
+    ) -> KinematicAnalysis:
+        """Positions, velocities and accelerations over a range of time or of coordinates, without forces.
+
+        The range is walked from the initial position in small steps, so the mechanism stays on its branch, also through
+        change points, where others meet it.
+
+        Parameters
+        ----------
+        t : (n,) array or float, optional
+            Times (s), for drivers; 0 by default.
+        initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
+            Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
+            declared initial position at t = 0 by default; from there it is walked to the first point.
+        parameters, inputs : optional
+            As for :meth:`bind`.
+        partial : bool
+            Return the part of the range that can be reached instead of raising an error.
+        **led : (n,) arrays or floats
+            Values of coordinates, of the tree or of cut joints, at most as many as degrees of freedom; those left
+            over stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
+
+        Returns
+        -------
+        KinematicAnalysis
+
+        Raises
+        ------
+        PartitionError
+            The range cannot be followed to its end (``.reached`` holds the part before), or its start is singular.
+        AssemblyError
+            The initial values do not fit the loops and drivers.
+        UsageError
+            Unknown names, wrong shapes, too many coordinates led.
+        """
+        from ..analysis.kinematic import analyse, read_range
+
+        module: Any = self
+        asked = read_range(module, t, led)
+        if parameters is not None or inputs is not None:
+            module = module.bind(parameters, inputs)
+        return analyse(module, asked, initial, partial)

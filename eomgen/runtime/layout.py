@@ -194,6 +194,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "loop_coordinates": ("motion", (3, "n_k")),
     "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
     "alignment": ("q", ("n_a",)),
+    "motion_outputs": ("motion", ("n_y",)),
     "finite_forces": ("x", ("n_e",)),
     "scales": ("none", ("n_v+n_c",)),
 }
