@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-
 import numpy as np
 
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales
 from .walking import Point, Walk
 
-REACH = 0.03  #: scaled motion from the middle of a bridge to its inner piers
+REACH = 0.05  #: scaled motion from the middle of a bridge to its inner piers
 
 
 class Bridge:

@@ -92,7 +92,8 @@ class Follower:
 
     def _loop_values(self, q: Array, t: float, v: Array | None = None, a: Array | None = None) -> Array:
         assert self._loops is not None
-        return self._loops(q, self._zero if v is None else v, self._zero if a is None else a, t=t)
+        zero = self._zero
+        return np.asarray(self._loops(q, zero if v is None else v, zero if a is None else a, t=t))
 
     def _gap(self, q: Array, y: Array, t: float) -> Array:
         """Scaled y(q) - y."""
@@ -113,6 +114,10 @@ class Follower:
         return np.concatenate([J, rows])
 
     # positions
+
+    def closure(self, q: Array, t: float) -> tuple[Array, Array]:
+        """C (n_h,) and C_q (n_c, n_v)."""
+        return self._C(q, t=t), self._C_q(q, t=t)
 
     def position(self, t: float, y: Array, guess: Array) -> Array | None:
         """The closed position (n_q,) next to a guess; None if Newton's iteration finds none."""
@@ -187,7 +192,7 @@ class Follower:
         return v, a
 
     def motions(self, t: Array, y: Array, y1: Array, y2: Array, guesses: Array) -> tuple[Array, Array, Array]:
-        """q, v, a (n, k) of many points at once from guesses (n_q, k); NaN where none is found.  For ``direct`` only."""
+        """q, v, a (n, k) of many points from guesses (n_q, k); NaN where none is found.  For ``direct`` only."""
         assert self._kinematics is not None
         found = self._kinematics(np.concatenate([y, y1, y2, guesses]), t=t)
         n_q, n = self.layout.n_q, self.layout.n_v

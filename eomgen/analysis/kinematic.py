@@ -261,7 +261,10 @@ def _pieces(follower: Follower, asked: Range) -> list[tuple[int, int]]:
         if sizes[k] <= MOVES:
             continue
         here = steps[:, k] / sizes[k]
-        if direction is not None and np.abs(here - direction).max() > ALIGNED + 1e-15 * np.abs(scaled[:, k]).max() / sizes[k]:
+        if (
+            direction is not None
+            and np.abs(here - direction).max() > ALIGNED + 1e-15 * np.abs(scaled[:, k]).max() / sizes[k]
+        ):
             pieces.append((first, k))
             first = k
             direction = here

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +127,13 @@ class KinematicAnalysis(Trajectory):
         return found
 
     def __repr__(self) -> str:
-        over = f"of {', '.join(self.led)}" if self.led else f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s" if self.t.size else ""
+        over = (
+            f"of {', '.join(self.led)}"
+            if self.led
+            else f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s"
+            if self.t.size
+            else ""
+        )
         end = "" if self.stop is None else f", ends early: {self.stop}"
         return f"<KinematicAnalysis of {self.name}: {len(self)} points {over}{end}>"
 
@@ -140,14 +146,22 @@ def keep(
     stop: Singular | None,
     asked: int,
     led: tuple[str, ...],
+    *,
+    u: Array | None = None,
+    header: Mapping[str, Any] | None = None,
+    **rest: Any,
 ) -> KinematicAnalysis:
-    """Put an analysis together from its pieces; ``asked`` points were asked for."""
+    """Put an analysis together from its pieces; ``asked`` points were asked for.
+
+    ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``rest`` what a Trajectory takes.
+    """
     module = follower.module
     q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
     x = np.concatenate([q, v])
-    u = np.repeat(module.u[:, None], len(t), axis=1)
+    if u is None:
+        u = np.repeat(module.u[:, None], len(t), axis=1)
     columns = MotionColumns(module, t, x, u, a)
-    header = describe(module) | {
+    complete = describe(module) | {
         "method": METHOD,
         "rtol": None,
         "atol": None,
@@ -158,8 +172,9 @@ def keep(
         "message": "the whole range" if stop is None else f"{len(t)} of {asked} points: {stop}",
         "residuals": residuals(module, t, x)._asdict(),
         "units": units_of(module, columns.names),
+        **(header or {}),
     }
-    return KinematicAnalysis(module, (t, q, v, a), columns, header, found, stop, led)
+    return KinematicAnalysis(module, (t, q, v, a), columns, complete, found, stop, led, **rest)
 
 
 def residuals(module: Module, t: Array, x: Array) -> Residuals:

@@ -1,4 +1,4 @@
-"""Analysis: walks -> the singular positions on them: where, of what kind, and which coordinates and joints are to blame.
+"""Analysis: walks -> the singular positions on them: where they are, and which coordinates and joints are to blame.
 
 At a singular position a motion is possible while the led coordinates (and the drivers) stand still.  Either the branch
 goes on through it, beside others (a change point: the sign of det K changes), or the led coordinates turn back there (a
@@ -16,6 +16,7 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .bridging import Bridge, build_bridge
 from .following import Follower, Tangent
+from .roots import find_root
 from .walking import LEAPS, Point, Walk
 
 NEAR = 1e-6  #: quality below which a position counts as singular
@@ -93,7 +94,7 @@ def cross(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | Non
 
 
 def _root(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
-    """Where det K changes its sign on a bridge, by the Illinois method."""
+    """Where det K changes its sign on a bridge; where it does not, the nearest to singular."""
 
     def value(s: float) -> float:
         return walk.follower.determinant(walk.path.at(s)[0], bridge.at(s)[0])
@@ -101,17 +102,7 @@ def _root(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
     f_low, f_high = value(low), value(high)
     if not f_low * f_high < 0.0:
         return _worst(walk, bridge, low, high)
-    for _ in range(80):
-        s = high - f_high * (high - low) / (f_high - f_low)
-        f = value(s)
-        if f * f_high < 0.0:
-            low, f_low = high, f_high
-        else:
-            f_low *= 0.5
-        high, f_high = s, f
-        if f == 0.0 or abs(high - low) <= 4e-16 * max(abs(high), abs(low)):
-            break
-    return high
+    return find_root(value, low, high, f_low, f_high)
 
 
 def _worst(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
@@ -216,4 +207,7 @@ def judge_walk(walk: Walk) -> tuple[list[tuple[Bridge, float]], list[Singular]]:
 def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
     """The last point before a leap that is not too near to the singular position."""
     width = after.s - before.s
-    return next((p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > LEAPS[0] * 1e-2), points[0])
+    return next(
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > LEAPS[0] * 1e-2),
+        points[0],
+    )

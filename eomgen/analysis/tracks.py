@@ -120,9 +120,8 @@ class Track:
             return self.stop.q, nothing, nothing
         t = self.path.at(s)[0]
         bridge = next((b for b, _ in self.bridges if b.piers[1].s < s < b.piers[2].s), None)
-        if bridge is not None:
-            if follower.tangent(t, bridge.at(s)[0], 0.0, self.path.y1).quality < POOR:
-                return self._bridged(bridge, s, y1, y2)
+        if bridge is not None and follower.tangent(t, bridge.at(s)[0], 0.0, self.path.y1).quality < POOR:
+            return self._bridged(bridge, s, y1, y2)
         q, v, a = found
         if not follower.direct or not np.isfinite(q).all() or largest(scales.distance(q, guess)) > ASTRAY:
             q = self._closer(s, guess)

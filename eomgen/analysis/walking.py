@@ -17,7 +17,8 @@ from ..numeric.scales import Array
 from .following import Follower, Tangent
 
 FIRST = 0.1  #: scaled motion in the first step
-JUMP = 0.4  #: largest scaled motion in one step
+LONG = 0.35  #: scaled motion aimed at in one step
+JUMP = 0.5  #: largest scaled motion in one step
 OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction
 REST = 1e-6  #: scaled motion too small to judge
@@ -81,6 +82,8 @@ class Walk:
             left = end - here.s
             if left <= 0.0:
                 return True
+            rate = largest(here.tangent.rate / self.follower.scales.q)
+            self.step = min(self.step, LONG / rate) if rate > 0.0 else self.step
             h = left if self.step >= left else min(self.step, 0.5 * left)
             found = self.forward(here, h, end if h == left else here.s + h)
             if found is None:

@@ -62,7 +62,7 @@ class DistanceDriver(Driver):
 
 @dataclass(frozen=True)
 class PlaceDriver(Driver):
-    """A coordinate of a marker's origin: along ``axis``, a unit vector in the axes of marker ``on``, from its origin."""
+    """The place of a marker's origin along ``axis``, a unit vector in the axes of marker ``on``, from its origin."""
 
     type_name: ClassVar[str] = "driver_place"
     marker: Marker

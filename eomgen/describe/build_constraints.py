@@ -12,7 +12,6 @@ from .build_cams import cam, cam_contact
 from .build_couplings import belt, coupling, gear, planetary, rack
 from .build_drivers import driver
 from .build_joints import Declared
-
 from .checks import check_keys, check_names
 from .constraint_element import Element, Surroundings
 from .description import Entry

@@ -70,7 +70,9 @@ def _value(e: Element) -> Expr:
     for function, orders in (graph.calls[operation] for operation in sorted(called)):
         kind = tables.get(function.name, {}).get("kind", "cubic")
         if function.name in tables and (kind in ROUGH or any(orders)):
-            what = f"of the derivative of table {function.name!r}" if any(orders) else f"of {kind} table {function.name!r}"
+            what = (
+                f"of the derivative of table {function.name!r}" if any(orders) else f"of {kind} table {function.name!r}"
+            )
             remedy = "take the value of a table of kind cubic, natural or periodic, whose curvature is continuous"
             e.faults.add(path, f"the acceleration {what} jumps at its points", remedy)
     return value

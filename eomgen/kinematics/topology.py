@@ -1,9 +1,9 @@
 """Stage kinematics: Mechanism -> Topology, the spanning tree and the joints that close loops.
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
-coordinates the user neither named nor drives (and whose angular velocity they did not give) before one they named; among equals
-the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are always cut, joints that
-cannot be cut (a point on a curve) never.
+coordinates the user did not name (and does not drive, and whose angular velocity they did not give) before one they
+named; among equals the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are
+always cut, joints that cannot be cut (a point on a curve) never.
 """
 
 from __future__ import annotations
@@ -45,7 +45,11 @@ def _rank(spec: JointSpec, independent: Collection[str], initial: Collection[str
         return 0
     if spec.joint.counts_turns:  # a thread is best kept whole
         return 1
-    return 1 if spec.named or not spec.coordinates or any(name in initial for name in (*spec.coordinates, *spec.velocities)) else 2
+    return (
+        1
+        if spec.named or not spec.coordinates or any(name in initial for name in (*spec.coordinates, *spec.velocities))
+        else 2
+    )
 
 
 class _Forest:

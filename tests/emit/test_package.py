@@ -71,7 +71,9 @@ def test_the_files_of_each_target(packages):
         for target, folder in packages.items()
     }
     assert files["c"] == {"crank.c", "crank.h", "eomgen.h", "model.json", "README.md", "Makefile"}
-    copied = {"errors.py"} | {str(p.relative_to(ROOT)) for d in ("numeric", "runtime", "analysis") for p in (ROOT / d).glob("*.py")}
+    copied = {"errors.py"} | {
+        str(p.relative_to(ROOT)) for d in ("numeric", "runtime", "analysis") for p in (ROOT / d).glob("*.py")
+    }
     python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}
     assert files["cython"] == copied | python | set(LAYER) | {"setup.py", "crank.c", "crank.h", "eomgen.h"}
