@@ -93,12 +93,14 @@ class Follower:
     def _loop_values(self, q: Array, t: float, v: Array | None = None, a: Array | None = None) -> Array:
         assert self._loops is not None
         zero = self._zero
-        return np.asarray(self._loops(q, zero if v is None else v, zero if a is None else a, t=t))
+        values: Array = np.asarray(self._loops(q, zero if v is None else v, zero if a is None else a, t=t), dtype=float)
+        return values
 
     def _gap(self, q: Array, y: Array, t: float) -> Array:
         """Scaled y(q) - y."""
         gap = self.led_values(q, t) - y
-        return np.where(self.wraps, np.remainder(gap + np.pi, 2 * np.pi) - np.pi, gap) / self.led_scales
+        wrapped = np.remainder(gap + np.pi, 2 * np.pi) - np.pi
+        return np.asarray(np.where(self.wraps, wrapped, gap) / self.led_scales)
 
     def matrix(self, q: Array, t: float) -> Array:
         """K (n_c + k, n_v), scaled."""
