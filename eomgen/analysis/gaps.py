@@ -21,31 +21,30 @@ def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
     near : (n_q,) array
         A closed position beside it.
     """
-    layout = follower.layout
+    layout, scales = follower.layout, follower.scales
+    start, free = np.array(near), np.ones(layout.n_v)
+    for name, tree, column, value in zip(follower.led, follower.in_tree, follower.columns, y, strict=True):
+        if tree:  # held exactly, so that the gap opens at a joint
+            start[layout.q.index(name)] = value
+            free[column] = 0.0
+    loops = [k for k, tree in enumerate(follower.in_tree) if not tree]
+    sizes = follower.led_scales[loops]
+
+    def led(q: Array) -> tuple[Array, Array]:
+        rows = follower.matrix(q, t)[layout.n_c :][loops] / scales.q * sizes[:, None]
+        return follower.led_values(q, t)[loops], rows
 
     def position(q: Array) -> tuple[Array, Array]:
         return follower.closure(q, t)
 
-    def led(q: Array) -> tuple[Array, Array]:
-        return follower.led_values(q, t), follower.matrix(q, t)[layout.n_c :] / follower.scales.q * follower.led_scales[
-            :, None
-        ]
-
-    equations = Equations(led, y, follower.led_scales, follower.wraps.tolist(), follower.led) if len(y) else None
-    system = System(position, follower.scales, np.ones(layout.n_v), equations)
+    names = [follower.led[k] for k in loops]
+    equations = Equations(led, y[loops], sizes, follower.wraps[loops].tolist(), names) if loops else None
     with np.errstate(all="ignore"):
-        q, _ = close(system, near)
-    C = follower.closure(q, t)[0]
-    worst = int(np.argmax(np.abs(follower.scales.residual(C)))) if C.size else -1
-    gap = abs(float(C[worst])) if C.size else 0.0
-    labels = [*layout.constraint_labels]
-    if len(y):
-        miss = np.abs(follower.led_values(q, t) - y)
-        k = int(np.argmax(miss / follower.led_scales))
-        if not C.size or miss[k] / follower.led_scales[k] > abs(follower.scales.residual(C)[worst]):
-            return f"beyond, {follower.led[k]} would miss its value by {miss[k]:.3g}"
-    unit = "m" if layout.metadata.get("constraint_kinds", ())[worst] == "length" else "rad"
-    place = (
-        f"at t = {t:.6g} s" if not len(y) else ", ".join(f"{n} = {v:.6g}" for n, v in zip(follower.led, y, strict=True))
-    )
-    return f"beyond, {place}, {labels[worst]} stays open by {gap:.3g} {unit}"
+        q, _ = close(System(position, scales, free, equations), start)
+    C = position(q)[0]
+    if not C.size:
+        return "beyond, nothing is open"
+    worst = int(np.argmax(np.abs(scales.residual(C))))
+    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(follower.led, y, strict=True)) or f"t = {t:.6g} s"
+    return f"beyond, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"

@@ -84,14 +84,14 @@ def run(
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
-        _complete(described, chosen)
+        complete_model(described, chosen)
         equations = pipeline.derive(described, method, independent or None)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)
         module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
-    initial, parameters, inputs = _sort(module, chosen)
+    initial, parameters, inputs = sort_settings(module, chosen)
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
@@ -115,14 +115,16 @@ def run(
         click.echo(f"wrote {file}")
 
 
-def _complete(model: Model, settings: dict[str, float]) -> None:
+def complete_model(model: Model, settings: dict[str, float]) -> None:
     """Give values to parameters that the model leaves open; others change without compiling anew."""
     for entry in model.description.sections["parameters"]:
         if entry.name in settings and entry.values.get("value") is None:
             entry.values["value"] = settings[entry.name]
 
 
-def _sort(module: Module, settings: dict[str, float]) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+def sort_settings(
+    module: Module, settings: dict[str, float]
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Which settings are initial values, parameters and inputs; one namespace holds them all."""
     loops = [*module.loop_names, *(f"{name}_dot" for name in module.loop_names)]
     groups = [[*module.x_names, *loops], module.p_names, module.u_names]
@@ -185,17 +187,21 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
     """Statistics of a run, its residuals, its energy and its final values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
-    rows = [
-        ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
-        ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
-    ]
+    if header["rtol"] is None:
+        rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
+    else:
+        rows = [
+            ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
+            ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
+        ]
     if header["loop_names"] or residuals.raw_position:
         rows += [
             ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
             ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
         ]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    rows.append(("energy", f"{change}; kept to {energy.drift:.1e} of the largest kinetic energy"))
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    rows.append(("energy", f"{change}{kept}"))
     if energy.work:
         rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
         rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))

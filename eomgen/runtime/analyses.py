@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..analysis.motions import KinematicAnalysis
+    from ..analysis.reaching import MotionRange
     from .kernels import Kernels
     from .protocols import Timed
 
@@ -80,3 +81,44 @@ class Analyses:
         if parameters is not None or inputs is not None:
             module = module.bind(parameters, inputs)
         return analyse(module, asked, initial, partial)
+
+    def motion_range(
+        self,
+        name: str,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Any = None,
+        *,
+        t: float = 0.0,
+        within: tuple[float, float] | None = None,
+    ) -> MotionRange:
+        """The limits between which a coordinate can move the mechanism, found by walking both ways.
+
+        Parameters
+        ----------
+        name : str
+            A coordinate of the tree or of a cut joint, or ``t`` for a mechanism that drivers move.
+        initial : mapping or array, optional
+            Position to start from, as for :meth:`kinematic_analysis`.
+        parameters, inputs : optional
+            As for :meth:`bind`.
+        t : float
+            Time (s); stands still unless ``name`` is ``t``.
+        within : (float, float), optional
+            Where to look; a full turn both ways for an angle, a hundred length scales or seconds else.
+
+        Returns
+        -------
+        MotionRange
+
+        Raises
+        ------
+        PartitionError, AssemblyError, UsageError
+            As :meth:`kinematic_analysis`.
+        """
+        from ..analysis.reaching import find_range
+
+        module: Any = self
+        if parameters is not None or inputs is not None:
+            module = module.bind(parameters, inputs)
+        return find_range(module, name, initial, t, within)
