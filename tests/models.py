@@ -28,6 +28,8 @@ EXAMPLE_NAMES = (
     "planetary_gear",
     "cam_follower",
     "rolling_disc",
+    "car_axis",
+    "kapitza_pendulum",
 )
 
 

@@ -96,7 +96,14 @@ def analyse(
         module.layout.require_minimal_form()
     t0, y0 = float(asked.t[0]), asked.y[:, 0]
     start_t, q = start_from(module, initial, t0)
-    names = complete(module, q, start_t, asked.names)
+    try:
+        names = complete(module, q, start_t, asked.names)
+    except PartitionError:
+        if initial is not None or not asked.names:
+            raise
+        # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
+        start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
+        names = complete(module, q, start_t, asked.names)
     follower = Follower(module, names)
     further = follower.led_values(q, start_t)[len(asked.names) :]
     start_y = follower.led_values(q, start_t)

@@ -95,8 +95,10 @@ class Track:
         x = np.clip((s - self.nodes[k - 1]) / width, 0.0, 1.0)
         q0, q1 = self._values[:, k - 1], self._values[:, k]
         d0, d1 = self._slopes[:, k - 1] * width, self._slopes[:, k] * width
-        result = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
-        return result if scales.space is None else scales.space.normalised(result)
+        result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
+        for i, _ in scales.space.balls if scales.space is not None else ():
+            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+        return result
 
     def _rates(self, k: int) -> tuple[Array, Array]:
         rate = self.path.y1 / (self.path.t1 or 1.0)

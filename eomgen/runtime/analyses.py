@@ -52,7 +52,8 @@ class Analyses:
             Times (s), for drivers; 0 by default.
         initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
             Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
-            declared initial position at t = 0 by default; from there it is walked to the first point.
+            declared initial position at t = 0 by default, from where it is walked to the first point; if that is a
+            dead centre of the led coordinates, the branch is the one found next to it.
         parameters, inputs : optional
             As for :meth:`bind`.
         partial : bool

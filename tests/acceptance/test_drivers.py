@@ -52,7 +52,7 @@ def test_kapitza_pendulum() -> None:
 
 
 def linkage(
-    name: str, pivots: tuple[float, float], crank: float, coupler: float, rocker: float, point: float
+    name: str, start: float, pivots: tuple[float, float], crank: float, coupler: float, rocker: float, point: float
 ) -> eg.Model:
     """A massless four-bar with the left crank at (0, 0) driven, and a point on the line of its coupler."""
     m = eg.Model(name)
@@ -64,7 +64,7 @@ def linkage(
     p = bar.marker("P", at=(point, 0, 0))
     m.output("P_x", p.position[0])
     m.output("P_y", p.position[1])
-    m.parameter("start", 0.0)
+    m.parameter("start", start)
     m.driver("drive", "theta", "start + t")
     return m
 
@@ -76,15 +76,15 @@ def test_straight_line_linkages(name: str) -> None:
     if name != "chebyshev":
         angles = np.radians(angles)
     if name == "chebyshev":
-        m = linkage(name, (4, 0), 5, 2, 5, 1)
+        m = linkage(name, angles[0], (4, 0), 5, 2, 5, 1)
         m.guess(theta=angles[0], bend=np.pi - 0.6, psi=2.3)
     elif name == "hoecken":
-        m = linkage(name, (2, 0), 1, 2.5, 2.5, 5)
+        m = linkage(name, angles[0], (2, 0), 1, 2.5, 2.5, 5)
         m.guess(theta=angles[0], bend=-0.5, psi=1.6)
     else:
-        m = linkage(name, (2, 0.5), 1, 0.5, 1, 0.25)
+        m = linkage(name, angles[0], (2, 0.5), 1, 0.5, 1, 0.25)
         m.guess(theta=angles[0], bend=np.pi / 2, psi=np.pi)
-    mod = m.compile(target="numpy").bind(p={"start": float(angles[0])})
+    mod = m.compile(target="numpy")
     keys = sorted(rows, key=float)
     found = mod.kinematic_analysis(t=angles - angles[0])
     expected = np.array([[float(x) for x in rows[key]] for key in keys])
