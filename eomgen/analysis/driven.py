@@ -15,7 +15,7 @@ from ..runtime.integrate import Event
 from ..runtime.signals import Forcing
 from .following import Follower
 from .gaps import describe_gap
-from .kinematic import start_from, walk_in
+from .kinematic import complete, start_from, walk_in
 from .motions import KinematicAnalysis, keep
 from .roots import find_root
 from .tracks import Track
@@ -57,6 +57,8 @@ def simulate_driven(
 
     Raises
     ------
+    PartitionError
+        The start is a singular position.
     SimulationError
         The drivers come to a position from which they cannot go on.
     """
@@ -64,7 +66,6 @@ def simulate_driven(
         if name not in ("rtol", "atol", "max_step", "first_step"):
             raise UsageError(f"a mechanism that drivers move entirely takes no option {name!r}; give method= as well")
     start, end = span
-    follower = Follower(module, ())
     nothing = np.empty(0)
     if initial is None:
         t0, q = start_from(module, None, start)
@@ -73,6 +74,7 @@ def simulate_driven(
         t0, q = start, module.x0(initial, t=start)[: module.n_q]
     else:
         t0, q = start_from(module, initial, start)
+    follower = Follower(module, complete(module, q, t0, ()))
     q = walk_in(follower, q, (t0, nothing), (start, nothing))
     sense = 1.0 if end >= start else -1.0
     track = Track(follower, Path(start, nothing, sense, nothing), q, abs(end - start))

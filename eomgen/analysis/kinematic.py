@@ -16,6 +16,7 @@ from ..errors import AssemblyError, PartitionError, UsageError
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .following import Follower
+from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
 from .singular import NEAR, Singular
 from .tracks import Track
@@ -246,8 +247,9 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
         q = columns[-1][0][:, -1] if len(taken) else q
     result = keep(follower, asked.t[:count], columns, found, stop, n, asked.names[:led])
     if count < n and not partial:
+        gap = "" if stop is None else describe_gap(follower, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
         error = PartitionError(
-            f"the range cannot be followed to its end: {stop}; partial=True gives the part that can be reached, "
+            f"the range cannot be followed to its end: {stop}; {gap}partial=True gives the part that can be reached, "
             f"{count} of {n} points",
             None if stop is None else stop.t,
             None if stop is None else stop.q,

@@ -21,6 +21,7 @@ LONG = 0.35  #: scaled motion aimed at in one step
 JUMP = 0.5  #: largest scaled motion in one step
 OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction
+FEWEST = 50  #: steps of a walk
 REST = 1e-6  #: scaled motion too small to judge
 LEAPS = (1e-3, 4e-3, 1.6e-2, 6e-2)  #: scaled motion on either side of a singular position, tried in order
 SMALLEST = 1e-13  #: of the path's parameter, before the way counts as blocked
@@ -77,13 +78,14 @@ class Walk:
 
     def to(self, end: float) -> bool:
         """Walk on until s = end, or beyond if a leap ends there; returns False where the way is blocked before."""
+        longest = end / FEWEST  # however still it stands: a pulse must not be stepped over
         for _ in range(STEPS):
             here = self.points[-1]
             left = end - here.s
             if left <= 0.0:
                 return True
             rate = largest(here.tangent.rate / self.follower.scales.q)
-            self.step = min(self.step, LONG / rate) if rate > 0.0 else self.step
+            self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)
             found = self.forward(here, h, end if h == left else here.s + h)
             if found is None:

@@ -23,7 +23,7 @@ from .options import (
     require_folder,
     target_option,
 )
-from .run import TABLES, complete_model, final_names, sort_settings
+from .run import TABLES, complete_parameters, final_names, sort_settings
 from .screen import finite, print_heading, print_json, print_rows, print_table, stage
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def kinematics(
 
     with blaming_option(independent), stage("derive"):
         described = load_model(model, allow_native)
-        complete_model(described, chosen)
+        complete_parameters(described, chosen)
         equations = pipeline.derive(described, "embedding", independent or None)
     with stage("compile"):
         module = equations.compile(target=target)

@@ -84,7 +84,7 @@ def run(
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
-        complete_model(described, chosen)
+        complete_parameters(described, chosen)
         equations = pipeline.derive(described, method, independent or None)
         parts |= equations.seconds
     with stage("compile") as parts:
@@ -115,7 +115,7 @@ def run(
         click.echo(f"wrote {file}")
 
 
-def complete_model(model: Model, settings: dict[str, float]) -> None:
+def complete_parameters(model: Model, settings: dict[str, float]) -> None:
     """Give values to parameters that the model leaves open; others change without compiling anew."""
     for entry in model.description.sections["parameters"]:
         if entry.name in settings and entry.values.get("value") is None:

@@ -29,7 +29,7 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate")
+METHODS = ("x0", "assemble", "kinematics", "kinematic_analysis", "motion_range", "bind", "simulate")
 
 
 def emit_package(program: Program, target: str) -> SourceSet:

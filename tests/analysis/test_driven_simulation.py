@@ -93,6 +93,8 @@ sys.meta_path.insert(0, Refuse())
 import numpy as np
 import driven_slider_crank as mod
 run = mod.simulate(1.0, t_eval=[0, 0.5, 1.0])
+again = mod.kinematic_analysis(t=[0, 0.5, 1.0])
+assert (again.q == run.q).all() and mod.motion_range("t", within=(0, 1)).upper == 1
 theta = run["theta"]
 assert np.abs(run["s"] - 0.1 * np.cos(theta) - np.sqrt(0.09 - 0.01 * np.sin(theta) ** 2)).max() < 1e-14
 """

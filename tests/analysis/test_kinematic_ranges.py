@@ -116,12 +116,34 @@ def test_a_parallelogram_keeps_its_branch_through_its_change_points() -> None:
     assert "the motion may branch" in str(first)
 
 
+@pytest.mark.parametrize("t", [0.3, 0.5, 7.0, -3.3])
+def test_a_state_at_a_later_time_is_on_the_branch_of_the_start(t: float) -> None:
+    """x0 follows the drivers from t = 0, through the change points of the parallelogram on the way."""
+    mod = parallelogram().compile(target="numpy")
+    angle = 0.5 + 2 * np.pi * t
+    rate = 2 * np.pi
+    np.testing.assert_allclose(mod.x0(t=t), [angle, -angle, angle, rate, -rate, rate], atol=1e-11)
+
+
 def test_starting_at_a_change_point_is_refused() -> None:
     m = parallelogram("2*pi*t")
     m.guess(bend=0, psi=0)
     mod = m.compile(target="numpy")
     with pytest.raises(eg.PartitionError, match="the initial position is singular.*branches meet there"):
         mod.kinematic_analysis(t=[0.0, 0.1])
+    with pytest.raises(eg.PartitionError, match="the initial position is singular"):
+        mod.simulate(0.1)
+
+
+def test_a_pulse_between_long_rests_is_not_stepped_over() -> None:
+    m = eg.Model("pulse")
+    m.prismatic("X", m.ground, m.body("b", mass=0), axis="x")
+    t = np.arange(0, 60.01, 0.5)
+    m.table("pulse", t, np.where(t == 41.0, 1.0, 0.0), kind="natural")
+    m.driver("d", "X", "pulse(t)")
+    run = m.compile(target="numpy").simulate(60)
+    assert run["X"].max() > 0.9
+    assert run.at([41.0])["X"][0] == pytest.approx(1.0)
 
 
 def test_a_driver_that_goes_too_far_stops_at_the_dead_centre(crank: eg.Module) -> None:
