@@ -20,6 +20,7 @@ from .roots import find_root
 from .walking import LEAPS, Point, Walk
 
 NEAR = 1e-6  #: quality below which a position counts as singular
+LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
 NARROW = 0.02  #: scaled motion to which a change of sign is narrowed by steps
 
@@ -184,24 +185,54 @@ def _to_extreme(other: Follower, follower: Follower, k: int, t: float, q: Array)
     return -slope(q) / curvature if curvature else None
 
 
+def touch(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | None:
+    """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
+    follower, scales = walk.follower, walk.follower.scales
+    for _ in range(60):
+        if largest(scales.distance(after.q, before.q)) <= NARROW:
+            break
+        rough = Bridge([before, after], scales)
+        third = (after.s - before.s) / 3.0
+        found = [walk.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
+        one, other = found
+        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < NEAR:
+            break
+        before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
+    bridge = build_bridge(walk, before, after, 0.5 * (before.s + after.s))
+    if bridge is None:
+        return None
+    middle = _worst(walk, bridge, bridge.piers[1].s, bridge.piers[2].s)
+    t = walk.path.at(middle)[0]
+    quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
+    return (bridge, middle) if quality < NEAR else None
+
+
 def judge_walk(walk: Walk) -> tuple[list[tuple[Bridge, float]], list[Singular]]:
     """Bridges over the change points of a walk, and the change points themselves, in order."""
-    leapt = {id(before): after for before, after in walk.leaps}
-    bridges: list[tuple[Bridge, float]] = []
-    found: list[Singular] = []
-    for before, after in zip(walk.points[:-1], walk.points[1:], strict=True):
-        if id(before) not in leapt and before.tangent.sign == after.tangent.sign:
-            continue
-        start = _good(walk.points, before, after) if id(before) in leapt else before
-        crossing = cross(walk, start, after)
-        if crossing is None:
-            continue
-        bridge, middle = crossing
-        t = walk.path.at(middle)[0]
+    leapt = {id(before) for before, _ in walk.leaps}
+    points = walk.points
+    crossings: list[tuple[Bridge, float]] = []
+    for k in range(len(points) - 1):
+        before, after = points[k], points[k + 1]
+        here = None
+        if id(before) in leapt or before.tangent.sign != after.tangent.sign:
+            here = cross(walk, _good(points, before, after) if id(before) in leapt else before, after)
+        elif k + 2 < len(points) and _dips(points[k : k + 3]):
+            here = touch(walk, before, points[k + 2])
+        if here is not None:
+            crossings.append(here)
+    found = []
+    for bridge, middle in crossings:
         q = bridge.at(middle)[0]
-        bridges.append(crossing)
-        found.append(name_singular(walk.follower, "change point", t, q, walk.tangent(middle, q)))
-    return bridges, found
+        found.append(name_singular(walk.follower, "change point", walk.path.at(middle)[0], q, walk.tangent(middle, q)))
+    return crossings, found
+
+
+def _dips(points: Sequence[Point]) -> bool:
+    """Whether the quality has a low minimum at the second of three points, without a change of sign."""
+    first, middle, last = (p.tangent for p in points)
+    low = middle.quality < LOW and middle.quality < first.quality and middle.quality <= last.quality
+    return low and first.sign == middle.sign == last.sign
 
 
 def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
