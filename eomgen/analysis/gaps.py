@@ -8,6 +8,8 @@ from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Array
 from .following import Follower
 
+SHUT = 1e-8  #: scaled residual below which a joint counts as closed
+
 
 def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
     """The largest gap that is left when all equations are met as well as they can be.
@@ -44,7 +46,14 @@ def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
     C = position(q)[0]
     if not C.size:
         return "beyond, nothing is open"
-    worst = int(np.argmax(np.abs(scales.residual(C))))
-    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    gaps = np.abs(scales.residual(C))
     place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(follower.led, y, strict=True)) or f"t = {t:.6g} s"
+    if not gaps.max() > SHUT:
+        return f"beyond, at {place}, it closes again: a driver's value jumps there, or it is out of reach in between"
+    joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
+    if joints and gaps[joints].max() > SHUT:  # rather than the driver
+        worst = joints[int(np.argmax(gaps[joints]))]
+    else:
+        worst = int(np.argmax(gaps))
+    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
     return f"beyond, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"
