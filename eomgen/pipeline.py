@@ -118,10 +118,12 @@ def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
     except AssemblyError as error:
         mechanism = kinematics.mechanism
         names = [row.partition(".")[0] for row in error.rows]
-        joint = next((j.name for j in mechanism.joints if j.name in names), None)
-        if joint is None:
+        places = [f"joints.{j.name}" for j in mechanism.joints if j.name in names]
+        places += [f"constraints.{c.name}" for c in mechanism.constraints if c.name in names]
+        place = min(places, key=lambda place: names.index(place.partition(".")[2]), default=None)
+        if place is None:
             raise
-        raise AssemblyError(str(mechanism.problem(f"joints.{joint}", str(error))), error.rows) from None
+        raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows) from None
 
 
 def check(model: Model) -> MechanismReport:

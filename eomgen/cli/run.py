@@ -195,17 +195,21 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
     """Statistics of a run, its residuals, its energy and its final values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
-    rows = [
-        ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
-        ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
-    ]
+    if header["rtol"] is None:
+        rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
+    else:
+        rows = [
+            ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
+            ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
+        ]
     if header["loop_names"] or residuals.raw_position:
         rows += [
             ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
             ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
         ]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    rows.append(("energy", f"{change}; kept to {energy.drift:.1e} of the largest kinetic energy"))
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    rows.append(("energy", f"{change}{kept}"))
     if energy.work:
         rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
         rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))

@@ -234,6 +234,44 @@ class ConstraintMethods:
         under = None if on is None else self._marker_of(on)
         self._constrain("knife_edge", name, marker=self._marker_of(marker), axis=axis, on=under)
 
+    def driver(
+        self,
+        name: str,
+        coordinate: Any = None,
+        value: Value = None,
+        between: Sequence[Any] | None = None,
+        angle: Sequence[Any] | None = None,
+        marker: Any = None,
+        axis: str | Sequence[float] | None = None,
+        on: Any = None,
+    ) -> None:
+        """Prescribe a motion over time: of a coordinate, a distance, an angle or the place of a marker.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        coordinate : handle or str, optional
+            A joint of one degree, or a coordinate.
+        value : scalar
+            Expression of t, parameters and functions (rad or m); its second derivative should be continuous.
+        between : (marker, marker), optional
+            Instead of a coordinate: the distance of two markers, which must not meet.
+        angle : (marker, marker), optional
+            Instead: the turn of the second about the z axis of the first; the two z axes stay in line.
+        marker : handle or str, optional
+            Instead: the place of a marker along ``axis``.
+        axis : str or three floats, optional
+            In the axes of ``on`` (x).
+        on : handle or str, optional
+            Marker from whose origin the place counts (ground).
+        """
+        pairs = {"between": between, "angle": angle}
+        given = {key: [self._marker_of(end) for end in pair] for key, pair in pairs.items() if pair is not None}
+        single = {"coordinate": None if coordinate is None else self._joint_of(coordinate)}
+        single |= {key: None if end is None else self._marker_of(end) for key, end in (("marker", marker), ("on", on))}
+        self._constrain("driver", name, **single, **given, axis=axis, value=value)
+
     # -- parts ----------------------------------------------------------------------------------------------------
     def _constrain(self, type_name: str, name: str, **keys: Any) -> None:
         given = {key: value for key, value in keys.items() if value is not None}

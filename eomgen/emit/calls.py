@@ -48,6 +48,8 @@ def describe_calls(program: Program) -> list[Call]:
             ", ".join(_shape(n) for n in (s.n_q, s.n_v, s.n_v)),
             f"q, v, a of the whole tree; {independent} are {_shape(s.n_dof)}",
         ),
+        Call("kinematic_analysis(t, **led)", "KinematicAnalysis", "a range of time or of coordinates, without forces"),
+        Call("motion_range(name)", "MotionRange", "the limits between which a coordinate can move"),
         Call("poses(q)", _shape(s.n_bodies, 4, 4), "body frames to ground, homogeneous"),
         Call("outputs(t, x)", _shape(s.n_y), "the outputs of the model at the projected state"),
         Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),

@@ -29,7 +29,7 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
-ANALYSES = ("linearise", "modes", "equilibrium", "sensitivities")
+ANALYSES = ("kinematic_analysis", "motion_range", "linearise", "modes", "equilibrium", "sensitivities")
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", *ANALYSES)
 
 

@@ -193,7 +193,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         motion=motion,
         constraints=constraints,
         coupled=tuple(row.label for row in coupled.rows),
-        hints=tuple(coupled.hints),
+        hints=tuple(hint for hint in coupled.hints if hint[0] in names),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
         length_scale=_length_scale(mechanism),
@@ -277,6 +277,10 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
                 remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
                 problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
     for constraint in mechanism.constraints:
+        if not constraint.is_defined(motion):
+            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+            remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
         for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
             message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
             remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
@@ -21,9 +22,11 @@ from ..numeric import (
     independent_rows,
     rank,
 )
+from ..numeric.assembly import RESTARTS
 from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
+from .driving import close_driven, follow_drivers
 from .kinematics import Kinematics
 
 Array = NDArray[np.float64]
@@ -85,6 +88,7 @@ class ConstraintFunctions:
         self.neutral = np.zeros(len(kinematics.names)) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())
+        self.rows = np.arange(self.m)  #: those that count
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
@@ -110,7 +114,19 @@ class ConstraintFunctions:
     def position(self, q: Array) -> tuple[Array, Array]:
         """C (h,) of the holonomic rows and C_q (m, n) of all."""
         flat = self._position(q)
-        return flat[: self.h], flat[self.h :].reshape(self.m, self.n)
+        J = flat[self.h :].reshape(self.m, self.n)
+        return (flat[: self.h], J) if len(self.rows) == self.m else (flat[self.rows[self.rows < self.h]], J[self.rows])
+
+    def with_rows(self, rows: Sequence[int]) -> ConstraintFunctions:
+        """The same with some of the constraint rows only."""
+        result = copy(self)
+        result.rows = np.array(rows, dtype=int)
+        result.scales = self.scales._replace(c=self.scales.c[result.rows])
+        return result
+
+    def set_time(self, t: float) -> None:
+        """Take all functions at another time than 0."""
+        self._rest[-1] = t
 
     def place_position(self, q: Array) -> tuple[Array, Array]:
         """What positions are closed with: :meth:`position`, or C and dC/dq (h, n_q) where q' is given."""
@@ -161,7 +177,7 @@ class ConstraintFunctions:
             [loop.names[j] for j in picked],
         )
 
-    def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    def close(self, given: Mapping[str, float], guess: Mapping[str, float], restarts: int = RESTARTS) -> Assembly:
         """Assemble with the given values exact, near the guess."""
         k = self.kinematics
         given, guess = self.settle(given), self.settle(guess)
@@ -174,7 +190,7 @@ class ConstraintFunctions:
             free[self.place.velocities(held)] = 0.0
             start = close(System(self.place_position, self.place, free, rough), start)[0]
         for (name, _), value in zip(k.hints, self._hints(start), strict=True):
-            if name not in given and name not in guess:
+            if name not in given and name not in guess and np.isfinite(value):
                 start[k.names.index(name)] = value
         equations = self._equations(given)
         return assemble(
@@ -185,7 +201,8 @@ class ConstraintFunctions:
             equations=equations,
             alignment=self.aligned if k.constraints.aligned else None,
             names=k.names,
-            labels=k.constraints.labels,
+            labels=[k.constraints.labels[i] for i in self.rows],
+            restarts=restarts,
         )
 
 
@@ -229,8 +246,9 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
     positions = {n: x for n, x in given.items() if n in known}
-    found = functions.close(positions, guess)
-    judged = _partition(functions, [found.q, *_probe(functions, found.q)], wanted)
+    found = close_driven(functions, positions, guess)
+    later = follow_drivers(functions, found.q)
+    judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
     return replace(judged, residual=found.residual, restarts=found.restarts)
 
 

@@ -160,6 +160,7 @@ class BlockMaker:
             "loop_coordinates": lambda: terms.loop_coordinates,
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
             "alignment": lambda: terms.alignment,
+            "motion_outputs": lambda: terms.outputs,
             "finite_forces": lambda: terms.finite_forces,
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,

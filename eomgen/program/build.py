@@ -91,6 +91,7 @@ def build_program(
         **metadata,
         "abi": ABI,
         **asdict(sizes),
+        "output_accelerations": maker.outputs_need_accelerations,
         "kernels": kernel_shapes,
         "operations": {key: value.as_dict() for key, value in counts.items()},
     }

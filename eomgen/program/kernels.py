@@ -78,6 +78,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
+    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
     Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
     Kernel(

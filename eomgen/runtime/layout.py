@@ -216,6 +216,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "loop_coordinates": ("motion", (3, "n_k")),
     "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
     "alignment": ("q", ("n_a",)),
+    "motion_outputs": ("motion", ("n_y",)),
     "finite_forces": ("x", ("n_e",)),
     "input_jacobian": ("x", ("n_x", "n_u")),
     "parameter_jacobian": ("x", ("n_x", "n_p")),

@@ -13,6 +13,7 @@ from ..numeric.scales import Array
 from .analyses import Analyses
 from .assembled import Assembled
 from .kernels import Kernels, Rows
+from .kinematic_analyses import KinematicAnalyses
 from .layout import Layout
 from .momenta import Momenta
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module(Assembled, Analyses, Momenta):
+class Module(Assembled, Analyses, KinematicAnalyses, Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of

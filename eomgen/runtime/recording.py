@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -102,19 +102,9 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
     ProjectionError
         A stored state cannot be brought onto the constraints.
     """
-    layout = module.layout
     residuals, x = project(module, solution.t, solution.x)
     header: dict[str, Any] = {
-        "name": module.name,
-        "q_names": list(layout.q),
-        "v_names": list(layout.v),
-        "x_names": list(layout.x),
-        "loop_names": list(layout.loops),
-        "y_names": list(layout.y),
-        "u_names": list(layout.u),
-        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
-        "model_method": layout.metadata.get("method"),
-        "docs": layout.metadata.get("docs", {}),
+        **describe(module),
         "method": method,
         "rtol": _plain(options.get("rtol")),
         "atol": _plain(options.get("atol")),
@@ -125,7 +115,7 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
         "residuals": residuals._asdict(),
     }
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
-    header["units"] = {name: layout.unit(name) for name in ("t", *columns.names) if layout.unit(name)}
+    header["units"] = units_of(module, columns.names)
     events = [project(module, t, found)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
@@ -137,6 +127,23 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
+
+
+def describe(module: Module) -> dict[str, Any]:
+    """What the columns of any run of a module are called, and its parameters."""
+    layout = module.layout
+    return {
+        "name": module.name,
+        "q_names": list(layout.q),
+        "v_names": list(layout.v),
+        "x_names": list(layout.x),
+        "loop_names": list(layout.loops),
+        "y_names": list(layout.y),
+        "u_names": list(layout.u),
+        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
+        "model_method": layout.metadata.get("method"),
+        "docs": layout.metadata.get("docs", {}),
+    }
 
 
 def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
@@ -161,6 +168,11 @@ def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
         correction_position=float(correction[:n].max()),
         correction_velocity=float(correction[n:].max()),
     ), x
+
+
+def units_of(module: Module, names: Sequence[str]) -> dict[str, str]:
+    """Units of columns, of those that have one."""
+    return {name: module.layout.unit(name) for name in ("t", *names) if module.layout.unit(name)}
 
 
 def _plain(value: Any) -> Any:

@@ -94,6 +94,14 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    if method in (None, "kinematic"):
+        from ..analysis.driven import is_driven
+
+        if is_driven(module):
+            steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
+            return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
+        if method is not None:
+            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
     listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
@@ -151,6 +159,29 @@ def simulate(
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
+
+
+def _follow_drivers(
+    module: Module,
+    span: float | tuple[float, float] | None,
+    initial: Mapping[str, float] | ArrayLike | None,
+    parameters: Any,
+    inputs: Mapping[str, Any] | None,
+    t_eval: ArrayLike | None,
+    events: Any,
+    options: Mapping[str, Any],
+) -> Trajectory:
+    """The motion of a mechanism that its drivers move entirely: solved, not integrated."""
+    from ..analysis.driven import simulate_driven
+
+    forcing = Forcing(module.layout, inputs)
+    start, end = span_of(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.base = bound.u
+    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    stored = None if t_eval is None else times_of(t_eval, start, end)
+    given = {key: value for key, value in options.items() if value is not None}
+    return simulate_driven(bound, (start, end), initial, forcing, stored, [Event(e) for e in listed], given)
 
 
 class _Run:

@@ -42,7 +42,7 @@ def compare(mod: Any, x: np.ndarray, t: float) -> None:
 
 
 @pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *LOOPS, "powered_arm", *REDUNDANT])
+@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *REDUNDANT])
 def test_jacobian_of_models(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     for x in judges.random_states(mod, 31, 3):

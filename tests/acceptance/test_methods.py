@@ -51,7 +51,7 @@ def compare(one: Any, other: Any, states: list[np.ndarray], random: np.random.Ge
         judges.agree(one.rhs(t, x, u=u)[n:], other.rhs(t, x, u=u)[n:], DIGITS, embedded_condition(other, q))
 
 
-@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *MORE])
+@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *MORE])
 def test_methods_agree_on_models(module: Callable[..., Any], name: str) -> None:
     one, other = (module(name, method) for method in METHODS)
     compare(one, other, judges.random_states(one, 11, 6), np.random.default_rng(12), t=0.3)

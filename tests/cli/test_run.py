@@ -46,9 +46,11 @@ def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
     run = call("run", path, "--json", "--out", "run.npz").json
     trajectory = eomgen.load_trajectory("run.npz")
     travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
-    assert travel > 1.0
+    driven = "type: driver" in path.read_text(encoding="utf-8")
+    assert travel > (0.1 if driven else 1.0)
     assert run["loop_residual"]["projected"] < 1e-10
-    assert run["energy"]["power_balance"] < 1e-7
+    balance = run["energy"]["power_balance"]
+    assert balance is None if driven else balance < 1e-7
 
 
 def test_the_integrator_and_its_tolerances_can_be_chosen(call: Call) -> None:

@@ -73,7 +73,7 @@ def test_every_example_script_is_run() -> None:
 def test_yaml_blocks_pass_check(path: Path, here: Path) -> None:
     for text in blocks(path, "yaml"):
         (here / "model.yaml").write_text(text, encoding="utf-8")
-        assert eomgen.load("model.yaml").check().degrees_of_freedom > 0
+        assert eomgen.load("model.yaml").check().degrees_of_freedom >= 0
 
 
 @pytest.mark.slow
