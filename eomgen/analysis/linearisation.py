@@ -98,7 +98,7 @@ class Linearisation:
     @cached_property
     def _sorted(self) -> tuple[Any, Any]:
         values, vectors = np.linalg.eig(self.A)
-        order = np.lexsort((values.imag, np.round(values.real, 12), np.round(np.abs(values.imag), 9)))
+        order = np.lexsort((values.imag, np.round(values.real, 9), np.round(np.abs(values), 9)))
         return values[order], vectors[:, order]
 
     @property

@@ -166,3 +166,35 @@ def test_rotations_and_rolling(compiled: Compiled) -> None:
     assert upright["lean"] == pytest.approx(0.0, abs=1e-9)
     assert upright["z"] == pytest.approx(0.5, abs=1e-9)
     assert upright.stability == "unstable"
+
+
+def test_constraints_that_move_in_time() -> None:
+    """Bead on a hoop turned at a given rate: cos(th) = g/(w^2 R), small motions at w sin(th) about it."""
+    m = eg.Model("hoop", gravity=(0, 0, -9.81))
+    R = m.parameter("R", 0.5)
+    hoop, bead = m.body("hoop", mass=1.0, inertia=(0.1, 0.1, 0.1)), m.body("bead", mass=0.3, com=(0, 0, -R))
+    m.revolute("A", m.ground, hoop, coordinate="phi")
+    m.revolute("B", hoop, bead, axis="y", coordinate="th")
+    m.coupling("turned", equation="phi - 6*t")
+    mod = m.compile(target="numpy")
+    found = mod.equilibrium({"th": 0.6}, t=0.2)
+    assert found["th"] == pytest.approx(np.arccos(9.81 / (36 * 0.5)), abs=1e-10)
+    assert found["phi"] == pytest.approx(1.2)
+    assert found.x[2] == pytest.approx(6.0)
+    modes = mod.modes(found.x, 0.2)
+    np.testing.assert_allclose(modes.frequencies, 6 * np.sin(found["th"]), rtol=1e-10)
+    other = mod.equilibrium(hold={"th": 1.1}, unknowns=["R"], t=0.2)
+    assert other["R"] == pytest.approx(9.81 / (36 * np.cos(1.1)), rel=1e-9)
+
+
+def test_a_ball_let_go_above_a_plane_comes_to_rest_on_it() -> None:
+    """Nothing balances it at the start; on the plane K d^(3/2) = m g, small motions with 3/2 K d^(1/2) (Hertz)."""
+    m = eg.Model("ball", gravity=(0, 0, -9.81))
+    ball = m.body("ball", mass=1.0)
+    m.prismatic("z", m.ground, ball, axis="z")
+    m.sphere_plane("floor", m.ground, ball, radius=0.1, stiffness=1e5)
+    m.initial(z=0.5)
+    mod = m.compile(target="numpy")
+    found, depth = mod.equilibrium(), (9.81 / 1e5) ** (2 / 3)
+    assert found["z"] == pytest.approx(0.1 - depth, rel=1e-10)
+    np.testing.assert_allclose(mod.modes().frequencies, np.sqrt(1.5e5 * np.sqrt(depth)), rtol=1e-9)

@@ -29,7 +29,7 @@ def oscillator() -> eg.Model:
 
 
 def test_a_linear_oscillator() -> None:
-    """Derivatives of the closed solution, by SymPy, in all five of its constants; of an output with acceleration too."""
+    """Derivatives of the closed solution, by SymPy, in all five of its constants; an output of acceleration too."""
     mod = oscillator().compile(target="numpy")
     times = np.linspace(0.0, 3.0, 7)
     found = mod.sensitivities(["k", "m", "F", "s", "s_dot"], 3.0, t_eval=times)
@@ -66,8 +66,11 @@ CASES = {
     "slider_crank": (["r", "l", "m_s", "tau", "theta", "theta_dot"], {"theta": 0.3, "theta_dot": 10.0}, 0.3),
     # held by the coordinate of the cut joint: the angles follow from it
     "offset_slider_crank": (["s", "s_dot"], {"s": 0.37, "s_dot": -0.5}, 0.3),
-    "rolling_disc": (["r", "g", "m", "lean", "spin_dot"], {"x": 0, "y": 0, "yaw": 0, "lean": 0.2, "spin": 0, "yaw_dot": 0.5,
-                     "lean_dot": 0.1, "spin_dot": 3.0}, 0.5),
+    "rolling_disc": (
+        ["r", "g", "m", "lean", "spin_dot"],
+        {"x": 0, "y": 0, "yaw": 0, "lean": 0.2, "spin": 0, "yaw_dot": 0.5, "lean_dot": 0.1, "spin_dot": 3.0},
+        0.5,
+    ),
     "rssr": (["r", "l", "tau", "th", "th_dot"], {"th": 0.3, "th_dot": 5.0}, 0.2),
 }  # fmt: skip
 
