@@ -28,6 +28,7 @@ EXAMPLE_NAMES = (
     "planetary_gear",
     "cam_follower",
     "rolling_disc",
+    "bicycle",
 )
 
 
