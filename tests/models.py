@@ -28,6 +28,7 @@ EXAMPLE_NAMES = (
     "planetary_gear",
     "cam_follower",
     "rolling_disc",
+    "bicycle",
 )
 #: Partly driven ones, which the Newton-Euler judge does not know.
 DRIVEN_NAMES = ("car_axis", "kapitza_pendulum")
