@@ -15,8 +15,10 @@ from ..errors import NonFiniteError, ProjectionError
 from .scales import Array, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
-TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
-EXACT = 1e-14  #: scaled residual at which to stop at once
+TIKHONOV = 1e-8  #: relative to the largest diagonal entry of J J^T
+PASSES = 3  #: of linear corrections, so that the Tikhonov term leaves no trace
+EXACT = 1e-15  #: scaled residual at which to stop
+SHORT = 1e-8  #: scaled Newton step whose square is nothing
 SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
 ACCEPTED = 1e-10  #: largest scaled residual of a projected state
 DAMPING = 0.5  #: largest scaled Newton step
@@ -62,20 +64,22 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
     NonFiniteError
         The constraints are not finite.
     """
-    before = np.inf
+    before, last = np.inf, False
     for step in range(STEPS + 1):
         C, C_q = position(q)
         e = scales.residual(C)
         size = largest(e)
-        if size <= EXACT or (step and size <= SETTLED and size > 0.5 * before):
+        if last or size == 0.0 or (step and (size <= EXACT or (size <= SETTLED and size > 0.5 * before))):
             return q, C_q
         if not np.isfinite(size):
             raise NonFiniteError("the constraints are not finite")
         if step == STEPS:
             break
         J = scales.jacobian(C_q[: len(e)])
-        dz = J.T @ gram_solve(J, e, max(TIKHONOV, size))
+        dz = J.T @ gram_solve(J, e, max(TIKHONOV, float(np.abs(e).sum())))
         longest = largest(dz)
+        # one step at least: near configurations where rows depend on each other a small residual is no small distance
+        last = longest <= SHORT and largest(e - J @ dz) <= EXACT
         if longest > DAMPING:
             dz *= DAMPING / longest
         q = scales.move(q, -dz)
@@ -86,9 +90,9 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
 
 
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
-    """The nearest v (n,) with C_q v + C_t = 0; two steps, so that the Tikhonov term leaves no trace."""
+    """The nearest v (n,) with C_q v + C_t = 0."""
     J = scales.jacobian(C_q)
-    for _ in range(2):
+    for _ in range(PASSES):
         v = v - scales.q * (J.T @ gram_solve(J, scales.residual(C_q @ v + C_t)))
     return v
 
@@ -129,7 +133,8 @@ def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
     J = scales.jacobian(C_q)
     z = y / scales.c[: len(y), None]
     x = J.T @ gram_solve(J, z)
-    x += J.T @ gram_solve(J, z - J @ x)  # second step, as in correct_velocity
+    for _ in range(PASSES - 1):
+        x += J.T @ gram_solve(J, z - J @ x)
     return np.asarray(scales.q[:, None] * x)
 
 
