@@ -6,7 +6,7 @@
 #include <time.h>
 #include "slider_crank.h"
 
-enum { STATES = 512, ROUNDS = 200, REPEATS = 15 };
+enum { STATES = 512, ROUNDS = 2, REPEATS = 3000 };
 
 /* p: r l m_c m_r m_s g; x: theta, theta_dot. */
 static __attribute__((noinline)) void closed_form(const double *restrict x, const double *restrict p, double tau,
