@@ -28,6 +28,8 @@ EXAMPLE_NAMES = (
     "planetary_gear",
     "cam_follower",
     "rolling_disc",
+    "bricard",
+    "n_four_bar",
 )
 
 

@@ -162,7 +162,8 @@ class _Failure(NamedTuple):
 
     def _contradiction(self) -> str:
         """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
-        labels = list(self.labels) or [f"C[{i}]" for i in range(len(self.system.position(self.best)[0]))]
+        m = len(self.system.position(self.best)[0])
+        labels = (list(self.labels) or [f"C[{i}]" for i in range(m)])[:m]
         gaps = [(labels.index(label), label, gap) for label, gap in self.open_rows() if label in labels]
         rows = [i for i, _, _ in gaps]
         if not rows:

@@ -92,6 +92,8 @@ class LoopBlocks:
     def closing(self) -> list[Expr]:
         """Sizes of the scaled residual, of what linear theory leaves of it and of the scaled step; the step (n,)."""
         graph = self.terms.graph
+        if not self.h:
+            return [graph.zero] * (3 + self.terms.n_v)
         e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
         rows = self.J[: self.h]
         size = total_magnitude(e) * self.unit

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import eomgen as eg
 from benchmarks.linkages import n_four_bar
 from eomgen import pipeline
 from eomgen.errors import PartitionError
@@ -83,3 +84,23 @@ def test_a_state_with_more_freedoms_at_once_is_named() -> None:
     mod = n_four_bar(3).compile(independent=["theta0"])
     with pytest.raises(PartitionError, match="theta0"):
         mod.rhs(0.0, np.zeros(mod.n_x))
+
+
+def test_loops_stay_short_in_the_spanning_tree() -> None:
+    """Three coordinates a loop, each shared with the neighbours at most, also where no coordinate has a name."""
+    from eomgen.kinematics.kinematics import analyse
+
+    def pattern(named: bool) -> list[int]:
+        m = eg.Model("row", gravity=(0, -9.81, 0))
+        cranks = [m.body(f"crank{k}", mass=1, inertia={"zz": 1}) for k in range(6)]
+        for k in range(1, 6):  # couplers first: in order of declaration the tree would be one long chain
+            coupler = m.body(f"coupler{k}", mass=1, inertia={"zz": 1})
+            m.revolute(f"B{k}", cranks[k - 1].at(1, 0, 0), coupler)
+            m.revolute(f"C{k}", coupler.at(1, 0, 0), cranks[k].at(1, 0, 0))
+        for k, crank in enumerate(cranks):
+            m.revolute(f"A{k}", m.ground.at(k, 0, 0), crank, **({"coordinate": f"theta{k}"} if named else {}))
+        rows = analyse(m.mechanism()).constraints.jacobian
+        return [sum(not x.is_zero for x in row) for row in rows]
+
+    assert pattern(named=True) == [3] * 10
+    assert pattern(named=False) == [3] * 10
