@@ -83,21 +83,22 @@ def chain_of(n: int) -> dict[str, float]:
 def run(quick: bool) -> Report:
     """Time and count."""
     closed, generated, difference = beside_closed_form(1 if quick else 5)
-    sizes = (1, 2, 5) if quick else (1, 2, 5, 10, 20, 40)
+    sizes = (1, 5, 10) if quick else (1, 2, 5, 10, 20, 40)
     found = {n: chain_of(n) for n in sizes}
     rows: list[list[Any]] = [
         [n, x["operations"] / n, x["microseconds of rhs"], x["seconds"], x["error"], x["energy"], x["residual"]]
         for n, x in found.items()
     ]
-    growth = found[sizes[-1]]["operations"] / sizes[-1] / (found[2]["operations"] / 2)
+    growth = found[sizes[-1]]["operations"] / sizes[-1] / (found[5]["operations"] / 5)
     limits = (
         Limit("the slider-crank takes, over its closed form,", generated / closed, 5.0),
         Limit("accelerations of both differ by, relative to 100 rad/s^2,", difference / 100.0, 1e-9),
-        Limit(f"operations per loop, {sizes[-1]} loops over 2,", growth, 1.15),
+        Limit(f"operations per loop, {sizes[-1]} loops over 5,", growth, 1.1),
         Limit("error of the tip after change points,", max(x["error"] for x in found.values()), 1e-3, "m"),
     )
     notes = (
         "The closed form has two states and no loop to close: it is written by hand for this linkage alone.",
+        "From 9 velocities on, configurations of lost rank are passed in the same code, which takes more operations.",
         "A02 allows errors of 1e-3 (its high precision). OpenSim 3.2 took 0.455 s for N = 2 and 10 s (Intel i5-4570,",
         "rehabenggroup.github.io/MBSbenchmarksInOpenSim): another machine, so a note and no comparison.",
     )

@@ -9,6 +9,7 @@ conditioned, drivers take another one.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
@@ -19,8 +20,11 @@ from .triangular import DiagonalBlock, diagonal_blocks
 
 TIKHONOV = 1e-12  #: of velocities and accelerations, relative to the largest diagonal entry of J J^T
 GENTLE = 1e-8  #: of positions, so that rounding of C is not blown up where rows come to depend on each other
+PASSES = 3  #: of linear corrections with GENTLE, so that it leaves no trace
+LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 LOST = 1e-5  #: least square of the sine between a column and those before it
+VANISHED = 1e-20  #: the same of large mechanisms
 
 
 def largest(values: Sequence[Expr]) -> Expr:
@@ -61,6 +65,8 @@ class LoopBlocks:
                      for i, row in enumerate(rows_of(terms.constraint_jacobian))]  # fmt: skip
         self.J = [{k: x * self.s[k] for k, x in row.items()} for row in self.rows]
         self.h = len(terms.constraints)
+        self.gentle = terms.n_v > LARGE
+        self.lost = VANISHED if self.gentle else LOST
 
     @property
     def determined(self) -> bool:
@@ -104,15 +110,21 @@ class LoopBlocks:
         return [size, left, total_magnitude(dz), *(-s * d for s, d in zip(self.s, dz, strict=True))]
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
-    def _corrected(self, v: Sequence[Expr]) -> list[Expr]:
-        """The nearest velocities that satisfy the constraints."""
-        n, redundant = self.terms.n_v, len(self.J) > self.terms.n_v - self.terms.n_dof
-        rate = [x * i for x, i in zip(self.terms.constraint_rate, self.inverse, strict=True)]
-        columns = transpose(self.J, n)
-        factor, _ = self._regularised(self.J, TIKHONOV) if redundant else (factorize(gram(self.J)), None)
-        x = list(v)
-        for _ in range(2 if redundant else 1):  # the second pass removes what the regularisation left
-            e = [a + b for a, b in zip(rate, times(self.rows, x), strict=True)]
+    @cached_property
+    def _factor(self) -> tuple[Factor, int]:
+        """The factor of J J^T, and how many passes of a correction by it leave no trace of its regularisation."""
+        if self.gentle:
+            return self._regularised(self.J, GENTLE)[0], PASSES
+        if len(self.J) > self.terms.n_v - self.terms.n_dof:  # redundant rows
+            return self._regularised(self.J, TIKHONOV)[0], 2
+        return factorize(gram(self.J)), 1
+
+    def _corrected(self, x: list[Expr], r: Sequence[Expr]) -> list[Expr]:
+        """The nearest x with C_q x + r = 0."""
+        factor, passes = self._factor
+        columns = transpose(self.J, self.terms.n_v)
+        for _ in range(passes):
+            e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
             dz = times(columns, factor.solve(e))
             x = [a - s * b for a, s, b in zip(x, self.s, dz, strict=True)]
         return x
@@ -121,10 +133,13 @@ class LoopBlocks:
         """Projected velocities (n,), accelerations (n,), 1 if the partition is sound; and checks of the inertia."""
         terms, graph, f = self.terms, self.terms.graph, range(self.terms.n_dof)
         v = [graph.symbol(name) for name in terms.v]
-        moved = self._corrected(v)
+        rate = [x * i for x, i in zip(terms.constraint_rate, self.inverse, strict=True)]
+        moved = self._corrected(v, rate)
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
-        B, a, sound = self._partition([-x for x in gamma])
+        B, a, sound = self._partition(None if self.gentle else [-x for x in gamma])
+        if self.gentle:
+            a = self._corrected([graph.zero] * terms.n_v, gamma)
         M = rows_of(terms.mass_matrix)
         force = [x + y for x, y in zip(here[: terms.n_v], times(M, a), strict=True)]
         columns = transpose(B, terms.n_dof)
@@ -143,13 +158,19 @@ class LoopBlocks:
         return [*moved, *a, sound], checks
 
     # -- partition ------------------------------------------------------------------------------------------------
-    def _partition(self, y: list[Expr]) -> tuple[list[Row], list[Expr], Expr]:
-        """B (n rows of f) with C_q B = 0, the x (n,) with C_q x = y and no independent part, whether both are sound."""
+    def _partition(self, y: list[Expr] | None) -> tuple[list[Row], list[Expr], Expr]:
+        """B (n rows of f) with C_q B = 0, the x (n,) with C_q x = y and no independent part, whether both are sound.
+
+        No y counts as zero.
+        """
         terms, graph = self.terms, self.terms.graph
         dependent = [k for k in range(terms.n_v) if k not in terms.preferred]
         place = {k: j for j, k in enumerate(dependent)}
         left = [{place[k]: x for k, x in row.items() if k in place} for row in self.rows]
-        right = [y, *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred)]
+        right = [
+            y or [graph.zero] * len(left),
+            *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
+        ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
         conditions: list[Expr] = []
         if blocks is None or any(len(b.rows) > 2 for b in blocks):
@@ -193,7 +214,9 @@ class LoopBlocks:
             (i, j), (k, l) = block.rows, block.columns
             p, q, r, t = (rows[m].get(c, graph.zero) for m in (i, j) for c in (k, l))
             determinant = p * t - q * r
-            conditions.append(graph.apply("lt", (p * p + r * r) * (q * q + t * t) * LOST, determinant * determinant))
+            conditions.append(
+                graph.apply("lt", (p * p + r * r) * (q * q + t * t) * self.lost, determinant * determinant)
+            )
             inverse = 1.0 / determinant
             x[k] = (t * b[0] - q * b[1]) * inverse
             x[l] = (p * b[1] - r * b[0]) * inverse
@@ -209,7 +232,7 @@ class LoopBlocks:
         factor = factorize(E)
         for i, pivot in enumerate(factor.pivots):
             if not (pivot - E[i][i]).is_zero:
-                conditions.append(graph.apply("lt", E[i][i] * LOST, pivot))
+                conditions.append(graph.apply("lt", E[i][i] * self.lost, pivot))
         found = []
         for b in right:
             x = factor.solve(times(columns, b))
