@@ -103,10 +103,10 @@ def _connect(ax: Any, places: Places, line: _Line, lane: int, font: float) -> No
     """A joint: solid in the tree, dashed and bent where it closes a loop."""
     start, end = _at(places, line.start, line.end), _at(places, line.end, line.start)
     bend = 0.0 if line.in_tree else 0.28 + 0.22 * lane
-    if not line.in_tree and line.start not in places.bodies:  # from the ground beside the body's own column
-        start, bend = (start[0] + 0.35, 0.0), 0.12
-    if not line.in_tree and line.end not in places.bodies:
-        end, bend = (end[0] + 0.35, 0.0), 0.12
+    if not line.in_tree and line.start not in places.bodies:  # from the ground, around the right of the body's column
+        start, bend = (start[0] + 0.45, 0.0), min(0.35, ARC / max(end[1], 1.0))
+    elif not line.in_tree and line.end not in places.bodies:
+        end, bend = (end[0] + 0.45, 0.0), -min(0.35, ARC / max(start[1], 1.0))
     run, rise = end[0] - start[0], end[1] - start[1]
     if bend and rise == 0.0 and start[1]:  # over what stands between
         bend = -min(bend, ARC / abs(run)) if run > 0 else min(bend, ARC / max(abs(run), 0.1))
