@@ -9,6 +9,8 @@ distance, whose Newton step would run along the motion.  It vanishes on converge
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
@@ -16,7 +18,7 @@ from .scales import Array, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
 TIKHONOV = 1e-8  #: relative to the largest diagonal entry of J J^T
-PASSES = 3  #: of linear corrections, so that the Tikhonov term leaves no trace
+PASSES = 5  #: of linear corrections, so that the Tikhonov term leaves no trace
 EXACT = 1e-15  #: scaled residual at which to stop
 SHORT = 1e-8  #: scaled Newton step whose square is nothing
 SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
@@ -29,8 +31,8 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
 
 
-def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
-    """``(J J^T + relative max(diag) I)^-1 e`` for e (m,) or (m, k)."""
+def gram_solver(J: Array, relative: float = TIKHONOV) -> Callable[[Array], Array]:
+    """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k)."""
     G = J @ J.T
     size = G.diagonal().max()
     G.flat[:: len(G) + 1] += relative * size
@@ -38,7 +40,7 @@ def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
         raise ProjectionError("the constraint Jacobian vanishes, so no correction is defined") from None
-    return np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
+    return lambda e: np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
 
 
 def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Array, Array]:
@@ -76,7 +78,7 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
         if step == STEPS:
             break
         J = scales.jacobian(C_q[: len(e)])
-        dz = J.T @ gram_solve(J, e, max(TIKHONOV, float(np.abs(e).sum())))
+        dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).sum())))(e)
         longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
         last = longest <= SHORT and largest(e - J @ dz) <= EXACT
@@ -92,8 +94,9 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
     """The nearest v (n,) with C_q v + C_t = 0."""
     J = scales.jacobian(C_q)
+    solve = gram_solver(J)
     for _ in range(PASSES):
-        v = v - scales.q * (J.T @ gram_solve(J, scales.residual(C_q @ v + C_t)))
+        v = v - scales.q * (J.T @ solve(scales.residual(C_q @ v + C_t)))
     return v
 
 
@@ -132,9 +135,10 @@ def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
     """
     J = scales.jacobian(C_q)
     z = y / scales.c[: len(y), None]
-    x = J.T @ gram_solve(J, z)
+    solve = gram_solver(J)
+    x = J.T @ solve(z)
     for _ in range(PASSES - 1):
-        x += J.T @ gram_solve(J, z - J @ x)
+        x += J.T @ solve(z - J @ x)
     return np.asarray(scales.q[:, None] * x)
 
 

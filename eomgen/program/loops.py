@@ -20,7 +20,7 @@ from .triangular import DiagonalBlock, diagonal_blocks
 
 TIKHONOV = 1e-12  #: of velocities and accelerations, relative to the largest diagonal entry of J J^T
 GENTLE = 1e-8  #: of positions, so that rounding of C is not blown up where rows come to depend on each other
-PASSES = 3  #: of linear corrections with GENTLE, so that it leaves no trace
+PASSES = 5  #: of linear corrections with GENTLE, so that it leaves no trace
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 LOST = 1e-5  #: least square of the sine between a column and those before it

@@ -1,11 +1,11 @@
-/* x -= J^T G^-1 (J x + r), three times so that the term GENTLE leaves no trace: the nearest x with J x + r = 0, in the first
+/* x -= J^T G^-1 (J x + r), five times so that the term GENTLE leaves no trace: the nearest x with J x + r = 0, in the first
    rows of J. */
 static void correct_linear(int rows, const double *restrict G, const double *restrict r, double *restrict x,
                            double *restrict w)
 {
     const double *const J = w + AT_J;
     double *const e = w + AT_E;
-    for (int pass = 0; pass < 3; pass++) {
+    for (int pass = 0; pass < 5; pass++) {
         for (int i = 0; i < rows; i++) {
             e[i] = r[i];
             for (int k = 0; k < N; k++) {
