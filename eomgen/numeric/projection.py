@@ -3,7 +3,7 @@
 The correction is the minimum-norm Newton step ``-J^T (J J^T)^-1 e`` in scaled coordinates.  It does not depend on any
 partition of the coordinates, so a partition that goes bad at a dead centre costs no digits.  A relative Tikhonov term
 in ``J J^T`` carries redundant rows and configurations where the rank drops.  In position steps it is as large as the
-scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
+mean scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
 distance, whose Newton step would run along the motion.  It vanishes on convergence, which stays quadratic.
 """
 
@@ -78,7 +78,7 @@ def correct_position(position: Position, q: Array, scales: Scales) -> tuple[Arra
         if step == STEPS:
             break
         J = scales.jacobian(C_q[: len(e)])
-        dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).sum())))(e)
+        dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).mean())))(e)
         longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
         last = longest <= SHORT and largest(e - J @ dz) <= EXACT

@@ -96,13 +96,13 @@ class LoopBlocks:
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
-        """Sizes of the scaled residual, of what linear theory leaves of it and of the scaled step; the step (n,)."""
+        """Sizes of the scaled residual (mean), of what linear theory leaves of it and of the scaled step; the step (n,)."""
         graph = self.terms.graph
         if not self.h:
             return [graph.zero] * (3 + self.terms.n_v)
         e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
         rows = self.J[: self.h]
-        size = total_magnitude(e) * self.unit
+        size = total_magnitude(e) * (self.unit / float(self.h))
         factor, term = self._regularised(rows, graph.apply("max", graph.constant(GENTLE), size))
         z = factor.solve(e)
         dz = times(transpose(rows, self.terms.n_v), z)

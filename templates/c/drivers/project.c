@@ -37,7 +37,7 @@ static int close_position(double t, double *restrict q, const double *restrict u
         }
         form_scaled(C + MH, s, w + AT_J);
         /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
-        const int status = factor_gram(MH, J, fmax(GENTLE, total_residual(C, s)), w + AT_G);
+        const int status = factor_gram(MH, J, fmax(GENTLE, mean_residual(C, s)), w + AT_G);
         if (status != 0 || last || has_settled(step, size, before)) {
             return status;
         }

@@ -1,11 +1,11 @@
-/* The sum of |C / s_c|. */
-static double total_residual(const double *restrict C, const double *restrict s)
+/* The mean of |C / s_c|. */
+static double mean_residual(const double *restrict C, const double *restrict s)
 {
     double total = 0.0;
     for (int i = 0; i < MH; i++) {
         total += fabs(C[i] / s[N + i]);
     }
-    return total;
+    return MH > 0 ? total / MH : 0.0;
 }
 
 /* What linear theory leaves of the scaled residual after the step -dz. */
