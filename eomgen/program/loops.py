@@ -96,7 +96,7 @@ class LoopBlocks:
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
-        """Sizes of the scaled residual (mean), of what linear theory leaves of it and of the scaled step; the step (n,)."""
+        """Mean scaled residual; sizes of what linear theory leaves of it, and of the scaled step; the step (n,)."""
         graph = self.terms.graph
         if not self.h:
             return [graph.zero] * (3 + self.terms.n_v)
