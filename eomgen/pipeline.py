@@ -194,6 +194,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
 
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
+    from .program import Limits
     from .program.build import build_program
     from .program.collect import collect_metadata, collect_terms
 
@@ -203,7 +204,8 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     kinematics.mechanism.require_values()
     require_inertia(kinematics, mobility, tree)
     metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
-    return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels)
+    limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
+    return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels, limits=limits)
 
 
 def compile_equations(

@@ -29,6 +29,8 @@ EXAMPLE_NAMES = (
     "cam_follower",
     "rolling_disc",
     "bicycle",
+    "bricard",
+    "n_four_bar",
 )
 #: Partly driven ones, which the Newton-Euler judge does not know.
 DRIVEN_NAMES = ("car_axis", "kapitza_pendulum")

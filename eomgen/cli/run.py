@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 TABLES = (".npz", ".csv")
 
 
+POINTS = 5  #: change points listed
+
+
 @click.command()
 @model_argument
 @native_option
@@ -186,6 +189,7 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance)
             "projected_velocity": residuals.velocity,
             "correction_velocity": residuals.correction_velocity,
         },
+        "change_points": [point._asdict() for point in trajectory.change_points],
         "energy": {key: None if value is None else finite(value) for key, value in energy._asdict().items()},
         "final": {"t": float(trajectory.t[-1]), **final},
     }
@@ -207,6 +211,10 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
             ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
             ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
         ]
+    points = trajectory.change_points
+    if points:
+        rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
+        rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
     kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
     rows.append(("energy", f"{change}{kept}"))

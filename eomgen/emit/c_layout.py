@@ -6,11 +6,23 @@ from ..program import Program
 from ..program.blocks import SHIFTS
 
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "project", "close", "project_drive"),
-    "rhs": ("scaled", "cholesky", "project", "close", "eliminate", "partition", "embed", "ldl", "accelerate", "rhs"),
+    "project": ("scaled", "cholesky", "residual_sizes", "project", "close", "project_drive"),
+    "rhs": (
+        "scaled",
+        "cholesky",
+        "residual_sizes",
+        "project",
+        "close",
+        "eliminate",
+        "partition",
+        "embed",
+        "ldl",
+        "accelerate",
+        "rhs",
+    ),
     "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
     "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
-    "outputs": ("scaled", "cholesky", "project", "close", "outputs_closed"),
+    "outputs": ("scaled", "cholesky", "residual_sizes", "project", "close", "outputs_closed"),
 }
 ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
 
@@ -52,6 +64,8 @@ def driver_files(program: Program) -> list[str]:
             needed = COLUMNS[driver.name]
         elif not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
+        elif driver.name == "rhs" and "dynamics" in driver.blocks:
+            needed = (*LOOPS["rhs"][:-1], "rhs_direct")
         elif driver.name == "jacobian":
             needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian")
         elif driver.name == "outputs" and "terms" in driver.blocks:
@@ -113,6 +127,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
+            ("CLOSING", n + 3 if "closing" in names else 0),
+            ("DYNAMICS", 2 * n + 1 if "dynamics" in names else 0),
         ]
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:

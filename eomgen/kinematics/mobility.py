@@ -26,6 +26,7 @@ from ..numeric.assembly import RESTARTS
 from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
+from .candidates import rate_candidates
 from .driving import close_driven, follow_drivers
 from .kinematics import Kinematics
 
@@ -73,6 +74,11 @@ class Mobility:
     restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
     n_positions: int = 0
+    instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
+    candidates: tuple[
+        tuple[str, float], ...
+    ] = ()  #: coordinates that can be independent there, with their conditioning
+    driven: bool = False  #: whether a constraint depends on time
 
 
 class ConstraintFunctions:
@@ -346,7 +352,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         )
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)
-    if wanted and quality < 1e-8 and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
+    at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
+    if wanted and not at_change_point and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
         better = [names[j] for j in choose_independent(jacobians, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
@@ -366,6 +373,9 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
         n_positions=len(functions.place.q) - max(rank(functions.place_jacobian(x)).rank for x in configurations),
+        instantaneous=n - ranks[0],
+        candidates=tuple((names[k], value) for k, value in rate_candidates(jacobians[0], chosen).items()),
+        driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
     )
 
 

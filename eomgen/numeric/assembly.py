@@ -131,6 +131,9 @@ class _Failure(NamedTuple):
                 "give initial values nearer to the wanted position"
             )
         gaps = "the largest gaps are " + ", ".join(f"{label} {gap:.3g}" for label, gap in self.open_rows())
+        contradiction = self._contradiction()
+        if contradiction:
+            return contradiction
         if not given:
             return (
                 f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
@@ -156,6 +159,32 @@ class _Failure(NamedTuple):
                 f"give fewer, or consistent ones such as {', '.join(near)}"
             )
         return f"the loops cannot close{self._with(given)}: {gaps}; a closed position nearby has {', '.join(near)}"
+
+    def _contradiction(self) -> str:
+        """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
+        m = len(self.system.position(self.best)[0])
+        labels = (list(self.labels) or [f"C[{i}]" for i in range(m)])[:m]
+        gaps = [(labels.index(label), label, gap) for label, gap in self.open_rows() if label in labels]
+        rows = [i for i, _, _ in gaps]
+        if not rows:
+            return ""
+        for start in starts(self.best, np.ones_like(self.system.free), self.system.scales, 3):
+            C, C_q = self.system.position(start)
+            J, e = self.system.scales.jacobian(C_q)[rows], self.system.scales.residual(C)[rows]
+            if not np.isfinite(J).all():
+                return ""
+            out_of_reach = np.linalg.svd(J)[0][:, rank(J).rank :]
+            if largest(out_of_reach.T @ e) <= 1e-6:
+                return ""
+        names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)
+        if len(gaps) == 1:
+            return (
+                f"the constraint {names} can never hold: no coordinate changes it; take it away, or correct its values"
+            )
+        return (
+            f"the constraints {names} contradict each other: they restrict the same motion and cannot hold together; "
+            "take one away, or make their values agree"
+        )
 
     def _with(self, given: list[str]) -> str:
         return f" with {', '.join(given)}" if given else ""

@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .projection import ACCEPTED, EXACT, SETTLED, TIKHONOV, largest
+from .projection import ACCEPTED, SETTLED, largest
 from .scales import Array, Position, Scales
 
+TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
+EXACT = 1e-14  #: scaled residual at which to stop at once
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
 LONGEST = 0.5  #: largest scaled step

@@ -82,7 +82,7 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
 def accelerate(terms: Terms, scales: Scales, system: Embedded) -> Array:
     """Accelerations a (n,) at a state on the manifold."""
     s = scales.q
-    a_p = system.split.particular(-scales.residual(terms.gamma))
+    a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales)[:, 0] / s if len(terms.gamma) else np.zeros(len(s))
     a = s * (a_p - system.solve(s * terms.h + system.M @ a_p))
     if not np.isfinite(a).all():
         raise NonFiniteError("the accelerations are not finite")

@@ -12,6 +12,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from .factor import exceeding, factorize, positivity, solve
 from .kernels import KERNELS, Sizes
+from .loops import LoopBlocks
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
 
@@ -45,6 +46,14 @@ class BlockMaker:
         """Whether the right-hand side is straight-line code."""
         small = self.sizes.n_v <= self.limits.unrolled
         return not self.has_loops and (small or self.terms.accelerations is not None)
+
+    @cached_property
+    def _loops(self) -> LoopBlocks | None:
+        """The straight-line form of a right-hand side with loops, if it is not too long."""
+        if not self.has_loops or not self.sizes.n_dof or not self.terms.mass_matrix:
+            return None
+        loops = LoopBlocks(self.terms)
+        return loops if loops.determined and loops.estimate() <= self.limits.unrolled_loops else None
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:
@@ -218,8 +227,9 @@ class BlockMaker:
             }[name]
         project = ("scales", "position", "rate")
         accelerate = ("terms",) if self.outputs_need_accelerations else ()
+        direct = ("closing", "dynamics") if self._loops is not None else ()
         return {
-            "rhs": (*project, "terms"),
+            "rhs": (*project, "terms", *direct),
             "jacobian": (*project, "terms", residual),
             "embedded_mass_matrix": ("scales", "position", "mass_matrix"),
             "project": project,
@@ -237,6 +247,12 @@ class BlockMaker:
                 return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
                 return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
+            case "closing":  # a Newton step
+                assert self._loops is not None
+                return self._internal(name, "q", self._loops.closing())
+            case "dynamics":  # v, a, whether the preferred partition is sound
+                assert self._loops is not None
+                return self._internal(name, "q v", *self._loops.dynamics())
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
             case "accelerated_outputs":

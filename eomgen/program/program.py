@@ -20,6 +20,7 @@ class Limits:
     """Sizes at which the generated code changes its form; every field changes the sources."""
 
     unrolled: int = 24  #: trees with at most so many velocities get a straight-line rhs, larger ones loops
+    unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
     statements: int = 1500  #: statements in one generated function at most
 

@@ -15,6 +15,7 @@ from .signals import Forcing
 from .trajectory import Residuals, Trajectory
 
 if TYPE_CHECKING:
+    from .change_points import ChangePoint
     from .module import Module
 
 
@@ -92,6 +93,13 @@ class Columns:
         """Kinetic, potential and total energy (3, n_t), whatever the model calls T and V."""
         T, V = self.module.energy(self.x, u=self._varying(), t=self.t)
         return np.array([T, V, T + V])
+
+    @cached_property
+    def change_points(self) -> list[ChangePoint]:
+        """Where the mobility changes on the way."""
+        from .change_points import find_change_points
+
+        return find_change_points(self.module, self.t, self.x, self.u)
 
 
 def record(module: Module, forcing: Forcing, solution: Solution, method: str, options: dict[str, Any]) -> Trajectory:

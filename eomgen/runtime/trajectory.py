@@ -16,6 +16,8 @@ from .names import require, unknown
 if TYPE_CHECKING:
     import pandas
 
+    from .change_points import ChangePoint
+
 
 class Residuals(NamedTuple):
     """Largest violation of the constraints over a run, all rows, redundant ones included."""
@@ -173,6 +175,22 @@ class Trajectory:
     def energies(self) -> Array:
         """Kinetic, potential and total energy (J), (3, n_t)."""
         return self._columns.energies
+
+    @property
+    def change_points(self) -> list[ChangePoint]:
+        """Moments at which the mechanism has more degrees of freedom than elsewhere, so that its motion may branch.
+
+        Each has a ``time``, the ``degrees_of_freedom`` there and the ``coordinates``.  The run itself goes straight on.
+
+        Raises
+        ------
+        UsageError
+            The trajectory was read from a file, without the model.
+        """
+        if not hasattr(self._columns, "change_points"):
+            raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
+        found: list[ChangePoint] = self._columns.change_points
+        return found
 
     @property
     def energy_drift(self) -> float:
