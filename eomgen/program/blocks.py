@@ -50,7 +50,7 @@ class BlockMaker:
     @cached_property
     def _loops(self) -> LoopBlocks | None:
         """The straight-line form of a right-hand side with loops, if it is not too long."""
-        if not self.has_loops or not self.sizes.n_dof or not self.terms.mass_matrix:
+        if not self.has_loops or not self.sizes.n_dof or not self.terms.mass_matrix or self.terms.given_rates:
             return None
         loops = LoopBlocks(self.terms)
         return loops if loops.determined and loops.estimate() <= self.limits.unrolled_loops else None
