@@ -173,7 +173,7 @@ class Initial:
             return None
         first = Initial(self.kernels).reference()
         try:
-            return follow_time(lambda t: Initial(self.kernels, t).position, first, self.scales, self.t)
+            return follow_time(lambda t: Initial(self.kernels, t).position, first, self.place, self.t)
         except AssemblyError:
             return None
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from .analyses import require_velocities
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -63,6 +65,7 @@ class KinematicAnalyses:
         from ..analysis.kinematic import analyse, read_range
 
         module: Any = self
+        require_velocities(module.layout)
         asked = read_range(module, t, led)
         if parameters is not None or inputs is not None:
             module = module.bind(parameters, inputs)
@@ -105,6 +108,7 @@ class KinematicAnalyses:
         from ..analysis.reaching import find_range
 
         module: Any = self
+        require_velocities(module.layout)
         if parameters is not None or inputs is not None:
             module = module.bind(parameters, inputs)
         return find_range(module, name, initial, t, within)
