@@ -34,7 +34,9 @@ def driver_files(program: Program) -> list[str]:
         space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
         files.update(dict.fromkeys(space if program.balls else ("space_plain",)))
     for driver in program.drivers:
-        if program.by_columns:
+        if "system" in driver.blocks:
+            needed = _system_files(program, driver.name, direct)
+        elif program.by_columns:
             needed = COLUMNS[driver.name]
         elif not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
@@ -46,6 +48,16 @@ def driver_files(program: Program) -> list[str]:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
     return list(files)
+
+
+def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """Files of a driver that solves the linear system of a method."""
+    solve = ("system_balance", "system_factor", "system_solve")
+    if name == "jacobian":
+        return (*solve, direct, "system_jacobian")
+    if program.has_loops and (program.projects or name == "outputs"):
+        return (*LOOPS["project"][:-1], *solve, f"system_{name}_closed")
+    return (*solve, f"system_{name}_given")
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
@@ -96,6 +108,16 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
+        ]
+    if "system" in names and program.system is not None:
+        size, places = len(program.system.unknowns), len(program.system.places)
+        lengths += [
+            ("SYSTEM", places + size),  # entries of K, r
+            ("LU", size * size),
+            ("ROW", size),  # scales
+            ("COLUMN", size),
+            ("DEFECT", size),
+            ("MOTION", n_q + n + size),  # q, v, z
         ]
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:

@@ -39,7 +39,7 @@ class BlockMaker:
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
         small = self.sizes.n_v <= self.limits.unrolled
-        return not self.has_loops and (small or self.terms.accelerations is not None)
+        return not self.has_loops and self.terms.system is None and (small or self.terms.accelerations is not None)
 
     @cached_property
     def outputs_need_accelerations(self) -> bool:
@@ -114,6 +114,7 @@ class BlockMaker:
             "a_i": tuple(terms.a[i] for i in independent),
             "q_guess": tuple(f"guess({q})" for q in terms.q),
             "multipliers": terms.multipliers,
+            "z": terms.system.unknowns if terms.system else (),
             "dq": tuple(f"d({q})" for q in terms.q),
             "dv": tuple(f"d({v})" for v in terms.v),
         }
@@ -173,6 +174,8 @@ class BlockMaker:
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         if self.terms.by_columns:
             return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
+        if self.terms.system and (name in ("rhs", "outputs") or (name == "jacobian" and not self.terms.projects)):
+            return self._system_needs(name, residual)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
             terms = ("mass_matrix", "bias", "scales")
             return {
@@ -191,6 +194,15 @@ class BlockMaker:
             "kinematics": (*project, "terms"),
         }[name]
 
+    def _system_needs(self, name: str, residual: str) -> tuple[str, ...]:
+        """What drivers need that solve the linear system of a method."""
+        closing = self.has_loops and (self.terms.projects or name == "outputs")
+        project = ("scales", "position", "rate") if closing else ()
+        if name == "outputs":
+            accelerate = ("system", "joint_accelerations") if self.outputs_need_accelerations else ()
+            return (*project, *accelerate, "accelerated_outputs")
+        return (*project, "system", "joint_accelerations", *((residual,) if name == "jacobian" else ()))
+
     def internal(self, name: str) -> Block:
         """A block that only drivers call; layouts in INTERFACES of the program stage (see the generated source)."""
         terms, n = self.terms, self.sizes.n_v
@@ -204,6 +216,12 @@ class BlockMaker:
                 return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
+            case "system":  # entries of K, then r
+                assert terms.system is not None
+                return self._internal(name, "q v", [*terms.system.entries, *terms.system.right])
+            case "joint_accelerations":
+                assert terms.system is not None
+                return self._internal(name, "q v z", terms.system.accelerations)
             case "accelerated_outputs":
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q

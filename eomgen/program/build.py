@@ -112,6 +112,8 @@ def build_program(
         coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
+        system=terms.system,
+        projects=terms.projects,
     )
 
 

@@ -60,6 +60,7 @@ class Layout:
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
+        self.projects = data.get("baumgarte") is None  #: whether rhs takes the projected state
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
