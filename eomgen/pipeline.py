@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .runtime.protocols import Core
 
 TARGETS = ("cython", "numpy", "c")
-OF_LAGRANGIANS = ("lagrange", "augmented")  #: methods that take a bare Lagrangian
+OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
 @contextmanager

@@ -34,7 +34,9 @@ def driver_files(program: Program) -> list[str]:
         space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
         files.update(dict.fromkeys(space if program.balls else ("space_plain",)))
     for driver in program.drivers:
-        if "system" in driver.blocks:
+        if driver.name == "dae_jacobian":
+            needed: tuple[str, ...] = ("dae_jacobian",)
+        elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
         elif program.by_columns:
             needed = COLUMNS[driver.name]
@@ -119,6 +121,8 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("DEFECT", size),
             ("MOTION", n_q + n + size),  # q, v, z
         ]
+    if "dae_tangent" in names:
+        lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

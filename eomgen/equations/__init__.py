@@ -1,6 +1,6 @@
 """Stage equations: Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
-from . import amalgamated, augmented, embedding, gibbs_appell, lagrange, newton_euler, recursive
+from . import amalgamated, augmented, embedding, gibbs_appell, hamilton, lagrange, newton_euler, recursive
 from .armature import with_armature
 from .equations import Method, TreeEquations
 
@@ -12,6 +12,7 @@ METHODS: dict[str, Method] = {
     "newton_euler": with_armature(newton_euler.derive),
     "amalgamated": with_armature(amalgamated.derive),
     "gibbs_appell": with_armature(gibbs_appell.derive),
+    "hamilton": hamilton.derive,
 }
 
 __all__ = ["METHODS", "Method", "TreeEquations"]

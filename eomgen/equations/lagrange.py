@@ -24,7 +24,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     """Lagrange's equations of the spanning tree, or of a bare Lagrangian."""
     graph = kinematics.graph
     q, v = list(kinematics.q), list(kinematics.v)
-    kinetic, potential = _energies(kinematics)
+    kinetic, potential = form_energies(kinematics)
     momentum = gradient(kinetic, v)
     drift = jvp(momentum, kinematics.flow | {kinematics.t: graph.one})
     total = kinematics.total_derivative(momentum)
@@ -34,7 +34,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     for _, j in kinematics.balls:
         w, p = (vec.vector(graph, x[j : j + 3]) for x in (v, momentum))
         slope[j : j + 3] = vec.sub(vec.vector(graph, slope[j : j + 3]), vec.cross(w, p))
-    applied = _generalized_forces(kinematics)
+    applied = generalized_forces(kinematics)
     entries = jacobian(momentum, v)
     n = len(v)
     return TreeEquations(
@@ -47,7 +47,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     )
 
 
-def _energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
+def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
     """T and V; of a bare Lagrangian V = -L(v = 0) and T = L + V."""
     bare = kinematics.mechanism.lagrangian
     graph = kinematics.graph
@@ -72,7 +72,7 @@ def _energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
     return 0.5 * kinetic, potential
 
 
-def _generalized_forces(kinematics: Kinematics) -> list[Expr]:
+def generalized_forces(kinematics: Kinematics) -> list[Expr]:
     """Q of everything without a potential, by virtual power: Q = sum F . d(velocity)/dv."""
     graph, n = kinematics.graph, len(kinematics.v)
     velocities: list[Expr] = []

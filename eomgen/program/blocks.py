@@ -11,7 +11,7 @@ from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from .factor import exceeding, factorize, positivity, solve
-from .kernels import KERNELS, Sizes
+from .kernels import DAE, KERNELS, Sizes
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
 
@@ -91,6 +91,27 @@ class BlockMaker:
             r2.append(r)
         return r2
 
+    @cached_property
+    def _dae_residual(self) -> list[Expr]:
+        """F: kinematics with corrections (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985), forces, positions, rates."""
+        terms = self.terms
+        v = self._symbols(terms.v)
+        moved = list(v)
+        for row, mu in zip(terms.constraint_jacobian, self._symbols(self.port("corrections").symbols), strict=False):
+            moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
+        flow = substitute(terms.rates or v, dict(zip(v, moved, strict=True)))
+        rates = self._symbols(self.port("q_rate").symbols)
+        kinematic = [r - f for r, f in zip(rates, flow, strict=True)]
+        return [*kinematic, *self._force_residual, *terms.constraints, *terms.velocity_constraints]
+
+    def _dae_tangent(self) -> Block:
+        given = [self.port(name) for name in DAE]
+        y = [symbol for port in given for symbol in port.symbols]
+        along = Port("directions", tuple(f"d({symbol})" for symbol in y))
+        seeds = dict(zip(self._symbols(y), self._symbols(along.symbols), strict=True))
+        outputs = tuple(jvp(self._dae_residual, seeds))
+        return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
+
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
         q = self._symbols(self.terms.q)
@@ -115,6 +136,11 @@ class BlockMaker:
             "q_guess": tuple(f"guess({q})" for q in terms.q),
             "multipliers": terms.multipliers,
             "z": terms.system.unknowns if terms.system else (),
+            "corrections": tuple(f"correction[{i}]" for i in range(self.sizes.n_h)),
+            "q_rate": tuple(f"rate({q})" for q in terms.q),
+            "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
+            "correction_rates": tuple(f"rate(correction[{i}])" for i in range(self.sizes.n_h)),
+            "cj": ("cj",),
             "dq": tuple(f"d({q})" for q in terms.q),
             "dv": tuple(f"d({v})" for v in terms.v),
         }
@@ -141,6 +167,8 @@ class BlockMaker:
             "loop_coordinates": lambda: terms.loop_coordinates,
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
             "alignment": lambda: terms.alignment,
+            "canonical": lambda: terms.canonical,
+            "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
         }
@@ -171,6 +199,8 @@ class BlockMaker:
 
     def drivers_need(self, name: str) -> tuple[str, ...]:
         """Names of the blocks behind a public kernel that is not straight-line code."""
+        if name == "dae_jacobian":
+            return ("dae_tangent",)
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         if self.terms.by_columns:
             return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
@@ -226,6 +256,8 @@ class BlockMaker:
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self._residual_jacobian())
+            case "dae_tangent":  # dF along (dy, dy')
+                return self._dae_tangent()
             case "mass_times":  # M a
                 along = {a: a for a in self._symbols(terms.a)}
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))

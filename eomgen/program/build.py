@@ -133,6 +133,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_a=len(terms.alignment),
         n_com=3 if terms.centroidal else 0,
         n_e=len(terms.finite_forces),
+        n_m=len(terms.canonical) // 2,
+        n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 
 

@@ -63,6 +63,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         pivots=equations.pivots,
         system=equations.system,
         projects=c.stabilised is None,
+        canonical=equations.canonical,
     )
 
 

@@ -24,6 +24,8 @@ class Sizes:
     n_a: int
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
     n_e: int = 0
+    n_m: int = 0  #: momenta: n_v by method hamilton, else 0
+    n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,9 @@ class Kernel:
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
 CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
 
+#: y, then y', of which only the rates of q and v are there
+DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
+
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
     Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
@@ -75,5 +80,8 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_m), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
+    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

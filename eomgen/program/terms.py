@@ -62,6 +62,7 @@ class SystemTerms:
     accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
+    canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property

@@ -71,7 +71,7 @@ class Drivers:
             names += ["rhs", *(["outputs"] if "accelerated_outputs" in blocks else [])]
             if not layout.projects and ("residual_jacobian" in blocks or "residual_tangent" in blocks):
                 names.append("jacobian")
-        self.names = tuple(names)
+        self.names = (*names, *(["dae_jacobian"] if "dae_tangent" in blocks else []))
         self._scales: tuple[Array, Scales] | None = None
 
     def make(self, name: str) -> Callable[..., Array]:
@@ -169,6 +169,11 @@ class Drivers:
         z = system.solve(flat[places:])
         a = self.blocks["joint_accelerations"](t, np.concatenate([x, z]), u, c)
         return np.asarray(a, dtype=float), z, system
+
+    def _dae_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        n = self.layout.n_dae
+        along = np.vstack([np.repeat(x[: 2 * n, None], n, axis=1), np.eye(n), x[2 * n] * np.eye(n)])
+        return np.asarray(self.blocks["dae_tangent"](t, along, u, c), dtype=float)
 
     def _jacobian_given(self, t: float, x: Array, u: Array, c: Array) -> Array:
         """The derivative of a right-hand side that does not project: K [da; dl] = -[dr1; dr2]."""
