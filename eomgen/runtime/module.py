@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .forms import Forms
 from .kernels import Kernels, Rows
 from .layout import Layout, number
 from .momenta import Momenta
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module(Momenta):
+class Module(Momenta, Forms):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
@@ -367,8 +368,6 @@ class Module(Momenta):
         from .simulate import simulate
 
         return simulate(self, span, initial, parameters, inputs, method=method, **options)
-
-    # description
 
     def report(self) -> str:
         """What the model is made of, as text."""

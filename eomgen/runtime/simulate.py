@@ -104,10 +104,10 @@ def simulate(
         solver = choose_solver(method)
         title = solver.__name__
         check_options(solver, options, OPTIONS)
-    start, end = _span(span, float(declared["end"]))
+    start, end = find_span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
-    x0 = _initial_state(bound, initial, start)
+    x0 = find_state(bound, initial, start)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     run = _Run(bound, forcing)
     tolerances = {
@@ -120,7 +120,7 @@ def simulate(
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end), end]
-    stored = None if t_eval is None else _times(t_eval, start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
     try:
         if compiled:
             solution, failure = integrate_compiled(
@@ -228,7 +228,7 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
 
 
-def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
     if span is None:
         return 0.0, declared
     if np.ndim(span) == 0:
@@ -239,7 +239,7 @@ def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[fl
     return float(pair[0]), float(pair[1])
 
 
-def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
+def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
     times = np.array(t_eval, dtype=float)
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)
@@ -249,7 +249,7 @@ def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
     return times
 
 
-def _initial_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+def find_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):
