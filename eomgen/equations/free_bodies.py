@@ -91,9 +91,7 @@ class FreeBodies:
         self.base: Twist = vec.zero(self.graph), vec.neg(kinematics.mechanism.gravity)
         self.products = self._products()
         self.loads = []
-        for link, twist, applied in zip(
-            kinematics.links, kinematics.twists, applied_wrenches(kinematics), strict=True
-        ):
+        for link, twist, applied in zip(kinematics.links, kinematics.twists, applied_wrenches(kinematics), strict=True):
             self.loads.append(sub(cross_wrench(twist, link.spatial.times(*twist)), applied))
         self.forces = [self.graph.zero] * len(kinematics.v)
         self.along_cut: dict[str, Expr] = {}
@@ -276,5 +274,3 @@ def _differentiate(
     found = substitute([*flat, *jvp(rates, flow)], here)
     rows = tuple(tuple(found[6 * i : 6 * i + 6]) for i in range(len(values)))
     return len(closure), rows, tuple(found[6 * len(values) :])
-
-

@@ -1,4 +1,4 @@
-"""Stage equations: Kinematics -> the equations of Newton and Euler in absolute accelerations and reactions of all joints.
+"""Stage equations: Kinematics -> Newton-Euler equations in absolute accelerations and the reactions of all joints.
 
 Every body is set free and every joint, of the tree and cut ones alike, replaced by its reaction (Shabana,
 Computational Dynamics, ch. 3 and sec. 7.6).  Unknowns are the six accelerations of each body, the six components of

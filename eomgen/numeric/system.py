@@ -55,7 +55,7 @@ class Pattern:
         balanced = row[:, None] * K * column
         balanced[self.relaxed] -= RELAXATION
         try:
-            inverse = np.linalg.inv(balanced)
+            inverse: Array = np.asarray(np.linalg.inv(balanced), dtype=np.float64)
         except np.linalg.LinAlgError:
             inverse = np.full((1, 1), np.inf)
         if not np.abs(inverse).max(initial=0.0) <= 1.0 / PIVOT:

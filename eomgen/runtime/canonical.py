@@ -1,4 +1,4 @@
-"""Stage runtime: z = [q; p], coordinates and momenta -> Hamilton's canonical equations of a model and its Hamiltonian."""
+"""Stage runtime: z = [q; p], coordinates and momenta -> the canonical equations of a model and its Hamiltonian."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Canonical:
         layout = module.layout
         if layout.n_m != layout.n_v:
             raise UsageError(
-                f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no canonical "
-                "variables; derive it with method='hamilton'"
+                f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "
+                "derive it with method='hamilton'"
             )
         self._module = module
         self.p_names = tuple(f"p_{name}" for name in layout.freedoms)
@@ -90,7 +90,9 @@ class Canonical:
         try:
             L = np.linalg.cholesky(N.T @ M @ N)
         except np.linalg.LinAlgError:
-            raise SingularMassMatrixError("the mass matrix is singular: momenta determine no velocities", t, q) from None
+            raise SingularMassMatrixError(
+                "the mass matrix is singular: momenta determine no velocities", t, q
+            ) from None
         y = np.linalg.solve(L.T, np.linalg.solve(L, right))
         return np.concatenate([q, s * (least + N @ y)])
 

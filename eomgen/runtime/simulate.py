@@ -229,6 +229,7 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
 
 
 def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
     if np.ndim(span) == 0:
@@ -240,6 +241,7 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
 
 
 def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
+    """The times wanted, in order and within the span, or a UsageError."""
     times = np.array(t_eval, dtype=float)
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)
@@ -250,6 +252,7 @@ def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
 
 
 def find_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected."""
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):
