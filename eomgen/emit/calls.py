@@ -54,7 +54,7 @@ def describe_calls(program: Program) -> list[Call]:
         Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
         Call("dae.residual(t, y, yp)", _shape(unknowns), "F(t, y, y') of y = [q; v; multipliers; corrections]"),
         Call("dae.jacobian(t, y, yp, cj)", _shape(unknowns, unknowns), "dF/dy + cj dF/dy'"),
-        Call("dae.initial(x)", f"2 x {_shape(unknowns)}", "consistent y and y' of a state"),
+        Call("dae.initial(x)", f"{_shape(unknowns)}, {_shape(unknowns)}", "consistent y and y' of a state"),
         Call("canonical.rhs(t, z)", _shape(s.n_x), "z' of z = [q; p] by Hamilton's equations"),
         Call("canonical.of(x)", _shape(s.n_x), "z of a state x"),
         Call("canonical.expand(z)", _shape(s.n_x), "x with these momenta"),

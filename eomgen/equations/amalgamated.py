@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..kinematics import Kinematics
 from .equations import LinearSystem, TreeEquations
 from .free_bodies import FreeBodies, cut_joints, scaled, sub
-from .newton_euler import Forces, Unknowns, free_body_equations
+from .free_body_system import Forces, Unknowns, free_body_equations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

@@ -18,11 +18,11 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..graph.substitute import substitute
+from ..graph.symmetric import solve_with_pivots
 from ..kinematics import Kinematics
 from ..kinematics.loads import drive_inertias
-from .dense import solve_with_pivots
+from .energies import form_energies, generalized_forces
 from .equations import Rows, TreeEquations
-from .lagrange import form_energies, generalized_forces
 
 WRITTEN = 24  #: velocities up to which H is written out
 

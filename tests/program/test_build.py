@@ -20,16 +20,16 @@ def names(program):
 
 def test_a_small_tree_has_its_right_hand_side_on_the_graph(systems):
     blocks, drivers = names(systems.chain(3).program())
-    assert drivers == ["jacobian"]
+    assert drivers == ["jacobian", "dae_jacobian"]
     assert {"rhs", "outputs", "project", "kinematics", "embedded_mass_matrix", "residual_jacobian"} < set(blocks)
     assert not {"terms", "position", "rate", "accelerated_outputs"} & set(blocks)
 
 
 def test_a_large_tree_and_a_loop_have_drivers(systems):
     blocks, drivers = names(systems.chain(3).program(limits=Limits(unrolled=2)))
-    assert drivers == ["rhs", "jacobian", "outputs"]
+    assert drivers == ["rhs", "jacobian", "outputs", "dae_jacobian"]
     blocks, drivers = names(systems.slider_crank().program())
-    assert drivers == ["rhs", "jacobian", "embedded_mass_matrix", "project", "outputs", "kinematics"]
+    assert drivers == ["rhs", "jacobian", "embedded_mass_matrix", "project", "outputs", "kinematics", "dae_jacobian"]
     assert {"terms", "position", "rate", "residual_jacobian", "accelerated_outputs", "scales"} < set(blocks)
     blocks, _ = names(systems.slider_crank().program(limits=Limits(jacobian_nodes=10)))
     assert "residual_tangent" in blocks

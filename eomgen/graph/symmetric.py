@@ -1,10 +1,10 @@
-"""Stage equations: symmetric positive definite systems on the graph."""
+"""Symmetric positive definite systems of expressions -> their solution."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..graph.core import Expr
+from .core import Expr
 
 
 def solve_with_pivots(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
