@@ -113,8 +113,9 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ]
     if "system" in names and program.system is not None:
         size, places = len(program.system.unknowns), len(program.system.places)
+        relaxed = len(program.system.relaxed)
         lengths += [
-            ("SYSTEM", places + size),  # entries of K, r
+            ("SYSTEM", places + size + relaxed),  # entries of K, r, sizes of constraints
             ("LU", size * size),
             ("ROW", size),  # scales
             ("COLUMN", size),

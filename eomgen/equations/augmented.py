@@ -43,6 +43,7 @@ def _system(kinematics: Kinematics, tree: TreeEquations) -> LinearSystem:
         entries=tuple(entries[place] for place in places),
         right=(*(-h for h in tree.bias), *(-g for g in c.gamma)),
         relaxed=tuple((n + i, n + i) for i in range(m)),
+        sizes=tuple(kinematics.length_scale if kind == "length" else graph.one for kind in c.kinds),
         accelerations=tuple(symbols[:n]),
     )
 

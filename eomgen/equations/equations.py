@@ -25,6 +25,8 @@ class LinearSystem:
     right : r
     relaxed : (row, column) of constraint equations and their reactions.  Where constraints are redundant, K is
         singular; solvers subtract a small number there and refine the result until K z = r holds.
+    sizes : per place in ``relaxed`` the typical size of the constraint, of parameters only.  Entries of a redundant
+        equation may be nothing but rounding, so that these equations are not scaled by the size of their entries.
     accelerations : (n_v,) a in terms of z and the state
     """
 
@@ -33,6 +35,7 @@ class LinearSystem:
     entries: tuple[Expr, ...]
     right: tuple[Expr, ...]
     relaxed: tuple[tuple[int, int], ...]
+    sizes: tuple[Expr, ...]
     accelerations: tuple[Expr, ...]
 
 
@@ -40,6 +43,7 @@ def linear_system(
     residuals: Sequence[Expr],
     unknowns: Sequence[Expr],
     relaxed: Sequence[tuple[int, int]],
+    sizes: Sequence[Expr],
     accelerations: Sequence[Expr],
 ) -> LinearSystem:
     """The system whose residuals K z - r are given, linear in the symbols z."""
@@ -52,6 +56,7 @@ def linear_system(
         entries=tuple(entries[place] for place in places),
         right=tuple(-r for r in substitute(list(residuals), still)),
         relaxed=tuple(relaxed),
+        sizes=tuple(sizes),
         accelerations=tuple(accelerations),
     )
 

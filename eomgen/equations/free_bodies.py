@@ -168,10 +168,15 @@ class CutJoint:
     pose: Frame  #: S in P
     rows: Rows  #: (closure equations, then measured coordinates; 6)
     rest: tuple[Expr, ...]  #: C'' less W times the rate of V
-    closing: int  #: number of closure equations
+    kinds: tuple[str, ...]  #: 'length' or 'angle' for each closure equation
     bend: Twist  #: what relative motion adds to the rate of V
     loads: tuple[Expr, ...]  #: along the measured coordinates
     inertia: Expr | None  #: of the drive on the first of them
+
+    @property
+    def closing(self) -> int:
+        """Number of closure equations."""
+        return len(self.kinds)
 
     def accelerations(self, motions: Sequence[Twist], base: Twist) -> list[Expr]:
         """C'' and y'' in terms of the accelerations of the links."""
@@ -226,7 +231,7 @@ def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
     above = seen_from(pose, first)
     relative = sub(second, above)
     measured = any(name in bodies.along_cut for name in spec.coordinates) or spec.armature is not None
-    closing, rows, rest = _differentiate(bodies, spec, pose, relative, measured)
+    kinds, rows, rest = _differentiate(bodies, spec, pose, relative, measured)
     return CutJoint(
         outer=links[0],
         inner=links[1],
@@ -235,7 +240,7 @@ def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
         pose=pose,
         rows=rows,
         rest=rest,
-        closing=closing,
+        kinds=kinds,
         bend=cross_motion(relative, above),
         loads=tuple(bodies.along_cut.get(name, graph.zero) for name in spec.coordinates) if measured else (),
         inertia=spec.armature,
@@ -249,7 +254,7 @@ def _twist(kinematics: Kinematics, frame: Frame, link: int) -> Twist:
 
 def _differentiate(
     bodies: FreeBodies, spec: JointSpec, pose: Frame, relative: Twist, measured: bool
-) -> tuple[int, Rows, tuple[Expr, ...]]:
+) -> tuple[tuple[str, ...], Rows, tuple[Expr, ...]]:
     """W and W' V of the closure equations, and of the coordinates if they are needed, as functions of the pose.
 
     R' = R [omega] and p' = R v for a twist (omega, v) in S axes.
@@ -264,8 +269,8 @@ def _differentiate(
     turned, moved = vec.product(R, cross), vec.times(R, (twist[3], twist[4], twist[5]))  # type: ignore[arg-type]
     for i in range(3):
         flow |= dict(zip(R[i], turned[i], strict=True)) | {p[i]: moved[i]}
-    closure = [c.expression for c in spec.joint.closure(graph, R, p)]  # type: ignore[arg-type]
-    values = closure + (spec.joint.measure(graph, R, p) if measured else [])  # type: ignore[arg-type]
+    closure = spec.joint.closure(graph, R, p)  # type: ignore[arg-type]
+    values = [c.expression for c in closure] + (spec.joint.measure(graph, R, p) if measured else [])  # type: ignore[arg-type]
     rates = jvp(values, flow)
     entries = jacobian(rates, twist)
     flat = [entries.get((i, j), graph.zero) for i in range(len(values)) for j in range(6)]
@@ -273,4 +278,4 @@ def _differentiate(
     here |= dict(zip(p, pose.position, strict=True)) | dict(zip(twist, (*relative[0], *relative[1]), strict=True))
     found = substitute([*flat, *jvp(rates, flow)], here)
     rows = tuple(tuple(found[6 * i : 6 * i + 6]) for i in range(len(values)))
-    return len(closure), rows, tuple(found[6 * len(values) :])
+    return tuple(c.kind for c in closure), rows, tuple(found[6 * len(values) :])

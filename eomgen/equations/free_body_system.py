@@ -119,4 +119,8 @@ class Forces:
     def solve(self, residuals: Sequence[Expr], closing: Sequence[Expr], a: Sequence[Expr]) -> LinearSystem:
         """The system of all equations, the constraints last."""
         relaxed = [(len(residuals) + k, self.first + k) for k in range(len(closing))]
-        return linear_system([*residuals, *closing], self.unknowns.symbols, relaxed, a)
+        kinematics = self.bodies.kinematics
+        kinds = [kind for cut in self.cuts for kind in cut.kinds]
+        kinds += [kinematics.constraints.kinds[i] for i in self.rows]
+        sizes = [kinematics.length_scale if kind == "length" else self.bodies.graph.one for kind in kinds]
+        return linear_system([*residuals, *closing], self.unknowns.symbols, relaxed, sizes, a)

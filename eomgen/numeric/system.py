@@ -36,8 +36,18 @@ class Pattern:
         relaxed = np.array(described["relaxed"], dtype=np.intp).reshape(-1, 2)
         self.relaxed = relaxed[:, 0], relaxed[:, 1]
 
-    def factor(self, entries: Array) -> Factored:
+    def factor(self, entries: Array, sizes: Array) -> Factored:
         """Balance and invert K.
+
+        Rows and columns are scaled until their largest entries are about 1; those of constraints by one common factor
+        beside their sizes, since a redundant constraint may have no entries but rounding.
+
+        Parameters
+        ----------
+        entries : array
+            At the places of the pattern.
+        sizes : array
+            Typical sizes of the constraints, one per relaxed place.
 
         Raises
         ------
@@ -47,11 +57,15 @@ class Pattern:
         K[self.places] = entries
         if not np.isfinite(K).all():
             raise NonFiniteError("the equations of motion are not finite")
-        row, column = np.ones(self.size), np.ones(self.size)
+        scales = np.ones(self.size), np.ones(self.size)
+        for scale, constraints in zip(scales, self.relaxed, strict=True):
+            scale[constraints] /= sizes
+        row, column = scales
         for k in range(8):  # D. Ruiz, RAL-TR-2001-034
             largest = np.abs(row[:, None] * K * column).max(axis=1 - k % 2)
-            scale = (row, column)[k % 2]
-            scale /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
+            constraints = self.relaxed[k % 2]
+            largest[constraints] = largest[constraints].max(initial=0.0)
+            scales[k % 2][:] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
         balanced = row[:, None] * K * column
         balanced[self.relaxed] -= RELAXATION
         try:

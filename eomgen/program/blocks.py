@@ -246,9 +246,10 @@ class BlockMaker:
                 return self._internal(name, "q", [*terms.constraints, *flat(terms.constraint_jacobian)])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
-            case "system":  # entries of K, then r
+            case "system":  # entries of K, then r, then sizes of the constraints
                 assert terms.system is not None
-                return self._internal(name, "q v", [*terms.system.entries, *terms.system.right])
+                system = terms.system
+                return self._internal(name, "q v", [*system.entries, *system.right, *system.sizes])
             case "joint_accelerations":
                 assert terms.system is not None
                 return self._internal(name, "q v z", terms.system.accelerations)

@@ -165,8 +165,9 @@ class Drivers:
         """Accelerations (n_v,) at a state by the method's linear system, all its unknowns, and its factors."""
         flat = np.asarray(self.blocks["system"](t, x, u, c), dtype=float)
         places = len(self.pattern.places[0])
-        system = self.pattern.factor(flat[:places])
-        z = system.solve(flat[places:])
+        entries, r, sizes = np.split(flat, [places, places + self.pattern.size])
+        system = self.pattern.factor(entries, sizes)
+        z = system.solve(r)
         a = self.blocks["joint_accelerations"](t, np.concatenate([x, z]), u, c)
         return np.asarray(a, dtype=float), z, system
 
