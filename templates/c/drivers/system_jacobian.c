@@ -2,13 +2,13 @@
 static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
-    int pivot[NZ];
+    int plan[3 * NZ];
     double *const dq = w + AT_DQ, *const dv = w + AT_DV, *const r = w + AT_ALONG, *const rates = w + AT_RATES;
     double *const z = w + AT_MOTION + NQ + N;
     for (int k = 0; k < NQ + N; k++) {
         w[AT_X + k] = x[k];
     }
-    int status = accelerate_system(t, u, c, pivot, w + AT_ACC, w);
+    int status = accelerate_system(t, u, c, plan, w + AT_ACC, w);
     for (int k = 0; k < M; k++) {
         w[AT_L + k] = z[N + k];
     }
@@ -23,7 +23,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
         for (int k = 0; k < NZ; k++) {
             r[k] = -r[k];
         }
-        status = solve_system(r, pivot, z, w);
+        status = solve_system(r, plan, z, w);
         change_rates(x, dq, dv, rates);
         for (int k = 0; k < NQ; k++) {
             out[k * (NQ + N) + column] = rates[k];

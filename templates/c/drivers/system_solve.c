@@ -1,18 +1,17 @@
 /* d = (L U)^-1 d */
-static void substitute_system(const double *restrict lu, const int *restrict pivot, double *restrict d)
+static void substitute_system(const double *restrict lu, const int *restrict plan, double *restrict d)
 {
+    const int *const last = plan + NZ, *const deep = plan + 2 * NZ;
     for (int k = 0; k < NZ; k++) {
-        const double entry = d[pivot[k]];
-        d[pivot[k]] = d[k];
+        const double entry = d[plan[k]];
+        d[plan[k]] = d[k];
         d[k] = entry;
-    }
-    for (int i = 0; i < NZ; i++) {
-        for (int j = 0; j < i; j++) {
-            d[i] -= lu[i * NZ + j] * d[j];
+        for (int i = k + 1; i <= deep[k]; i++) {
+            d[i] -= lu[i * NZ + k] * entry;
         }
     }
     for (int i = NZ - 1; i >= 0; i--) {
-        for (int j = i + 1; j < NZ; j++) {
+        for (int j = i + 1; j <= last[i]; j++) {
             d[i] -= lu[i * NZ + j] * d[j];
         }
         d[i] /= lu[i * NZ + i];
@@ -21,7 +20,7 @@ static void substitute_system(const double *restrict lu, const int *restrict piv
 
 /* K z = r by steps with the factors of the relaxed K: the proximal point method, which of all solutions with redundant
    constraints finds the one of least multipliers. Ends when the defect no longer halves. */
-static int solve_system(const double *restrict r, const int *restrict pivot, double *restrict z, double *restrict w)
+static int solve_system(const double *restrict r, const int *restrict plan, double *restrict z, double *restrict w)
 {
     const double *const K = w + AT_SYSTEM, *const row = w + AT_ROW, *const column = w + AT_COLUMN;
     double *const d = w + AT_DEFECT;
@@ -48,7 +47,7 @@ static int solve_system(const double *restrict r, const int *restrict pivot, dou
             return 0;
         }
         before = size;
-        substitute_system(w + AT_LU, pivot, d);
+        substitute_system(w + AT_LU, plan, d);
         for (int i = 0; i < NZ; i++) {
             z[i] += column[i] * d[i];
         }
@@ -57,14 +56,14 @@ static int solve_system(const double *restrict r, const int *restrict pivot, dou
 }
 
 /* Accelerations a (N) of the state in w + AT_X; leaves z behind q and v in w + AT_MOTION, and the factors. */
-static int accelerate_system(double t, const double *restrict u, const double *restrict c, int *restrict pivot,
+static int accelerate_system(double t, const double *restrict u, const double *restrict c, int *restrict plan,
                              double *restrict a, double *restrict w)
 {
     (void)system_block(t, w + AT_X, u, c, w + AT_SYSTEM, w);
     balance_system(w);
-    int status = factor_system(w, pivot);
+    int status = factor_system(w, plan);
     if (status == 0) {
-        status = solve_system(w + AT_SYSTEM + PLACES, pivot, w + AT_MOTION + NQ + N, w);
+        status = solve_system(w + AT_SYSTEM + PLACES, plan, w + AT_MOTION + NQ + N, w);
     }
     for (int k = 0; k < NQ + N; k++) {
         w[AT_MOTION + k] = w[AT_X + k];
