@@ -76,10 +76,9 @@ def derive(
     Parameters
     ----------
     model : Model
-    method : {'auto', 'embedding', 'lagrange', 'recursive', 'augmented', 'newton_euler', 'amalgamated', \
-'gibbs_appell', 'hamilton'}
-        ``auto`` takes, of a tree, embedding or recursive, whichever has the right-hand side of fewer operations;
-        embedding where there are loops; lagrange of a bare Lagrangian.
+    method : str
+        One of ``equations.METHODS``, or ``auto``: of a tree, embedding or recursive, whichever has the right-hand side
+        of fewer operations; embedding where there are loops; lagrange of a bare Lagrangian.
     independent : names of coordinates, optional
         The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
     baumgarte : (alpha, beta), optional

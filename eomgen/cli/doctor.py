@@ -23,6 +23,7 @@ CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.
 OPTIONAL = {
     "matplotlib": ("plot", "plots"),
     "pandas": ("results", "tables of results"),
+    "scikit-sundae": ("sundials", "IDA, a solver of differential-algebraic equations"),
     "ziglang": ("compiler", "a C compiler from pip"),
     "mujoco": ("robots", "MJCF files"),
     "ipykernel": ("notebook", "Jupyter notebooks"),

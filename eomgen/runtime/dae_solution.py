@@ -35,7 +35,7 @@ def integrate_dae(
     options: Mapping[str, Any],
 ) -> Trajectory:
     """One run; see :meth:`~.dae.Dae.solve`."""
-    ida = require("sksundae.ida", '"eomgen[sundials]" (scikit-sundae)', "dae.solve")
+    ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
