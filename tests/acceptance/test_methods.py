@@ -197,11 +197,29 @@ def test_models_against_newton_euler_with_multipliers(module: Callable[..., Any]
     "name", [*models.EXAMPLE_NAMES, "offset_slider_crank", "spatial_loop", "skewed_four_bar", "three_cranks"]
 )
 def test_forms_against_newton_euler_with_multipliers(module: Callable[..., Any], name: str) -> None:
-    """Every other form, redundant and nonholonomic rows included, on the states of the test before."""
-    forms = [models.build(name).compile(method, target="numpy", kernels=["rhs"]) for method in FORMS]
+    """Every other form, redundant and nonholonomic rows included; M, h and M a + h are those of embedding too."""
+    kernels = ["rhs", "mass_matrix", "bias", "inverse_dynamics"]
+    forms = [models.build(name).compile(method, target="numpy", kernels=kernels) for method in FORMS]
     rigid = judges.rigid_bodies(models.build(name).mechanism())
-    for x in judges.random_states(module(name), 5, 4):
+    states = judges.random_states(module(name), 5, 3)
+    for form in forms:
+        compare(form, module(name), states, np.random.default_rng(6), t=0.3)
+    for x in states:
         judge(module(name), rigid, x, FORCES.get(name), forms)
+
+
+@pytest.mark.parametrize("seed", [3, 8, 21, 34, 55])
+def test_forms_on_random_mechanisms_against_newton_euler_with_multipliers(seed: int) -> None:
+    """Trees and loops, planar and spatial, of mixed joints either way round; redundant rows where a loop is planar."""
+    made = random_mechanism(
+        seed, 2 + seed % 3, planar=seed % 5 == 3, reverse=True, forces=False, loop=seed % 2 == 0 or seed == 3
+    )
+    mod = derived(made, "embedding").compile(target="numpy")
+    forms = [derived(made, method).compile(target="numpy", kernels=["rhs"]) for method in FORMS]
+    rigid = judges.RigidBodies(made.masses, made.centers, made.inertias, made.gravity)
+    assert mod.n_dof
+    for x in states_of(mod, seed, 2):
+        judge(mod, rigid, x, others=forms)
 
 
 # MuJoCo

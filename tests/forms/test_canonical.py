@@ -44,17 +44,17 @@ def test_the_spherical_pendulum_of_the_textbooks() -> None:
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank", "rolling_disc", "three_cranks"])
 def test_the_motion_is_that_of_the_state_form(name: str) -> None:
     """Trees, loops, redundant and nonholonomic rows: q(t) of [q; p] equals q(t) of [q; v] of another method."""
-    mod, other = models.build(name).compile("hamilton"), models.build(name).compile("embedding")
+    mod, other = (models.build(name).compile(method, target="numpy") for method in ("hamilton", "embedding"))
     form, n = mod.canonical, mod.n_q
     z0 = form.z0()
     np.testing.assert_allclose(form.expand(z0), mod.x0(), rtol=1e-12, atol=1e-12)
     options = {"rtol": 1e-10, "atol": 1e-12, "method": "DOP853"}
-    end = 0.4
+    end = 0.2
     z = solve_ivp(form.rhs, (0.0, end), z0, **options).y[:, -1]
     x = other.project(solve_ivp(other.rhs, (0.0, end), other.x0(), **options).y[:, -1])
     found = form.expand(z, end)
     assert np.abs(found - x).max() <= 1e-8 * np.abs(x).max()
-    assert np.abs(x[:n] - mod.x0()[:n]).max() > 0.05
+    assert np.abs(x[:n] - mod.x0()[:n]).max() > 0.02
 
 
 @pytest.mark.parametrize("name", ["four_bar", "spherical_pendulum"])

@@ -57,14 +57,14 @@ def test_compiled_residual_and_jacobian_equal_those_in_numpy() -> None:
 
 @pytest.mark.parametrize(
     ("name", "end", "first", "last"),
-    [("slider_crank", 1.0, 1e-5, 1e-7), ("four_bar", 1.0, 1e-4, 1e-6), ("andrews_squeezer", 0.03, 1e-4, 1e-6)],
+    [("slider_crank", 0.5, 1e-5, 1e-7), ("four_bar", 1.0, 1e-4, 1e-6), ("andrews_squeezer", 0.03, 1e-4, 1e-6)],
 )
 def test_ida_finds_the_trajectories_of_embedding(name: str, end: float, first: float, last: float) -> None:
     """A real solver of differential-algebraic equations on F alone: the difference falls with its tolerance."""
     pytest.importorskip("sksundae")
-    mod = models.build(name).compile()
+    mod = models.build(name).compile(target="cython" if name == "andrews_squeezer" else "numpy")
     times = np.linspace(0.0, end, 13)
-    ours = mod.simulate((0.0, end), t_eval=times, rtol=1e-11, atol=1e-13)
+    ours = mod.simulate((0.0, end), t_eval=times, rtol=1e-10, atol=1e-12)
     assert np.ptp(ours.x, axis=1).max() > 1.0
     errors = []
     for rtol in (1e-7, 1e-9):
