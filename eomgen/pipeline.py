@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .runtime.protocols import Core
 
 TARGETS = ("cython", "numpy", "c")
+OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
 @contextmanager
@@ -63,22 +64,30 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
         return "lagrange"
     if method not in ("auto", *METHODS):
         raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
-    if bare and method != "lagrange":
-        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, lagrange")
+    if bare and method not in OF_LAGRANGIANS:
+        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, {', '.join(OF_LAGRANGIANS)}")
     return method
 
 
-def derive(model: Model, method: str = "auto", independent: Sequence[str] | None = None) -> Equations:
+def derive(
+    model: Model,
+    method: str = "auto",
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+) -> Equations:
     """Derive the equations of motion of a model.
 
     Parameters
     ----------
     model : Model
-    method : {'auto', 'embedding', 'lagrange', 'recursive'}
-        ``auto`` takes, of a tree, embedding or recursive, whichever has the right-hand side of fewer operations;
-        embedding where there are loops; lagrange of a bare Lagrangian.
+    method : str
+        One of ``equations.METHODS``, or ``auto``: of a tree, embedding or recursive, whichever has the right-hand side
+        of fewer operations; embedding where there are loops; lagrange of a bare Lagrangian.
     independent : names of coordinates, optional
         The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
+    baumgarte : (alpha, beta), optional
+        Of the augmented form (1/s): C'' + 2 alpha C' + beta^2 C = 0 holds instead of C'' = 0, and the right-hand side
+        does not project its states.
 
     Raises
     ------
@@ -98,6 +107,8 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     with _without_collection(), _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
         mobility = _judge(kinematics, independent or ())
+    if baumgarte is not None:
+        kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _without_collection(), _timed(seconds, "equations"):
         choice: Choice | None = None
         if chosen == GIVEN:
@@ -109,6 +120,23 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
         else:
             tree, choice = choose(kinematics)
     return Equations(kinematics, mobility, tree, seconds, choice)
+
+
+def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:
+    """Kinematics with Baumgarte's terms, of the method that takes them."""
+    from .equations.augmented import stabilise
+
+    if method != "augmented":
+        raise UsageError(f"baumgarte belongs to method 'augmented', not {method!r}; the others project their states")
+    try:
+        alpha, beta = (float(x) for x in baumgarte)
+    except (TypeError, ValueError):
+        raise UsageError(f"baumgarte must be two numbers (alpha, beta) in 1/s, not {baumgarte!r}") from None
+    if not (0.0 <= alpha < float("inf") and 0.0 <= beta < float("inf")):
+        raise UsageError(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
+    if not kinematics.constraints.labels:
+        raise UsageError("baumgarte stabilises constraints, and this model has none")
+    return stabilise(kinematics, alpha, beta)
 
 
 def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
@@ -272,6 +300,7 @@ def generate(
     method: str = "auto",
     target: str = "cython",
     independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/`` and return that path.
 
@@ -285,7 +314,7 @@ def generate(
     from .emit import emit_package
     from .emit.write import write_package
 
-    equations = derive(model, method, independent)
+    equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
     sources = emit_package(program, target)
     return write_package(sources, Path(directory) / equations.name)

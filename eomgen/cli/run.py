@@ -12,6 +12,7 @@ from ..errors import UsageError
 from .derive import print_operations, summary
 from .failures import after_integration, reports_failures
 from .options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -43,6 +44,7 @@ POINTS = 5  #: change points listed
 @model_argument
 @native_option
 @method_option
+@baumgarte_option
 @independent_option
 @target_option("cython", "numpy")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
@@ -63,6 +65,7 @@ def run(
     model: Path,
     allow_native: bool,
     method: str,
+    baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
     end: float | None,
@@ -91,7 +94,7 @@ def run(
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
         complete_parameters(described, chosen)
-        equations = pipeline.derive(described, method, independent or None)
+        equations = pipeline.derive(described, method, independent or None, baumgarte)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)

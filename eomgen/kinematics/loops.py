@@ -37,6 +37,7 @@ class Constraints:
     aligned_joints: tuple[str, ...] = ()
     vanishing: tuple[str, ...] = ()
     declared: int = 0  #: rows before the vanishing ones were left out
+    stabilised: tuple[float, float] | None = None  #: alpha and beta, where gamma holds 2 alpha C' + beta^2 C
 
     @property
     def nonholonomic(self) -> int:

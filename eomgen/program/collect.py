@@ -67,6 +67,9 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
+        system=equations.system,
+        projects=c.stabilised is None,
+        canonical=equations.canonical,
     )
 
 
@@ -178,6 +181,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             for name, limits in zip(j.coordinates, j.limits, strict=False)
             if limits
         },
+        "system": _system(equations),
+        "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
         "simulation": {
             "end": m.simulation.end,
@@ -185,6 +190,19 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "rtol": m.simulation.rtol,
             "atol": m.simulation.atol,
         },
+    }
+
+
+def _system(equations: TreeEquations) -> dict[str, Any] | None:
+    """Where the entries of the linear system of a method stand, if it solves one."""
+    system = equations.system
+    if system is None:
+        return None
+    return {
+        "size": len(system.unknowns),
+        "rows": [i for i, _ in system.places],
+        "columns": [j for _, j in system.places],
+        "relaxed": [list(place) for place in system.relaxed],
     }
 
 

@@ -35,6 +35,20 @@ def require_velocities(layout: Layout) -> None:
         )
 
 
+def require_projection(layout: Layout) -> None:
+    """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not layout.projects:
+        raise UsageError(
+            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project, and its "
+            "derivatives by inputs and parameters are not derived; derive without baumgarte for analyses"
+        )
+
+
 class Analyses:
     """Part of :class:`~.module.Module`: one call for each analysis."""
 
@@ -44,6 +58,7 @@ class Analyses:
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
         require_velocities(self.kernels.layout)
+        require_projection(self.kernels.layout)
         return self.kernels.timed("input_jacobian")
 
     @cached_property
@@ -54,6 +69,7 @@ class Analyses:
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
         require_velocities(self.kernels.layout)
+        require_projection(self.kernels.layout)
         return self.kernels.timed("parameter_jacobian")
 
     def linearise(

@@ -65,11 +65,14 @@ class Layout:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_com: int = data.get("n_com", 0)
+        self.n_m: int = data.get("n_m", 0)
+        self.n_dae: int = data.get("n_dae", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.n_e = len(self.fragile_forces)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
+        self.projects = data.get("baumgarte") is None  #: whether rhs takes the projected state
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
@@ -120,9 +123,9 @@ class Layout:
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
-        return {"q": self.n_q, "x": self.n_x, "motion": self.n_q + 2 * self.n_v, "none": 0}.get(
-            KERNELS[kernel][0], 3 * self.n_dof + self.n_q
-        )
+        motion, dae = self.n_q + 2 * self.n_v, 2 * self.n_dae
+        sizes = {"q": self.n_q, "x": self.n_x, "motion": motion, "none": 0, "dae": dae, "dae_cj": dae + 1}
+        return sizes.get(KERNELS[kernel][0], 3 * self.n_dof + self.n_q)
 
     def shape(self, kernel: str) -> tuple[int, ...]:
         """Shape of a kernel's result for one state."""
@@ -224,5 +227,8 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
     "needed_wrenches": ("motion", ("n_s",)),
     "wrench_geometry": ("q", ("n_w",)),
+    "canonical": ("x", (2, "n_m")),
+    "dae_residual": ("dae", ("n_dae",)),
+    "dae_jacobian": ("dae_cj", ("n_dae", "n_dae")),
     "scales": ("none", ("n_v+n_c",)),
 }

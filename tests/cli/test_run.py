@@ -27,8 +27,8 @@ def test_what_is_printed(call: Call) -> None:
 def test_json(call: Call) -> None:
     run = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1", "--json").json
     assert set(run) == {
-        "name", "method", "choice", "report", "operations", "seconds", "integration", "loop_residual", "energy",
-        "change_points", "final", "files",
+        "name", "method", "choice", "system", "report", "operations", "seconds", "integration", "loop_residual",
+        "energy", "change_points", "final", "files",
     }  # fmt: skip
     assert set(run["seconds"]) >= {"describe", "kinematics", "equations", "compile", "simulate"}
     assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls", "jacobians"}
