@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
+    from ..analysis.drive import ActuatorForces
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
     from ..analysis.sensitivities import Sensitivities
@@ -296,3 +297,44 @@ class Analyses:
         from ..analysis.reactions import driving_forces
 
         return driving_forces(self, t, x, p, u)  # type: ignore[arg-type]
+
+    def actuator_forces(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        a: Mapping[str, ArrayLike] | ArrayLike | None = None,
+        *,
+        actuated: Sequence[str] | None = None,
+        p: Any = None,
+        u: Any = None,
+    ) -> ActuatorForces:
+        """Constrained inverse dynamics: the forces of chosen drives that make a motion, loops closed.
+
+        Parameters
+        ----------
+        t : float or (k,) array
+        x : (n_x,) or (n_x, k) array
+            States; projected onto the constraints first.
+        a : mapping of str to float or (k,) array, or (n_v,) or (n_v, k) array, optional
+            Accelerations: those of the independent coordinates by name (others 0), from which the rest follows, or all
+            of them, which must obey the constraints.  By default the independent accelerations are 0.
+        actuated : sequence of str, optional
+            What is driven: coordinates of the tree or of cut joints, whose forces come on top of the model's own, or
+            inputs in which forces are linear, whose whole values are found.  By default the independent coordinates.
+        p, u : optional
+            As for ``bind``.
+
+        Returns
+        -------
+        ActuatorForces
+            ``forces["theta"]``, ``forces.forces`` (n,) or (n, k), ``multipliers``, ``reactions``.  With more drives
+            than freedoms the smallest forces in the sense of least squares, each weighted by its effect.
+
+        Raises
+        ------
+        UsageError
+            An unknown name; accelerations that break the constraints; drives that cannot make the motion.
+        """
+        from ..analysis.drive import find_forces
+
+        return find_forces(self, t, x, a, actuated=actuated, p=p, u=u)  # type: ignore[arg-type]

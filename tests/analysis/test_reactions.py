@@ -54,7 +54,15 @@ def test_every_body_of_random_loops(seed: int, planar: bool) -> None:
         check_balance(module, made.mechanism, x)
 
 
-LOOPS = ["slider_crank", "four_bar", "tilted_four_bar", "skewed_four_bar", "three_cranks", "spatial_loop", "peaucellier"]
+LOOPS = [
+    "slider_crank",
+    "four_bar",
+    "tilted_four_bar",
+    "skewed_four_bar",
+    "three_cranks",
+    "spatial_loop",
+    "peaucellier",
+]
 
 
 @pytest.mark.parametrize("name", LOOPS)
