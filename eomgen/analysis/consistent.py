@@ -79,7 +79,7 @@ def _metric(
     layout = module.layout
     if weights == "mass":
         try:
-            return np.linalg.cholesky(module.mass_matrix(q, t=t))
+            return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
                 "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass"
@@ -129,7 +129,7 @@ def _positions(
         step = np.zeros(layout.n_v)
         step[free] = np.linalg.solve(L.T, correction)
         longest = largest(step / scales.q)
-        if longest <= STILL and size <= ACCEPTED or size <= EXACT and longest <= 1e3 * STILL:
+        if (longest <= STILL and size <= ACCEPTED) or (size <= EXACT and longest <= 1e3 * STILL):
             return q
         q = _move(layout, q, step * min(1.0, DAMPING / longest))
     C = module.constraints(q, t=t, rows="all") / scales.c[:n_h]
