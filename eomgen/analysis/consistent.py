@@ -1,7 +1,7 @@
 """Analysis: any state -> the nearest one on the constraints, near in a metric of one's own, with values held.
 
-Least change of positions, d^T W d with C = 0, by steps of sequential quadratic programming; then of velocities, in one
-linear step (Blajer, Elimination of constraint violation and accuracy aspects in numerical simulation of multibody
+Least change of positions, d^T W d with C = 0, by steps along the constraints and back onto them; then of velocities, in
+one linear step (Blajer, Elimination of constraint violation and accuracy aspects in numerical simulation of multibody
 systems, Multibody System Dynamics 7 (2002), 265-284, has W = M).
 """
 
@@ -22,8 +22,10 @@ from ..runtime.layout import Layout
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-STEPS = 200  #: at most; they gain a constant factor each, the larger the nearer the state
-STILL = 1e-13  #: scaled step at which the nearest position is found
+STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
+CLOSING = 25  #: Newton steps onto the constraints, at most
+STILL = 1e-12  #: scaled step along the constraints at which the nearest position is found
+RANK = 1e-9  #: relative to the largest singular value of the scaled constraint Jacobian
 DAMPING = 0.5  #: largest scaled step
 
 
@@ -115,29 +117,59 @@ def _positions(
     if not n_h:
         return start
     L = _metric(module, start, t, weights, layout.freedoms)[np.ix_(free, free)]
-    scales, q, size = layout.scales, start, np.inf
-    for _ in range(STEPS):
-        C = module.constraints(q, t=t, rows="all") / scales.c[:n_h]
-        size = largest(C)
-        if not np.isfinite(size):
-            raise ProjectionError("the constraints are not finite on the way to a consistent position")
-        J = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
-        J = np.linalg.solve(L, J.T).T
-        d = _difference(layout, q, start)[free]
-        y = L.T @ d
-        correction = -y + J.T @ gram_solve(J, J @ y - C, max(TIKHONOV, size))
+    scales = layout.scales
+
+    def rows(q: Array) -> tuple[Array, Array]:
+        C_q = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
+        return module.constraints(q, t=t, rows="all") / scales.c[:n_h], np.linalg.solve(L, C_q.T).T
+
+    def moved(q: Array, y: Array) -> Array:
         step = np.zeros(layout.n_v)
-        step[free] = np.linalg.solve(L.T, correction)
+        step[free] = np.linalg.solve(L.T, y)
         longest = largest(step / scales.q)
-        if (longest <= STILL and size <= ACCEPTED) or (size <= EXACT and longest <= 1e3 * STILL):
-            return q
-        q = _move(layout, q, step * min(1.0, DAMPING / longest))
-    C = module.constraints(q, t=t, rows="all") / scales.c[:n_h]
-    if largest(C) <= ACCEPTED:
-        return q
-    worst = layout.constraint_labels[int(np.abs(C).argmax())]
-    kept = f" with {', '.join(held)} held" if held else ""
-    raise ProjectionError(f"no consistent position was found{kept}: {worst} is left open by {largest(C):.2g} (scaled)")
+        return _move(layout, q, step * min(1.0, DAMPING / longest) if longest else step)
+
+    def close(q: Array) -> Array | None:
+        """The nearest closed position to first order, None if there is none near by."""
+        before = np.inf
+        for _ in range(CLOSING):
+            C, J = rows(q)
+            size = largest(C)
+            if size <= EXACT or (size <= ACCEPTED and size > 0.5 * before):
+                return q
+            if not np.isfinite(size) or not J.any():
+                return None
+            q, before = moved(q, -J.T @ gram_solve(J, C, max(TIKHONOV, size))), size
+        return None
+
+    def change(q: Array) -> Array:
+        return np.asarray(L.T @ _difference(layout, q, start)[free])
+
+    q = close(start)
+    if q is None:
+        kept = f" with {', '.join(held)} held" if held else ""
+        C, _ = rows(start)
+        worst = layout.constraint_labels[int(np.abs(C).argmax())]
+        raise ProjectionError(
+            f"no consistent position was found{kept}: {worst} is open by {largest(C):.2g} (scaled) in the state given"
+        )
+    share = 1.0
+    for _ in range(STEPS if free.any() else 0):
+        _, J = rows(q)
+        _, sizes, Vt = np.linalg.svd(J, full_matrices=False)
+        across = Vt[sizes > RANK * sizes[0]]
+        y = change(q)
+        slope = y - across.T @ (across @ y)
+        if largest(np.linalg.solve(L.T, slope) / scales.q[free]) <= STILL:
+            break
+        trial = close(moved(q, -share * slope))
+        if trial is not None and float(change(trial) @ change(trial)) < float(y @ y):
+            q, share = trial, min(1.0, 2.0 * share)
+        elif share < STILL:
+            break
+        else:
+            share *= 0.5
+    return q
 
 
 def _velocities(
