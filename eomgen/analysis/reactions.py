@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .constrained import States, prepare, solve_multipliers
+from .constrained import States, evaluate, prepare, solve_multipliers
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -202,15 +202,13 @@ def reactions(
 ) -> Array:
     """See :meth:`~..runtime.analyses.Analyses.reactions`."""
     joint_table(module)
-    states = prepare(module, t, x, p, u)
-    return states.shaped(find_reactions(states)[0], out)
+    return evaluate(lambda states: find_reactions(states)[0], module, t, x, p, u, out)
 
 
 def undetermined_reactions(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
     """See :meth:`~..runtime.analyses.Analyses.undetermined_reactions`."""
     joint_table(module)
-    states = prepare(module, t, x, p, u)
-    return states.shaped(find_reactions(states)[1])
+    return evaluate(lambda states: find_reactions(states)[1], module, t, x, p, u)
 
 
 def driving_forces(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:

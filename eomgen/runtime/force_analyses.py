@@ -39,7 +39,7 @@ class ForceAnalyses:
         x : (n_x,) or (n_x, k) array
             States; projected onto the constraints first.
         p, u, out : optional
-            As for every kernel.
+            As for every kernel; u may also be (n_u, k), inputs of each state.
 
         Returns
         -------
@@ -60,7 +60,7 @@ class ForceAnalyses:
         x : (n_x,) or (n_x, k) array
             States; projected onto the constraints first.
         p, u, out : optional
-            As for every kernel.
+            As for every kernel; u may also be (n_u, k), inputs of each state.
 
         Returns
         -------

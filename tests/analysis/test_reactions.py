@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -170,6 +174,42 @@ def test_targets_batches_and_shapes(name: str, compiled: Callable[..., Any]) -> 
         assert getattr(one, call)(0.0, x, out=out) is out
         np.testing.assert_array_equal(out, many)
     assert one.undetermined_reactions(0.0, x).dtype == bool
+
+
+def test_inputs_that_change_from_state_to_state(compiled: Callable[..., Any]) -> None:
+    module = compiled("slider_crank")
+    x = np.array(judges.random_states(module, 1, 3)).T
+    u = np.array([[0.0, 2.0, -5.0]])
+    found = module.reactions(0.0, x, u=u)
+    for k in range(3):
+        np.testing.assert_allclose(found[..., k], module.reactions(0.0, x[:, k], u=u[:, k]), atol=1e-10)
+    assert np.abs(found[..., 2] - module.reactions(0.0, x[:, 2])).max() > 1.0
+    with pytest.raises(eg.EomgenError, match=r"u must have shape \(1,\), or \(1, k\) for k states"):
+        module.multipliers(0.0, x, u=np.zeros((1, 2)))
+
+
+ALONE = """
+import json, sys
+sys.modules["scipy"] = sys.modules["eomgen"] = None
+import slider_crank as model
+x = model.x0()
+hit = model.impact(0.0, x, lock=["s"])
+found = [model.reactions(0.0, x), model.multipliers(0.0, x), model.actuator_forces(0.0, x).forces, hit.impulses,
+         model.consistent(x + 0.05)]
+print(json.dumps([y.tolist() for y in found]))
+"""
+
+
+def test_an_exported_package_has_them_with_numpy_alone(tmp_path: Path, compiled: Callable[..., Any]) -> None:
+    pipeline.generate(models.build("slider_crank"), tmp_path, target="numpy")
+    done = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    mod = compiled("slider_crank")
+    x = mod.x0()
+    here = [mod.reactions(0.0, x), mod.multipliers(0.0, x), mod.actuator_forces(0.0, x).forces,
+            mod.impact(0.0, x, lock=["s"]).impulses, mod.consistent(x + 0.05)]  # fmt: skip
+    for theirs, ours in zip(json.loads(done.stdout), here, strict=True):
+        np.testing.assert_allclose(theirs, ours, atol=1e-9)
 
 
 def test_what_is_refused(compiled: Callable[..., Any]) -> None:
