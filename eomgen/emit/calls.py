@@ -68,6 +68,11 @@ def describe_calls(program: Program) -> list[Call]:
         Call("linearise(x=None, t=0.0)", "Linearisation", "A, B, C, D along the constraints, eigenvalues"),
         Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
         Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
+        Call("multipliers(t, x)", _shape(s.n_c), "l of all constraint rows in M v' + h + C_q^T l = 0"),
+        Call("reactions(t, x)", _shape(len(program.metadata.get("joint_names", ())), 6), "force and moment in joints"),
+        Call("actuator_forces(t, x, a, actuated=None)", "ActuatorForces", "forces of drives that make a motion"),
+        Call("impact(t, x, {gap: restitution})", "Impact", "the state after an impact, impulses"),
+        Call("consistent(x, t=0.0)", _shape(s.n_x), "the nearest state on the constraints, in any metric"),
         Call("sensitivities(names, span)", "Sensitivities", "a run with its derivatives; needs SciPy"),
     ]
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
@@ -75,7 +80,8 @@ def describe_calls(program: Program) -> list[Call]:
     calls = [call for call in calls if s.n_m or not call.text.startswith("canonical")]
     sums = ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
     kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
-    return [call for call in kept if s.n_c or "constraint" not in call.text]
+    kept = [call for call in kept if s.n_s or not call.text.startswith("reactions")]
+    return [call for call in kept if s.n_c or not ("constraint" in call.text or call.text.startswith("multipliers"))]
 
 
 def _shape(*sizes: int) -> str:
