@@ -170,7 +170,7 @@ class _Writer:
 
     def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
         name = self.joints[joint.name]
-        self._add("forces", self.names.link(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
+        self._add("forces", self.names.made(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
 
     def _spring(self, joint: Joint) -> None:
         if joint.type == "revolute":
@@ -229,7 +229,7 @@ class _Writer:
                 terms.insert(0, (drive.gain, name))
             law = " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
             for q, c in parts if law else ():
-                force = self.names.link(f"{name}_drive")
+                force = self.names.made(f"{name}_drive")
                 self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
 
 
