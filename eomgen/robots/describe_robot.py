@@ -14,7 +14,7 @@ from .names import Names, clean_model_name
 from .placement import Inertia, Placement, numbers
 from .robot import Joint, Options, Robot
 from .ties import Sum, Tie, describe_tie
-from .tree import GROUND, Bodies, Body, build_bodies
+from .tree import GROUND, Bodies, Body, build_bodies, find_tied
 
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
@@ -44,6 +44,7 @@ class _Writer:
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
+        self.tied = find_tied(robot, found)
 
     def describe(self) -> Description:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
@@ -151,7 +152,8 @@ class _Writer:
         if joint.initial or joint.start:
             start = [joint.initial] if joint.start is None else self._start(joint.start)
             reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
-            known = self.out.values.setdefault("initial", {})
+            # what an equality moves only starts its assembly: the file's pose may not satisfy it
+            known = self.out.values.setdefault("guess" if joint.name in self.tied else "initial", {})
             known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
         chosen = self.options.actuate
         if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
@@ -197,12 +199,12 @@ class _Writer:
         loose = []
         for joint in self.robot.joints.values():
             law = joint.mimic
-            if law is None or joint.type == "weld":
+            if law is None:
                 continue
             if self.options.mimic == "coupling":
                 sums = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
                 ties.append(Tie(f"{joint.name}_mimic", *sums, (law.offset, law.factor), joint.place))
-            else:
+            elif joint.type != "weld":
                 loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
         if loose:
             remedy = "mimic='coupling' ties them"
