@@ -11,7 +11,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
-from .build_equations import build_equations, declare_equations
+from .build_equations import build_equations, check_energies, declare_equations
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -90,6 +90,7 @@ def build(description: Description) -> Mechanism:
     numbers = {p.name: p.value for p in parameters if p.value is not None}
     check_bodies(bodies, numbers, faults)
     check_turns(constraints, numbers, faults)
+    check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
     if faults:

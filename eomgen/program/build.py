@@ -61,6 +61,7 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
+    has["energy"] = bool(metadata.get("energy_known", True))
     if terms.given_rates:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]

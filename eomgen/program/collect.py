@@ -165,6 +165,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "velocity_kinds": list(kinematics.velocity_kinds),
         "balls": [list(ball) for ball in kinematics.balls],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
+        **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),
