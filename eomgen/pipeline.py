@@ -19,6 +19,7 @@ from .equations import GIVEN, METHODS, TreeEquations, take_given
 from .errors import AssemblyError, EvaluationError, ModelError, UsageError
 from .graph.evaluate import compile_evaluator
 from .kinematics import Kinematics, analyse
+from .kinematics.loads import drives_cut_joint
 from .kinematics.mobility import ConstraintFunctions, Mobility, judge
 from .kinematics.report import MechanismReport, report
 
@@ -115,7 +116,7 @@ def derive(
             tree = take_given(kinematics)
         elif chosen != "auto":
             tree = METHODS[chosen](kinematics)
-        elif kinematics.constraints.labels:
+        elif kinematics.constraints.labels or drives_cut_joint(kinematics):
             tree = METHODS["embedding"](kinematics)
         else:
             tree, choice = choose(kinematics)

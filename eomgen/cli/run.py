@@ -170,7 +170,7 @@ def final_names(trajectory: Trajectory) -> list[str]:
     return list(dict.fromkeys([*header["x_names"], *loops, *header["y_names"]]))
 
 
-def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance) -> dict[str, Any]:
+def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
     """A run as plain values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     final = {name: finite(trajectory[name][-1]) for name in final_names(trajectory)}
@@ -193,12 +193,25 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance)
             "correction_velocity": residuals.correction_velocity,
         },
         "change_points": [point._asdict() for point in trajectory.change_points],
-        "energy": {key: None if value is None else finite(value) for key, value in energy._asdict().items()},
+        "energy": energy and {k: None if value is None else finite(value) for k, value in energy._asdict().items()},
         "final": {"t": float(trajectory.t[-1]), **final},
     }
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
+def _energy_rows(energy: EnergyBalance | None) -> list[tuple[str, str]]:
+    if energy is None:
+        return [("energy", "not known: the equations have no kinetic_energy")]
+    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
+    if energy.work:
+        return [
+            ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
+            ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
+        ]
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    return [("energy", f"{change}{kept}")]
+
+
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None) -> None:
     """Statistics of a run, its residuals, its energy and its final values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
@@ -218,13 +231,7 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
     if points:
         rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
         rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
-    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
-    rows.append(("energy", f"{change}{kept}"))
-    if energy.work:
-        rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
-        rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))
-    print_rows(rows)
+    print_rows(rows + _energy_rows(energy))
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
     print_rows(
         [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]

@@ -61,6 +61,7 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
+    has["energy"] = bool(metadata.get("energy_known", True))
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates:

@@ -12,6 +12,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
+from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
@@ -56,7 +57,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         constraint_scales=tuple(scale[kind] for kind in c.kinds),
         n_dof=mobility.n_dof,
         preferred=tuple(kinematics.freedoms.index(n) for n in mobility.independent),
-        parent=kinematics.parent,
+        parent=_pattern(kinematics),
         centroidal=tuple(_centroidal(kinematics)),
         balls=kinematics.balls,
         rates=kinematics.rates if kinematics.balls or kinematics.given_rates else (),
@@ -71,6 +72,13 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         projects=c.stabilised is None,
         canonical=equations.canonical,
     )
+
+
+def _pattern(kinematics: Kinematics) -> tuple[int, ...]:
+    """The tree that says where M is zero: one chain, hence nowhere, if a drive on a cut joint ties its branches."""
+    if drives_cut_joint(kinematics):
+        return tuple(range(-1, len(kinematics.v) - 1))
+    return kinematics.parent
 
 
 def _centroidal(kinematics: Kinematics) -> list[Expr]:
@@ -160,6 +168,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "velocity_kinds": list(kinematics.velocity_kinds),
         "balls": [list(ball) for ball in kinematics.balls],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
+        **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "alignment_labels": list(c.aligned_joints),

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
 
 
+ENERGY = (
+    "the energy of the model {!r} is not known: its equations of motion are given without kinetic_energy; "
+    "give equations.kinetic_energy, and potential_energy where forces have one"
+)
+
+
 class Kernels:
     """The calls of one model, sharing one set of parameters and inputs.
 
@@ -69,7 +75,10 @@ class Kernels:
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
         if name not in self.core.names:
-            return Missing(name, f"model {self.layout.name!r} was generated without the kernel {name!r}")
+            if name == "energy" and not self.layout.energy_known:
+                return Missing(name, ENERGY.format(self.layout.name))
+            message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
+            return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
     def _culprit(self, status: int, t: float, x: Array) -> str:
@@ -116,7 +125,7 @@ class Missing:
         ------
         UsageError
         """
-        raise UsageError(f"{self.message}; compile again with kernels=None for all, or name it in kernels")
+        raise UsageError(self.message)
 
 
 class Rows:

@@ -56,6 +56,7 @@ class Layout:
             self.freedoms = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
+        self.energy_known: bool = data.get("energy_known", True)
         self.n_g: int = data.get("n_g", 0)
         self.n_s: int = data.get("n_s", 0)
         self.n_w: int = data.get("n_w", 0)
