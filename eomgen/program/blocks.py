@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import exceeding, factorize, positivity, solve
+from .factor import exceeding, factorize, outward, positivity, solve
 from .kernels import KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
@@ -76,7 +76,7 @@ class BlockMaker:
             pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
-            checks = one if len(pivots) == 1 else exceeding(pivots, pivots)
+            checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
             return list(terms.accelerations), [*self._turned, *checks]
         factor = factorize(terms.mass_matrix, terms.parent)
         checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
