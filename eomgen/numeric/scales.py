@@ -18,6 +18,9 @@ Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 Rate: TypeAlias = Callable[[Array], Array]
 
 
+ROUNDED = 64.0 * float(np.finfo(float).eps)  #: of a coordinate, and of what it goes into
+
+
 class Scales(NamedTuple):
     """Typical sizes: the length scale L of the mechanism for lengths, 1 for angles; of rows that a user wrote the
     length of their scaled gradient.
@@ -30,6 +33,7 @@ class Scales(NamedTuple):
     q: Array  #: (n,) of the velocities, times a second
     c: Array  #: (m,) of the constraint rows, holonomic ones first
     space: Space | None = None  #: where q' = N(q) v, how coordinates move with velocities
+    long: Array | None = None  #: (n,) 1.0 for velocities of lengths, 0.0 for those of angles
 
     @classmethod
     def of_kinds(
@@ -41,6 +45,7 @@ class Scales(NamedTuple):
             np.array([unit.get(kind, 1.0) for kind in velocities]),
             np.array([unit.get(row, 1.0) if isinstance(row, str) else float(row) for row in rows]),
             space,
+            np.array([float(kind == "length") for kind in velocities]),
         )
 
     def resized(self, C_q: Array, rows: Indices) -> Scales:
@@ -56,6 +61,18 @@ class Scales(NamedTuple):
     def residual(self, C: Array) -> Array:
         """The scaled residual e = C / s_c, (m,), of all rows or the first."""
         return C / self.c[: len(C)]
+
+    def rounding(self, q: Array, J: Array) -> Array:
+        """What is left of the scaled residual (m,) by rounding of q alone, as between bodies on an orbit.
+
+        64 eps |J| |q / s|; Euler parameters do not count.
+        """
+        if self.space is None:
+            sizes = np.abs(q) if len(q) == len(self.q) else np.zeros(len(self.q))
+        else:
+            sizes = np.zeros(len(self.q))
+            sizes[self.space.plain_v] = np.abs(q[self.space.plain_q])
+        return np.asarray(ROUNDED * np.abs(J) @ (sizes / self.q))
 
     def move(self, q: Array, dz: Array) -> Array:
         """The coordinates (n_q,) a scaled step (n,) away."""

@@ -252,7 +252,8 @@ class BlockMaker:
                 return self._internal(name, "q", self._loops.closing())
             case "dynamics":  # v, a, whether the preferred partition is sound
                 assert self._loops is not None
-                return self._internal(name, "q v", *self._loops.dynamics())
+                outputs, checks = self._loops.dynamics()
+                return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
             case "accelerated_outputs":

@@ -98,12 +98,14 @@ def exceeding(pivots: Sequence[Expr], sizes: Sequence[Expr]) -> list[Expr]:
     for entry in rest:
         largest = _larger(largest, entry)
     nothing = largest * NOTHING
-    conditions = [graph.apply("lt", nothing, d) for d in pivots]
-    return conditions + [
-        graph.apply("lt", size * SINGULAR, d)
-        for size, d in zip(sizes, pivots, strict=True)
-        if not (size - d).is_zero  # its own size
-    ]
+    conditions = []
+    for size, d in zip(sizes, pivots, strict=True):
+        reduced = not (size - d).is_zero
+        if reduced:
+            conditions.append(graph.apply("lt", size * SINGULAR, d))
+        if len(sizes) > 1 or not reduced:
+            conditions.append(graph.apply("lt", nothing, d))
+    return conditions
 
 
 def outward(pivots: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
