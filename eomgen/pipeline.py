@@ -12,15 +12,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from .derivation import Equations
-from .equations import GIVEN, METHODS, TreeEquations, take_given
-from .errors import AssemblyError, EvaluationError, ModelError, UsageError
-from .graph.evaluate import compile_evaluator
+from .equations import GIVEN, METHODS, take_given
+from .equations.positive import require_inertia
+from .errors import AssemblyError, UsageError
 from .kinematics import Kinematics, analyse
 from .kinematics.loads import drives_cut_joint
-from .kinematics.mobility import ConstraintFunctions, Mobility, judge
+from .kinematics.mobility import Mobility, judge
 from .kinematics.report import MechanismReport, report
 
 if TYPE_CHECKING:
@@ -166,59 +164,6 @@ def check(model: Model) -> MechanismReport:
     equations.kinematics.mechanism.require_values()
     require_inertia(equations.kinematics, equations.mobility, equations.tree)
     return report(equations.kinematics, equations.mobility)
-
-
-def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
-    """Refuse a degree of freedom that moves no mass at any configuration tried.
-
-    The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
-    as Euler angles make it, a run that gets there says so.
-
-    Raises
-    ------
-    ModelError
-        Names the coordinates that move nothing.
-    """
-    m, names = kinematics.mechanism, kinematics.freedoms
-    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
-    functions = ConstraintFunctions(kinematics, numbers)
-    n, r = len(names), mobility.rank
-    if n == r:
-        return
-    if tree.pivots:
-        moved = compile_evaluator(list(tree.pivots), (*kinematics.names, *numbers, "t"))
-        for sample in mobility.samples:
-            sizes = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
-            if sizes.min() > 1e-12 * sizes.max():
-                return
-    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
-    scales = functions.scales.q
-    worst: tuple[float, np.ndarray] | None = None
-    for sample in mobility.samples:
-        q = np.array(sample)
-        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
-        basis = np.linalg.svd(functions.scaled_jacobian(q))[2][r:].T if functions.m else np.eye(n)
-        embedded = basis.T @ M @ basis
-        if not np.isfinite(embedded).all():
-            continue
-        sizes, modes = np.linalg.eigh(embedded)
-        if sizes[0] > 1e-12 * sizes[-1]:
-            return
-        if worst is None:  # the reference is what the message speaks of
-            worst = float(sizes[0] + 1e-12 * abs(sizes[-1])), np.abs(basis @ modes[:, 0])
-    if worst is None:
-        raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
-    size, motion = worst
-    problems = []
-    for j in np.argsort(-motion):
-        if motion[j] > 0.3 * motion.max():
-            spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
-            section = "lagrangian" if m.given is None else "equations"
-            path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
-            what = "negative inertia" if size < 0.0 else "no inertia"
-            message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
-            problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
-    raise ModelError(problems)
 
 
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:

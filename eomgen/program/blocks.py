@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import exceeding, factorize, positivity, solve
+from .factor import exceeding, factorize, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
@@ -79,7 +79,7 @@ class BlockMaker:
             pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
-            checks = one if len(pivots) == 1 else exceeding(pivots, pivots)
+            checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
             return list(terms.accelerations), [*self._turned, *checks]
         factor = factorize(terms.mass_matrix, terms.parent)
         checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
@@ -297,7 +297,8 @@ class BlockMaker:
                 return self._internal(name, "q", self._loops.closing())
             case "dynamics":  # v, a, whether the preferred partition is sound
                 assert self._loops is not None
-                return self._internal(name, "q v", *self._loops.dynamics())
+                outputs, checks = self._loops.dynamics()
+                return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
             case "system":  # entries of K, then r, then sizes of the constraints

@@ -14,6 +14,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
+from ..kinematics.row_scales import coefficient_rows, row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .given_multipliers import multiplier_values
@@ -54,7 +55,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         loop_coordinate_jacobian=loop.jacobian,
         alignment=c.aligned,
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
-        constraint_scales=tuple(scale[kind] for kind in c.kinds),
+        constraint_scales=row_scales(kinematics),
         n_dof=mobility.n_dof,
         preferred=tuple(kinematics.freedoms.index(n) for n in mobility.independent),
         parent=_pattern(kinematics),
@@ -171,6 +172,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
+        "constraint_scales": list(mobility.row_scales),
+        "coefficient_rows": list(coefficient_rows(kinematics)),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "p_values": [p.value for p in m.parameters],

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
@@ -92,7 +93,7 @@ class Kernels:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():
                 return ""
-            values, vectors = np.linalg.eigh(M)
+            values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]

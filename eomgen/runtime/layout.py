@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,14 +78,14 @@ class Layout:
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
         self.length: float = float(data.get("length_scale") or 1.0)
-        self.scales = Scales.of_kinds(kinds, data.get("constraint_kinds", ()), self.length, self.space)
+        rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
+        self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
+        self.coefficient_rows = np.array(data.get("coefficient_rows", ()), dtype=np.intp)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
         self.place_scales = (
-            Scales.of_kinds(self.coordinate_kinds, data.get("constraint_kinds", ())[: self.n_h], self.length)
-            if self.given_rates
-            else self.scales
+            Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
         )
         self.units: dict[str, str] = data.get("units", {})
         loop_kinds: Sequence[str] = data.get("loop_kinds") or [
@@ -100,6 +100,16 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+
+    def sized(self, C_q: Callable[[], Array]) -> tuple[Scales, Scales]:
+        """The scales, and those of positions, with parameters that may have other values than declared.
+
+        ``C_q`` gives the Jacobian (m, n) with the parameters' own values.
+        """
+        if not self.coefficient_rows.size:
+            return self.scales, self.place_scales
+        scales = self.scales.resized(C_q(), self.coefficient_rows)
+        return scales, self.place_scales._replace(c=scales.c[: len(self.place_scales.c)])
 
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import SingularMassMatrixError
 from ..numeric import embedded, projection
+from ..numeric.definite import SINGULAR, correlated
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian
@@ -90,7 +91,7 @@ class Drivers:
         known = "mass_matrix" in self.blocks or "mass_times" in self.blocks
         if name in ("rhs", "jacobian", "outputs", *SHIFTS) and known and not self.layout.n_c:
             M = self._matrix(t, x[: self.layout.n_q], u, c)
-            if np.isfinite(M).all() and np.linalg.eigvalsh(M)[0] <= embedded.SINGULAR * M.diagonal().max():
+            if np.isfinite(M).all() and np.linalg.eigvalsh(correlated(M))[0] <= SINGULAR:
                 return 2
         return 1
 
