@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
     from ..analysis.sensitivities import Sensitivities
+    from ..numeric.scales import Array
     from .kernels import Kernels
     from .layout import Layout
     from .protocols import Timed
@@ -49,6 +50,25 @@ def require_projection(layout: Layout) -> None:
         )
 
 
+class Refusal:
+    """In place of a kernel that a model cannot have: says why when it is called."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Refuse.
+
+        Raises
+        ------
+        UsageError
+        """
+        require_velocities(self.layout)
+        require_projection(self.layout)
+
+
 class Analyses(ForceAnalyses):
     """Part of :class:`~.module.Module`: one call for each analysis."""
 
@@ -57,9 +77,7 @@ class Analyses(ForceAnalyses):
     @cached_property
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
-        require_velocities(self.kernels.layout)
-        require_projection(self.kernels.layout)
-        return self.kernels.timed("input_jacobian")
+        return self._derivative("input_jacobian")
 
     @cached_property
     def parameter_jacobian(self) -> Timed:
@@ -68,9 +86,12 @@ class Analyses(ForceAnalyses):
         The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
-        require_velocities(self.kernels.layout)
-        require_projection(self.kernels.layout)
-        return self.kernels.timed("parameter_jacobian")
+        return self._derivative("parameter_jacobian")
+
+    def _derivative(self, name: str) -> Timed:
+        layout = self.kernels.layout
+        refused = layout.given_rates or not layout.projects
+        return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
 
     def linearise(
         self,
