@@ -66,7 +66,7 @@ class Drivers:
             names = [n for n in names if n != "outputs"]
         if "mass_times" in blocks:
             names += ["mass_matrix", "embedded_mass_matrix"]
-        elif "terms" not in blocks and (loops or "mass_matrix" not in blocks):
+        elif "terms" not in blocks and ("mass_matrix" not in blocks or (loops and "position" not in blocks)):
             names = [n for n in names if n != "embedded_mass_matrix"]
         if "acceleration_tangent" in blocks:
             names.append("jacobian")
