@@ -21,6 +21,7 @@ _HOMES = {"Model": "describe", "from_sympy": "describe", "load": "describe", "lo
 _ERRORS = (
     "AssemblyError",
     "EomgenError",
+    "EquilibriumError",
     "EvaluationError",
     "ExpressionError",
     "MissingDependencyError",

@@ -11,6 +11,7 @@
     |  |- ProjectionError           the state could not be brought onto the constraints
     |  |- PartitionError            the chosen independent coordinates cannot move the mechanism here
     |  '- NonFiniteError            a result is not a finite number
+    |- EquilibriumError      no equilibrium was found from the guess; .forces says what is left
     |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
     |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
     |- MissingDependencyError       an optional package is needed; the message says what to install
@@ -19,7 +20,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 
@@ -123,6 +124,20 @@ class PartitionError(EvaluationError):
 
 class NonFiniteError(EvaluationError):
     """A result is NaN or infinite."""
+
+
+class EquilibriumError(EomgenError):
+    """No equilibrium was found from the guess.
+
+    Attributes
+    ----------
+    forces : dict of str to float
+        What is left: the generalized force (N, N m) along each independent coordinate.
+    """
+
+    def __init__(self, message: str, forces: Mapping[str, float] | None = None) -> None:
+        super().__init__(message)
+        self.forces = dict(forces or {})
 
 
 class SimulationError(EomgenError):

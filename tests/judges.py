@@ -152,14 +152,16 @@ def random_states(module: Any, seed: int, count: int, position: float = 0.15, sp
     random = np.random.default_rng(seed)
     start = module.x0()
     n = module.n_q
-    sizes = np.array(
-        [module.metadata["length_scale"] if k == "length" else 1.0 for k in module.metadata["coordinate_kinds"]]
+    length = module.metadata["length_scale"]
+    sizes, rates = (
+        np.array([length if kind == "length" else 1.0 for kind in module.metadata[key]])
+        for key in ("coordinate_kinds", "velocity_kinds")
     )
     found = []
     for _ in range(count):
         x = start.copy()
         x[:n] += position * sizes * random.uniform(-1, 1, n)
-        x[n:] = speed * sizes * random.uniform(-1, 1, n)
+        x[n:] = speed * rates * random.uniform(-1, 1, len(rates))
         found.append(module.project(x))
     return found
 

@@ -28,7 +28,12 @@ EXAMPLE_NAMES = (
     "planetary_gear",
     "cam_follower",
     "rolling_disc",
+    "bicycle",
+    "bricard",
+    "n_four_bar",
 )
+#: Partly driven ones, which the Newton-Euler judge does not know.
+DRIVEN_NAMES = ("car_axis", "kapitza_pendulum")
 
 
 @cache

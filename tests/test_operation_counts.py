@@ -12,16 +12,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import eomgen as eg
 from benchmarks.growth import operations
 from benchmarks.models import ARMS, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
 from eomgen import pipeline
 from eomgen.emit import emit_c
 from eomgen.equations import METHODS
+from eomgen.equations.reduction import reduce_to_independent
 from eomgen.graph import evaluate
 from eomgen.graph.count import Operations, count
+from eomgen.graph.substitute import substitute
 from eomgen.kinematics import analyse
 from eomgen.kinematics.regroup import regroup
 
+EXAMPLES = Path(__file__).parents[1] / "examples"
 LIMITS = {"puma560": (498, 402), "stanford": (326, 285), "rx90": (330, 282), "panda": (415, 354), "iiwa": (403, 342)}
 #: What is counted today: multiplications and additions of the inverse dynamics by embedding.
 FOUND = {"puma560": (269, 279), "stanford": (230, 237), "rx90": (252, 258), "panda": (327, 340), "iiwa": (308, 319)}
@@ -95,6 +99,28 @@ def test_humanoid_of_thirty_joints() -> None:
     assert equations.operations["mass_matrix and bias"].total <= 7000
 
 
+def bicycle() -> dict[str, tuple[int, int]]:
+    """Of M and h, and of the whole embedded system; with every parameter a symbol and a number."""
+    equations = eg.load(EXAMPLES / "bicycle.yaml").derive("embedding")
+    kinematics, tree = equations.kinematics, equations.tree
+    values = {p.name: p.value for p in kinematics.mechanism.parameters}
+    matrix, force = reduce_to_independent(kinematics, equations.mobility, tree, values | {"t": 0.0})
+    assert (len(matrix), len(force)) == (3, 3)
+    graph = kinematics.graph
+    numbers = {graph.symbol(name): graph.constant(value) for name, value in values.items()}
+    counted = {}
+    for title, rows, rest in (("M and h", tree.mass_matrix, tree.bias), ("complete", matrix, force)):
+        outputs = [*(entry for row in rows for entry in row), *rest]
+        counted[title] = (count(outputs).total, count(substitute(outputs, numbers)).total)
+    assert counted["M and h"][0] == equations.operations["mass_matrix and bias"].total
+    return counted
+
+
+def test_bicycle_takes_fewer_operations_than_1900() -> None:
+    for symbols, numbers in bicycle().values():
+        assert 400 < numbers < symbols <= 1900
+
+
 def test_auto_takes_the_fewest_operations() -> None:
     short, long = spatial_chain(4).derive(), spatial_chain(40).derive()
     for equations, method in ((short, "embedding"), (long, "recursive")):
@@ -133,4 +159,6 @@ def test_the_table_in_the_documents_is_what_is_counted() -> None:
         choice = numeric_arm(name, driven=True).derive().choice
         assert choice is not None
         assert rows[title] == f"{choice.operations['embedding']:,}"
+    for title, counted in bicycle().items():
+        assert f"| bicycle, {title} | {counted[0]:,} | {counted[1]:,} |" in text
     assert rows["humanoid"] == f"{humanoid().derive('embedding').operations['mass_matrix and bias'].total:,}"

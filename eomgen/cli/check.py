@@ -31,9 +31,15 @@ def _print_schema(context: click.Context) -> None:
     callback=lambda context, _, wanted: _print_schema(context) if wanted else None,
     help="Print the JSON Schema of model files, for editors, and stop.",
 )
+@click.option(
+    "--graph",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw bodies, joints and constraints as a graph (svg, png, pdf; needs matplotlib).",
+)
 @robot_options
 @reports_failures
-def check(model: Path, allow_native: bool, as_json: bool, robot: dict[str, Any]) -> None:
+def check(model: Path, allow_native: bool, as_json: bool, graph: Path | None, robot: dict[str, Any]) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
@@ -41,7 +47,11 @@ def check(model: Path, allow_native: bool, as_json: bool, robot: dict[str, Any])
     from .. import pipeline
 
     report = pipeline.check(load_model(model, allow_native, robot))
+    if graph is not None:
+        report.draw(graph)
     if as_json:
         print_json(report.to_dict())
     else:
         click.echo(str(report))
+        if graph is not None:
+            click.echo(f"wrote {graph}")

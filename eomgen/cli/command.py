@@ -15,8 +15,16 @@ from .failures import USAGE
 #: verb -> what it does; the file of the same name in this folder holds the command of the same name.
 VERBS = {
     "run": "Derive, compile and simulate a model.",
+    "kinematics": "Analyse the motion over a range of time or coordinates, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",
+    "linearise": "Linearise a model: A, B, C, D, eigenvalues.",
+    "modes": "Natural frequencies, mode shapes and damping ratios about an equilibrium.",
+    "equilibrium": "Find a static equilibrium, with parameters that make it one.",
+    "sensitivity": "Derivatives of a run by parameters, inputs and initial values.",
+    "reactions": "Forces and moments in all joints, and which are undetermined.",
+    "inverse": "Forces of chosen drives that make a motion, loops closed.",
+    "impact": "State after an impact, impulses and energy lost.",
     "generate": "Write a package that stands alone.",
     "convert": "Write a robot (URDF, MJCF) as a model file.",
     "examples": "List the example models, or copy one here.",

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from ..describe.mechanism import Mechanism
     from ..runtime import Trajectory
 
-_BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
-_BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "fontsize": "small", "frameon": False}
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
+BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "fontsize": "small", "frameon": False}
 POINTS = 2000  #: of a smooth curve, from the dense output
 
 
@@ -78,7 +78,7 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
             axes.plot(smooth.t, smooth[name], label=name, linewidth=1.2)
         axes.set_ylabel(label)
         axes.grid(alpha=0.3)
-        axes.legend(**_BESIDE)
+        axes.legend(**BESIDE)
     if axes is not None:
         axes.set_xlabel("t (s)")
     if paths:
@@ -88,7 +88,7 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
         plane.set_aspect("equal", adjustable="datalim")
         plane.set_title("paths (m)", fontsize="medium")
         plane.grid(alpha=0.3)
-        plane.legend(**_BELOW)
+        plane.legend(**BELOW)
     figure.suptitle(title)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file)

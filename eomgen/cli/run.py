@@ -12,6 +12,7 @@ from ..errors import UsageError
 from .derive import print_operations, summary
 from .failures import after_integration, reports_failures
 from .options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -36,10 +37,14 @@ if TYPE_CHECKING:
 TABLES = (".npz", ".csv")
 
 
+POINTS = 5  #: change points listed
+
+
 @click.command()
 @model_argument
 @native_option
 @method_option
+@baumgarte_option
 @independent_option
 @target_option("cython", "numpy")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
@@ -60,6 +65,7 @@ def run(
     model: Path,
     allow_native: bool,
     method: str,
+    baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
     end: float | None,
@@ -87,14 +93,14 @@ def run(
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
-        _complete(described, chosen)
-        equations = pipeline.derive(described, method, independent or None)
+        complete_parameters(described, chosen)
+        equations = pipeline.derive(described, method, independent or None, baumgarte)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)
         module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
-    initial, parameters, inputs = _sort(module, chosen)
+    initial, parameters, inputs = sort_settings(module, chosen)
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
@@ -123,14 +129,16 @@ def run(
         click.echo(f"wrote {file}")
 
 
-def _complete(model: Model, settings: dict[str, float]) -> None:
+def complete_parameters(model: Model, settings: dict[str, float]) -> None:
     """Give values to parameters that the model leaves open; others change without compiling anew."""
     for entry in model.description.sections["parameters"]:
         if entry.name in settings and entry.values.get("value") is None:
             entry.values["value"] = settings[entry.name]
 
 
-def _sort(module: Module, settings: dict[str, float]) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+def sort_settings(
+    module: Module, settings: dict[str, float]
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Which settings are initial values, parameters and inputs; one namespace holds them all."""
     loops = [*module.loop_names, *(f"{name}_dot" for name in module.loop_names)]
     groups = [[*module.x_names, *loops], module.p_names, module.u_names]
@@ -162,7 +170,7 @@ def final_names(trajectory: Trajectory) -> list[str]:
     return list(dict.fromkeys([*header["x_names"], *loops, *header["y_names"]]))
 
 
-def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance) -> dict[str, Any]:
+def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
     """A run as plain values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     final = {name: finite(trajectory[name][-1]) for name in final_names(trajectory)}
@@ -184,30 +192,46 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance)
             "projected_velocity": residuals.velocity,
             "correction_velocity": residuals.correction_velocity,
         },
-        "energy": {key: None if value is None else finite(value) for key, value in energy._asdict().items()},
+        "change_points": [point._asdict() for point in trajectory.change_points],
+        "energy": energy and {k: None if value is None else finite(value) for k, value in energy._asdict().items()},
         "final": {"t": float(trajectory.t[-1]), **final},
     }
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
+def _energy_rows(energy: EnergyBalance | None) -> list[tuple[str, str]]:
+    if energy is None:
+        return [("energy", "not known: the equations have no kinetic_energy")]
+    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
+    if energy.work:
+        return [
+            ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
+            ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
+        ]
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    return [("energy", f"{change}{kept}")]
+
+
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None) -> None:
     """Statistics of a run, its residuals, its energy and its final values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
-    rows = [
-        ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
-        ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
-    ]
+    if header["rtol"] is None:
+        rows = [("moved by drivers", f"{len(trajectory)} positions, solved one by one")]
+    else:
+        rows = [
+            ("integrator", f"{header['method']}, rtol {header['rtol']:g}, atol {header['atol']:g}"),
+            ("steps", f"{len(trajectory) - 1}, {trajectory.nfev} calls of the right-hand side"),
+        ]
     if header["loop_names"] or residuals.raw_position:
         rows += [
             ("loop residual", f"{residuals.raw_position:.1e} raw, {residuals.position:.1e} projected (m, rad)"),
             ("at velocity level", f"{residuals.raw_velocity:.1e} raw, {residuals.velocity:.1e} projected"),
         ]
-    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    rows.append(("energy", f"{change}; kept to {energy.drift:.1e} of the largest kinetic energy"))
-    if energy.work:
-        rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
-        rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))
-    print_rows(rows)
+    points = trajectory.change_points
+    if points:
+        rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
+        rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
+    print_rows(rows + _energy_rows(energy))
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
     print_rows(
         [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]

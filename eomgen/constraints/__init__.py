@@ -3,6 +3,7 @@
 from .base import Condition, Constraint, View
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
 from .couplings import Equation, Linear
+from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
 from .gears import Belt, Gear, Planetary, Rack
 from .rolling import KnifeEdge, RollingDisc, RollingSphere
 
@@ -23,15 +24,23 @@ CONSTRAINTS: dict[str, type[Constraint]] = {
         RollingDisc,
         RollingSphere,
         KnifeEdge,
+        CoordinateDriver,
+        DistanceDriver,
+        PlaceDriver,
+        AngleDriver,
     )
 }
 
 __all__ = [
     "CONSTRAINTS",
+    "AngleDriver",
     "Belt",
     "CamLift",
     "Condition",
     "Constraint",
+    "CoordinateDriver",
+    "DistanceDriver",
+    "Driver",
     "Equation",
     "FlatContact",
     "FlatSupport",
@@ -39,6 +48,7 @@ __all__ = [
     "KnifeContact",
     "KnifeEdge",
     "Linear",
+    "PlaceDriver",
     "Planetary",
     "Rack",
     "RollerContact",

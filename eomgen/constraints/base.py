@@ -31,6 +31,10 @@ class View(Protocol):
     def rotation(self, marker: Marker) -> Mat3: ...
     def angular_velocity(self, marker: Marker) -> Vec3: ...
 
+    def turn(self, start: Marker, end: Marker) -> tuple[Expr, Expr, bool]:
+        """Angle of ``end`` about the z axis of ``start``, its rate, and whether it is exact and does not wrap."""
+        ...
+
 
 class Condition(NamedTuple):
     """One equation ``expression = 0``.
@@ -50,6 +54,7 @@ class Constraint(ABC):
     """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions."""
 
     type_name: ClassVar[str]
+    written: ClassVar[bool] = False  #: whether factors in the equations are the user's, and may have any size
     name: str
 
     @abstractmethod
@@ -59,6 +64,10 @@ class Constraint(ABC):
     def aligned(self, view: View) -> list[Expr]:
         """Expressions that must be positive: the equations alone also admit contact from the wrong side."""
         return []
+
+    def is_defined(self, view: View) -> bool:
+        """Whether the angle it is about is defined everywhere."""
+        return True
 
     def hints(self, view: View) -> list[tuple[Expr, Expr]]:
         """Where assembly may look for a coordinate of the element's own: (its symbol, a value near by)."""

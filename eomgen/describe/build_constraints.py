@@ -10,6 +10,7 @@ from ..frames import Marker
 from .build_cam_points import Contacts
 from .build_cams import cam, cam_contact
 from .build_couplings import belt, coupling, gear, planetary, rack
+from .build_drivers import driver
 from .build_joints import Declared
 from .checks import check_keys, check_names
 from .constraint_element import Element, Surroundings
@@ -102,4 +103,5 @@ BUILDERS: Mapping[str, Callable[[Element], Any]] = {
     "cam_contact": cam_contact,
     "rolling": _rolling,
     "knife_edge": _knife_edge,
+    "driver": driver,
 }

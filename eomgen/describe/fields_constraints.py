@@ -5,7 +5,7 @@ Part of the table of :mod:`~eomgen.describe.fields`; it drives the same checks, 
 
 from __future__ import annotations
 
-from .fields import OUTPUT, Field, Fields
+from .fields import MOTION, OUTPUT, Field, Fields
 
 #: The name that stands for the angle in profiles of cams.
 CAM_ANGLE = "theta"
@@ -89,6 +89,15 @@ CONSTRAINT: dict[str, Fields] = {
         "axis": Field("axis", "direction without motion, in the marker's axes", default="y"),
         "on": Field("marker", "the body on which it moves", default="ground"),
     },
+    "driver": {
+        "coordinate": _JOINT._replace(required=False, doc="a joint of one degree, or a coordinate, that is driven"),
+        "between": Field("pair", "two markers whose distance is driven"),
+        "angle": Field("pair", "two markers with z axes in line; the turn of the second from the first is driven"),
+        "marker": Field("marker", "a marker of which one coordinate is driven"),
+        "axis": Field("axis", "along which the marker's place counts, in the axes of on", default="x"),
+        "on": Field("marker", "from where the marker's place counts", default="ground"),
+        "value": Field("expression", "motion over time: t, parameters, functions", required=True, level=MOTION),
+    },
 }
 #: Types of which exactly one of these keys must be given.
 ONE_OF_CONSTRAINT: dict[str, tuple[str, ...]] = {
@@ -97,6 +106,7 @@ ONE_OF_CONSTRAINT: dict[str, tuple[str, ...]] = {
     "planetary": ("radii", "teeth"),
     "belt": ("radii", "teeth"),
     "cam_contact": ("contour", "support"),
+    "driver": ("coordinate", "between", "angle", "marker"),
 }
 
 

@@ -143,7 +143,7 @@ class ConstraintMethods:
         phase : scalar, optional
             The cam's angle where theta is 0 (rad).
         periodic : bool, optional
-            Whether the law repeats every turn (it does).
+            Whether the law repeats every turn (it does); then value and slope at 2 pi must be those at 0.
         """
         keys = {"cam": self._joint_of(cam), "follower": self._joint_of(follower)}
         self._constrain("cam", name, **keys, lift=lift, phase=phase, periodic=periodic)
@@ -181,7 +181,7 @@ class ConstraintMethods:
         coordinate : str, optional
             Name of the polar angle of the contact point, ``<name>_contact`` unless given.
         periodic : bool, optional
-            Whether the profile repeats every turn (it does).
+            Whether the profile repeats every turn (it does); then value and slope at 2 pi must be those at 0.
         """
         self._constrain(
             "cam_contact",
@@ -233,6 +233,44 @@ class ConstraintMethods:
         """Keep a marker from moving along an axis of its own (y), relative to the body of ``on`` (ground)."""
         under = None if on is None else self._marker_of(on)
         self._constrain("knife_edge", name, marker=self._marker_of(marker), axis=axis, on=under)
+
+    def driver(
+        self,
+        name: str,
+        coordinate: Any = None,
+        value: Value = None,
+        between: Sequence[Any] | None = None,
+        angle: Sequence[Any] | None = None,
+        marker: Any = None,
+        axis: str | Sequence[float] | None = None,
+        on: Any = None,
+    ) -> None:
+        """Prescribe a motion over time: of a coordinate, a distance, an angle or the place of a marker.
+
+        Parameters
+        ----------
+        name : str
+            Identifier.
+        coordinate : handle or str, optional
+            A joint of one degree, or a coordinate.
+        value : scalar
+            Expression of t, parameters and functions (rad or m); its second derivative should be continuous.
+        between : (marker, marker), optional
+            Instead of a coordinate: the distance of two markers, which must not meet.
+        angle : (marker, marker), optional
+            Instead: the turn of the second about the z axis of the first; the two z axes stay in line.
+        marker : handle or str, optional
+            Instead: the place of a marker along ``axis``.
+        axis : str or three floats, optional
+            In the axes of ``on`` (x).
+        on : handle or str, optional
+            Marker from whose origin the place counts (ground).
+        """
+        pairs = {"between": between, "angle": angle}
+        given = {key: [self._marker_of(end) for end in pair] for key, pair in pairs.items() if pair is not None}
+        single = {"coordinate": None if coordinate is None else self._joint_of(coordinate)}
+        single |= {key: None if end is None else self._marker_of(end) for key, end in (("marker", marker), ("on", on))}
+        self._constrain("driver", name, **single, **given, axis=axis, value=value)
 
     # -- parts ----------------------------------------------------------------------------------------------------
     def _constrain(self, type_name: str, name: str, **keys: Any) -> None:

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from ..program import Program
+from ..program.blocks import SHIFTS
 
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "project", "close", "project_drive"),
-    "rhs": ("scaled", "cholesky", "project", "close", "eliminate", "partition", "embed", "ldl", "accelerate", "rhs"),
+    "project": ("scaled", "cholesky", "residual_sizes", "project", "close", "project_drive"),
+    "rhs": (
+        "scaled",
+        "cholesky",
+        "residual_sizes",
+        "project",
+        "close",
+        "eliminate",
+        "partition",
+        "embed",
+        "ldl",
+        "accelerate",
+        "rhs",
+    ),
     "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
     "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
-    "outputs": ("scaled", "cholesky", "project", "close", "outputs_closed"),
+    "outputs": ("scaled", "cholesky", "residual_sizes", "project", "close", "outputs_closed"),
 }
 ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
 
@@ -26,6 +39,15 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 }
 
 
+def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """The files of a derivative by inputs or parameters."""
+    if program.by_columns:
+        return ("shift_columns", name)
+    if not program.has_loops:
+        return ("tree", "shift_tree", name)
+    return (*LOOPS["rhs"][:-1], "multipliers", direct, "shift_loops", name)
+
+
 def driver_files(program: Program) -> list[str]:
     """Names of the files in templates/c/drivers that hold this program's drivers, callees first."""
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
@@ -36,10 +58,18 @@ def driver_files(program: Program) -> list[str]:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
         files.update(dict.fromkeys(space if program.balls or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
-        if program.by_columns:
+        if driver.name == "dae_jacobian":
+            needed: tuple[str, ...] = ("dae_jacobian",)
+        elif driver.name in SHIFTS:
+            needed = shift_files(program, driver.name, direct)
+        elif "system" in driver.blocks:
+            needed = _system_files(program, driver.name, direct)
+        elif program.by_columns:
             needed = COLUMNS[driver.name]
         elif not program.has_loops:
             needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
+        elif driver.name == "rhs" and "dynamics" in driver.blocks:
+            needed = (*LOOPS["rhs"][:-1], "rhs_direct")
         elif driver.name == "jacobian":
             needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian")
         elif driver.name == "outputs" and "terms" in driver.blocks:
@@ -48,6 +78,16 @@ def driver_files(program: Program) -> list[str]:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
     return list(files)
+
+
+def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """Files of a driver that solves the linear system of a method."""
+    solve = ("system_balance", "system_factor", "system_solve")
+    if name == "jacobian":
+        return (*solve, direct, "system_jacobian")
+    if program.has_loops and (program.projects or name == "outputs"):
+        return (*LOOPS["project"][:-1], *solve, f"system_{name}_closed")
+    return (*solve, f"system_{name}_given")
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
@@ -71,13 +111,16 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     n_q, h = program.sizes.n_q, program.sizes.n_h
     names = program.block_names
     residual = (n + m) * (n_q + n) + m * n_q if "residual_jacobian" in names else 0
+    shifted = {SHIFTS[d.name] for d in program.drivers if d.name in SHIFTS}
+    seeds = max((program.sizes.n_u if what == "input" else program.sizes.n_p for what in shifted), default=0)
     lengths = [
-        ("X", 2 * n_q + 3 * n + m),  # q, v, a, multipliers, dq, dv
+        ("X", n_q + 2 * n + m + max(n_q + n, seeds)),  # q, v, a, multipliers, dq, dv; or du or dp in place of these
         ("SCALES", n + m),
         ("TERMS", n * (n + 1) // 2 + n + m * n + m),  # M packed, h, C_q, gamma
         ("RESIDUAL", residual),  # r1_q, r1_v, r2_q, r2_v, r3_q
         ("ALONG", n + 2 * m),  # r1, r2, r3 along a direction
         ("RATES", n_q),
+        ("SHIFT", h + n + 2 * m if shifted else 0),  # C, r1, r2, r3 along du or dp
     ]
     if program.composes_terms:
         lengths.append(("FULL", n * n))
@@ -98,7 +141,22 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
+            ("CLOSING", n + 3 if "closing" in names else 0),
+            ("DYNAMICS", 2 * n + 1 if "dynamics" in names else 0),
         ]
+    if "system" in names and program.system is not None:
+        size, places = len(program.system.unknowns), len(program.system.places)
+        relaxed = len(program.system.relaxed)
+        lengths += [
+            ("SYSTEM", places + size + relaxed),  # entries of K, r, sizes of constraints
+            ("LU", size * size),
+            ("ROW", size),  # scales
+            ("COLUMN", size),
+            ("DEFECT", size),
+            ("MOTION", n_q + n + size),  # q, v, z
+        ]
+    if "dae_tangent" in names:
+        lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

@@ -19,17 +19,22 @@ from .sources import SourceSet, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
-    *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs")),
+    *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")),
     *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
     *((name, "State") for name in ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
     ("inverse_dynamics", "Motion"),
     *((name, "Rows") for name in ("constraints", "constraint_jacobian", "velocity_constraints")),
     *((name, "tuple[str, ...]") for name in
-      ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names")),
+      ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names",
+       "joint_names", "constraint_labels")),
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate")
+FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
+          "simulate_impacts", "consistent")  # fmt: skip
+MOTIONS = ("kinematic_analysis", "motion_range")
+ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", *ANALYSES)
 
 
 def emit_package(program: Program, target: str) -> SourceSet:
@@ -91,10 +96,10 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, numeric/ and runtime/ as they are in eomgen itself."""
+    """errors.py, numeric/, runtime/ and analysis/ as they are in eomgen itself."""
     root = files("eomgen")
     found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
-    for folder in ("numeric", "runtime"):
+    for folder in ("numeric", "runtime", "analysis"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")

@@ -15,6 +15,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
+from ..joints.rods import Distance, RevoluteSpherical
 from .couplings import couple
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
@@ -193,7 +194,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         motion=motion,
         constraints=constraints,
         coupled=tuple(row.label for row in coupled.rows),
-        hints=tuple(coupled.hints),
+        hints=tuple(hint for hint in coupled.hints if hint[0] in names),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
         length_scale=_length_scale(mechanism),
@@ -277,6 +278,10 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
                 remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
                 problems.append(mechanism.problem(f"forces.{force.name}", message, remedy))
     for constraint in mechanism.constraints:
+        if not constraint.is_defined(motion):
+            message = "the z axes of its two markers do not stay in line, so the angle between them is not defined"
+            remedy = "turn the markers (rpy) so that z is the axis between them, or drive a coordinate"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", message, remedy))
         for name in sorted(set(wrapping) & symbols_of(_expressions(constraint))):
             message = f"the angle {name!r} closes a loop in space and is only known up to full turns"
             remedy = "name the coordinate of that joint, or choose it as independent, so that another one is cut"
@@ -313,7 +318,7 @@ def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
 
 
 def _length_scale(mechanism: Mechanism) -> Expr:
-    """Root mean square distance of joint markers from their bodies' origins: the mechanism's size, 1 if it has none.
+    """Root mean square length of rods, and distance of joint markers from their bodies' origins; 1 if there is none.
 
     Minimum-norm corrections compare lengths with angles; measured in this length, units do not matter.
     """
@@ -324,6 +329,8 @@ def _length_scale(mechanism: Mechanism) -> Expr:
             square = vec.dot(marker.frame.position, marker.frame.position)
             if not square.is_zero:
                 squares.append(square)
+        if isinstance(spec.joint, Distance | RevoluteSpherical):
+            squares.append(spec.joint.length * spec.joint.length)
     if not squares:
         return graph.one
     total = graph.zero

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 
@@ -21,10 +22,14 @@ from ..numeric import (
     independent_rows,
     rank,
 )
+from ..numeric.assembly import RESTARTS
 from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
+from .candidates import rate_candidates
+from .driving import close_driven, follow_drivers
 from .kinematics import Kinematics
+from .row_scales import row_scales
 
 Array = NDArray[np.float64]
 PROBES = 4  #: further assembled configurations at which the rank is judged
@@ -63,6 +68,7 @@ class Mobility:
     redundant: tuple[str, ...]
     conditioning: float
     length_scale: float
+    row_scales: tuple[float, ...] = ()  #: typical size of each constraint row
     configurations: int = 1
     ranks: tuple[int, ...] = ()
     assumed: bool = False
@@ -70,6 +76,11 @@ class Mobility:
     restarts: int = 0  #: further starts the assembly needed; 0 means it went straight from the initial values and guess
     samples: tuple[tuple[float, ...], ...] = ()  #: the configurations, the reference first
     n_positions: int = 0
+    instantaneous: int = 0  #: degrees of freedom at the reference, more than n_dof at a change point
+    candidates: tuple[
+        tuple[str, float], ...
+    ] = ()  #: coordinates that can be independent there, with their conditioning
+    driven: bool = False  #: whether a constraint depends on time
 
 
 class ConstraintFunctions:
@@ -85,16 +96,17 @@ class ConstraintFunctions:
         self.neutral = np.zeros(len(kinematics.names)) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())
+        self.rows = np.arange(self.m)  #: those that count
         self._position = self._compile([*c.values, *_flat(c.jacobian)])
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
         self._hints = self._compile([value for _, value in kinematics.hints])
-        (length,) = self._compile([kinematics.length_scale])(self.neutral)
+        length, *sizes = self._compile([kinematics.length_scale, *row_scales(kinematics)])(self.neutral)
         self.length_scale = float(length)
-        self.scales = Scales.of_kinds(kinematics.velocity_kinds, c.kinds, self.length_scale, space)
+        self.scales = Scales.of_kinds(kinematics.velocity_kinds, sizes, self.length_scale, space)
         self.place, self._slopes = self.scales, None  # positions move with velocities, unless q' is given
         if kinematics.given_rates:
-            self.place = Scales.of_kinds(kinematics.kinds, c.kinds[: self.h], self.length_scale)
+            self.place = Scales.of_kinds(kinematics.kinds, sizes[: self.h], self.length_scale)
             self._slopes = self._compile([*c.values, *_flat(c.slopes)])
 
     def _compile(self, outputs: list[Expr]):  # type: ignore[no-untyped-def]
@@ -110,7 +122,19 @@ class ConstraintFunctions:
     def position(self, q: Array) -> tuple[Array, Array]:
         """C (h,) of the holonomic rows and C_q (m, n) of all."""
         flat = self._position(q)
-        return flat[: self.h], flat[self.h :].reshape(self.m, self.n)
+        J = flat[self.h :].reshape(self.m, self.n)
+        return (flat[: self.h], J) if len(self.rows) == self.m else (flat[self.rows[self.rows < self.h]], J[self.rows])
+
+    def with_rows(self, rows: Sequence[int]) -> ConstraintFunctions:
+        """The same with some of the constraint rows only."""
+        result = copy(self)
+        result.rows = np.array(rows, dtype=int)
+        result.scales = self.scales._replace(c=self.scales.c[result.rows])
+        return result
+
+    def set_time(self, t: float) -> None:
+        """Take all functions at another time than 0."""
+        self._rest[-1] = t
 
     def place_position(self, q: Array) -> tuple[Array, Array]:
         """What positions are closed with: :meth:`position`, or C and dC/dq (h, n_q) where q' is given."""
@@ -161,7 +185,7 @@ class ConstraintFunctions:
             [loop.names[j] for j in picked],
         )
 
-    def close(self, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    def close(self, given: Mapping[str, float], guess: Mapping[str, float], restarts: int = RESTARTS) -> Assembly:
         """Assemble with the given values exact, near the guess."""
         k = self.kinematics
         given, guess = self.settle(given), self.settle(guess)
@@ -174,7 +198,7 @@ class ConstraintFunctions:
             free[self.place.velocities(held)] = 0.0
             start = close(System(self.place_position, self.place, free, rough), start)[0]
         for (name, _), value in zip(k.hints, self._hints(start), strict=True):
-            if name not in given and name not in guess:
+            if name not in given and name not in guess and np.isfinite(value):
                 start[k.names.index(name)] = value
         equations = self._equations(given)
         return assemble(
@@ -185,7 +209,8 @@ class ConstraintFunctions:
             equations=equations,
             alignment=self.aligned if k.constraints.aligned else None,
             names=k.names,
-            labels=k.constraints.labels,
+            labels=[k.constraints.labels[i] for i in self.rows],
+            restarts=restarts,
         )
 
 
@@ -229,8 +254,9 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
     positions = {n: x for n, x in given.items() if n in known}
-    found = functions.close(positions, guess)
-    judged = _partition(functions, [found.q, *_probe(functions, found.q)], wanted)
+    found = close_driven(functions, positions, guess)
+    later = follow_drivers(functions, found.q)
+    judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
     return replace(judged, residual=found.residual, restarts=found.restarts)
 
 
@@ -328,7 +354,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         )
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)
-    if wanted and quality < 1e-8 and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
+    at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
+    if wanted and not at_change_point and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
         better = [names[j] for j in choose_independent(jacobians, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])
@@ -344,10 +371,14 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         redundant=tuple(label for i, label in enumerate(labels) if i not in kept),
         conditioning=quality,
         length_scale=functions.length_scale,
+        row_scales=tuple(float(x) for x in functions.scales.c),
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
         n_positions=len(functions.place.q) - max(rank(functions.place_jacobian(x)).rank for x in configurations),
+        instantaneous=n - ranks[0],
+        candidates=tuple((names[k], value) for k, value in rate_candidates(jacobians[0], chosen).items()),
+        driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),
     )
 
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.substitute import symbols_of
 from .kinematics import Kinematics
 from .mobility import Mobility
+from .notes import find_notes
 
 WIDTH = 110  #: of the lines of a report
 WHOLE_WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
@@ -30,8 +34,15 @@ class MechanismReport:
         Rows that do not vanish identically, of ``constraints_declared``; ``nonholonomic`` of them at velocity level.
     degrees_of_freedom, configuration_freedoms : int
         Independent velocities; independent coordinates, which nonholonomic constraints do not restrict.
+    instantaneous_freedoms : int
+        Degrees of freedom at the reference configuration, more than usual at a change point.
     redundant : list of str
         Rows that follow from the others at the reference configuration.
+    candidates : dict of str to float
+        Coordinates that can be independent at the reference configuration, the best first, and their conditioning: 1 is
+        perfect, 0 not at all.
+    notes : list of str
+        What deserves attention, each with a remedy.
     """
 
     name: str
@@ -50,14 +61,45 @@ class MechanismReport:
     ranks: list[int]
     degrees_of_freedom: int
     configuration_freedoms: int
+    instantaneous_freedoms: int
     gruebler_kutzbach: int | None
     gruebler_kutzbach_planar: int | None
     redundant: list[str]
     conditioning: float
+    candidates: dict[str, float]
+    notes: list[str]
     length_scale: float
     reference: dict[str, float]
     assembly_restarts: int
     assumed: bool
+    elements: list[dict[str, Any]]
+
+    def draw(self, file: str | Path | None = None, ax: Any = None) -> Any:
+        """Draw the mechanism as a graph: bodies above the bodies that carry them, joints between them.
+
+        Joints of the spanning tree are solid lines, those that close loops dashed; constraint elements are diamonds.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            Where to write the picture; its ending says the format (svg, png, pdf).
+        ax : matplotlib Axes, optional
+            Where to draw; by default a figure of its own.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib is not installed: ``pip install "eomgen[plot]"``.
+        UsageError
+            A file name whose ending is no kind of picture.
+        """
+        from .picture import draw
+
+        return draw(self, file, ax)
 
     def to_dict(self) -> dict[str, Any]:
         """The report as plain values, for JSON."""
@@ -91,16 +133,21 @@ class MechanismReport:
         if self.gruebler_kutzbach_planar is not None:
             counts.append(f"{self.gruebler_kutzbach_planar} in the plane")
         say("degrees of freedom", f"{self.degrees_of_freedom}" + (f" ({', '.join(counts)})" if counts else ""))
+        if self.instantaneous_freedoms != self.degrees_of_freedom:
+            say("at this configuration", str(self.instantaneous_freedoms))
         if self.nonholonomic:
             say("of the configuration", str(self.configuration_freedoms))
         say("independent", _list(self.independent) or "none")
         if self.dependent:
             say("dependent", f"{_list(self.dependent)} (conditioning {self.conditioning:.2g})")
+        if len(self.candidates) > len(self.independent):
+            say("can be independent", _list([f"{name} {value:.2g}" for name, value in self.candidates.items()]))
         if self.loop_joints and not self.assumed:
             away = f"after {self.assembly_restarts} restarts: one of several ways to close it; a guess says which"
             say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
         if self.assumed:
             lines.append("  some parameters have no value: the rank was judged with made-up ones")
+        lines += [f"  note: {note}" for note in self.notes]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -143,6 +190,7 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
                 "type": j.joint.type_name,
                 "between": [j.predecessor.label, j.successor.label],
                 "coordinates": list(j.coordinates),
+                "bodies": [names[j.predecessor.body + 1], names[j.successor.body + 1]],
             }
             for j in m.joints
         ],
@@ -162,15 +210,48 @@ def report(kinematics: Kinematics, mobility: Mobility) -> MechanismReport:
         ranks=list(mobility.ranks),
         degrees_of_freedom=mobility.n_dof,
         configuration_freedoms=mobility.n_positions,
+        instantaneous_freedoms=mobility.instantaneous,
         gruebler_kutzbach=spatial,
         gruebler_kutzbach_planar=planar,
         redundant=list(mobility.redundant),
         conditioning=mobility.conditioning,
+        candidates=dict(mobility.candidates),
+        notes=find_notes(kinematics, mobility),
         length_scale=mobility.length_scale,
         reference=dict(zip(kinematics.names, mobility.q_reference, strict=True)),
         assembly_restarts=mobility.restarts,
         assumed=mobility.assumed,
+        elements=[
+            {"name": e.name, "type": e.type_name, "bodies": [names[k + 1] for k in _touched(kinematics, e)]}
+            for e in m.constraints
+        ],
     )
+
+
+def _touched(kinematics: Kinematics, element: object) -> list[int]:
+    """Bodies that a constraint element holds: those of its markers, and those that its coordinates move."""
+    m = kinematics.mechanism
+    found: set[int] = set()
+    moves = {n: (j.predecessor.body, j.successor.body) for j in m.joints for n in (*j.coordinates, *j.velocities)}
+
+    def visit(value: object) -> None:
+        if isinstance(value, Marker):
+            found.add(value.body)
+        elif isinstance(value, Expr):
+            for name in symbols_of([value]):
+                if name in moves:
+                    found.update(moves[name][1:])
+                elif name in m.quantities and (marker := m.quantities[name].marker) is not None:
+                    found.add(marker.body)
+        elif isinstance(value, tuple):
+            for item in value:
+                visit(item)
+        elif is_dataclass(value):
+            for item in fields(value):
+                visit(getattr(value, item.name))
+
+    visit(element)
+    return sorted(found)
 
 
 def _moves_in_a_plane(kinematics: Kinematics) -> bool:

@@ -1,9 +1,9 @@
 """Stage kinematics: Mechanism -> Topology, the spanning tree and the joints that close loops.
 
 Which joint of a loop is cut: never one with a chosen independent coordinate if that can be helped; one whose
-coordinates the user did not name (and whose angular velocity they did not give) before one they named; among equals
-the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are always cut, joints that
-cannot be cut (a point on a curve) never.
+coordinates the user did not name (and does not drive, and whose angular velocity they did not give) before one they
+named; among equals the one that leaves the shortest chains; then the last declared.  Pure constraints (a rod) are
+always cut, joints that cannot be cut (a point on a curve) never.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from ..constraints import CoordinateDriver
 from ..describe.checks import UNHELD
 from ..describe.mechanism import JointSpec, Mechanism
 from ..errors import ModelError
@@ -44,7 +45,11 @@ def _rank(spec: JointSpec, independent: Collection[str], initial: Collection[str
         return 0
     if spec.joint.counts_turns:  # a thread is best kept whole
         return 1
-    return 1 if spec.named or not spec.coordinates or any(name in initial for name in spec.velocities) else 2
+    return (
+        1
+        if spec.named or not spec.coordinates or any(name in initial for name in (*spec.coordinates, *spec.velocities))
+        else 2
+    )
 
 
 class _Forest:
@@ -147,6 +152,7 @@ def find_topology(mechanism: Mechanism, independent: Collection[str] = ()) -> To
     forest = _Forest(n)
     rates = {n for spec in joints for n, v in zip(spec.velocities, spec.joint.velocities, strict=True) if v.of is None}
     given = rates.intersection(mechanism.initial)
+    given |= {str(c.coordinate.node[1]) for c in mechanism.constraints if isinstance(c, CoordinateDriver)}
     rank = [_rank(spec, independent, given) for spec in joints]
     order = sorted(range(len(joints)), key=lambda k: (rank[k], k))
     tree = {k for k in order if joints[k].joint.role != "loop" and forest.join(*_ends(joints[k]))}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
-from .closure import Equations, System, close, closed
+from .closure import FAR, Equations, System, close, closed, remoteness
 from .projection import largest
 from .ranks import rank
 from .scales import Array, Indices, Position, Scales
@@ -131,11 +131,12 @@ class _Failure(NamedTuple):
                 "give initial values nearer to the wanted position"
             )
         gaps = "the largest gaps are " + ", ".join(f"{label} {gap:.3g}" for label, gap in self.open_rows())
+        contradiction = self._contradiction()
+        if contradiction:
+            return contradiction
         if not given:
-            return (
-                f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
-                "check the dimensions, or give a better guess"
-            )
+            tried = f"({self.restarts + 1} starts tried)"
+            return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
         free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
         for start in starts(self.best, free.free, free.scales, self.restarts // 2):
             with np.errstate(all="ignore"):
@@ -145,7 +146,7 @@ class _Failure(NamedTuple):
         else:
             return (
                 f"the loops do not close{self._with(given)}, nor with these values left free "
-                f"({self.restarts + 1} starts tried): {gaps}; check the dimensions, or give a better guess"
+                f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
             )
         near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
@@ -156,6 +157,40 @@ class _Failure(NamedTuple):
                 f"give fewer, or consistent ones such as {', '.join(near)}"
             )
         return f"the loops cannot close{self._with(given)}: {gaps}; a closed position nearby has {', '.join(near)}"
+
+    def _contradiction(self) -> str:
+        """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
+        m = len(self.system.position(self.best)[0])
+        labels = (list(self.labels) or [f"C[{i}]" for i in range(m)])[:m]
+        gaps = [(labels.index(label), label, gap) for label, gap in self.open_rows() if label in labels]
+        rows = [i for i, _, _ in gaps]
+        if not rows:
+            return ""
+        for start in starts(self.best, np.ones_like(self.system.free), self.system.scales, 3):
+            C, C_q = self.system.position(start)
+            J, e = self.system.scales.jacobian(C_q)[rows], self.system.scales.residual(C)[rows]
+            if not np.isfinite(J).all():
+                return ""
+            out_of_reach = np.linalg.svd(J)[0][:, rank(J).rank :]
+            if largest(out_of_reach.T @ e) <= 1e-6:
+                return ""
+        names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)
+        if len(gaps) == 1:
+            return (
+                f"the constraint {names} can never hold: no coordinate changes it; take it away, or correct its values"
+            )
+        return (
+            f"the constraints {names} contradict each other: they restrict the same motion and cannot hold together; "
+            "take one away, or make their values agree"
+        )
+
+    def _advice(self) -> str:
+        e, J = self.system.evaluate(self.guess)
+        far = remoteness(e, np.sqrt((J * J).sum(axis=1)))
+        if far > FAR:
+            away = f"the guess is far away (about {far:.2g} times the mechanism's size)"
+            return f"{away}: give a better one, or check the dimensions"
+        return "check the dimensions, or give a better guess"
 
     def _with(self, given: list[str]) -> str:
         return f" with {', '.join(given)}" if given else ""

@@ -5,6 +5,8 @@ The way to stay on the branch the mechanism is on: small steps along the straigh
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import AssemblyError
@@ -15,6 +17,8 @@ from .scales import Array, Indices, Position, Scales
 STEP = 0.1  #: largest scaled change of a held value in one step
 JUMP = 0.6  #: largest scaled change of any coordinate in one step
 SMALLEST = 2.0**-10  #: of STEP, before giving up
+TIMED = 0.3  #: STEP of a walk in time, which is predicted
+TRIES = 4000  #: its steps and halvings
 LONGEST = 200.0  #: scaled distance too long to walk
 TRIALS = 5000  #: steps at most, those taken back included
 
@@ -85,3 +89,45 @@ def follow(
             if step < SMALLEST * usual:
                 raise AssemblyError(f"the way is blocked after {100 * done:.0f} % of it")
     return q
+
+
+def follow_time(position: Callable[[float], Position], start: Array, scales: Scales, end: float) -> Array:
+    """From a closed position at t = 0 to another time, in steps short enough to stay on the branch.
+
+    Parameters
+    ----------
+    position : callable
+        t -> (q (n,) -> C (m,), C_q (m, n)).
+    start : (n,) array
+        A closed position at t = 0.
+    scales : Scales
+    end : float
+        Time; what moves only because of it is moved.
+
+    Returns
+    -------
+    (n,) array
+
+    Raises
+    ------
+    AssemblyError
+        The way is blocked, or too long.
+    """
+    q, t, step = np.array(start), 0.0, end / 64.0
+    slope = np.zeros_like(scales.q)  # scaled motion per time in the last step
+    free = np.ones_like(scales.q)
+    for _ in range(TRIES):
+        if t == end:
+            return q
+        reached = end if abs(end - t) <= abs(step) else t + step
+        ahead = scales.move(q, slope * (reached - t))
+        trial, residual = close(System(position(reached), scales, free), ahead, steps=15)
+        change = scales.distance(trial, q)
+        if closed(residual) and largest(change) <= TIMED:
+            q, t, slope = trial, reached, change / (reached - t)
+            step *= 2.0 if largest(change) < 0.4 * TIMED else 1.0
+        else:
+            step *= 0.5
+            if abs(step) < SMALLEST**2 * abs(end):
+                break
+    raise AssemblyError(f"the way from t = 0 to t = {end:.6g} s is blocked at t = {t:.6g} s")

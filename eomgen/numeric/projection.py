@@ -3,11 +3,13 @@
 The correction is the minimum-norm Newton step ``-J^T (J J^T)^-1 e`` in scaled coordinates.  It does not depend on any
 partition of the coordinates, so a partition that goes bad at a dead centre costs no digits.  A relative Tikhonov term
 in ``J J^T`` carries redundant rows and configurations where the rank drops.  In position steps it is as large as the
-scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
+mean scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
 distance, whose Newton step would run along the motion.  It vanishes on convergence, which stays quadratic.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,8 +17,10 @@ from ..errors import NonFiniteError, ProjectionError
 from .scales import Array, GivenRates, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
-TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
-EXACT = 1e-14  #: scaled residual at which to stop at once
+TIKHONOV = 1e-8  #: relative to the largest diagonal entry of J J^T
+PASSES = 5  #: of linear corrections, so that the Tikhonov term leaves no trace
+EXACT = 1e-15  #: scaled residual at which to stop
+SHORT = 1e-8  #: scaled Newton step whose square is nothing
 SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
 ACCEPTED = 1e-10  #: largest scaled residual of a projected state
 DAMPING = 0.5  #: largest scaled Newton step
@@ -27,8 +31,13 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
 
 
-def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
-    """``(J J^T + relative max(diag) I)^-1 e`` for e (m,) or (m, k)."""
+def within(e: Array, limit: float, rounded: Array) -> bool:
+    """Whether each scaled residual (m,) is at most the limit, or what rounding leaves of it (m,)."""
+    return bool((np.abs(e) <= np.maximum(limit, rounded)).all())
+
+
+def gram_solver(J: Array, relative: float = TIKHONOV) -> Callable[[Array], Array]:
+    """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k)."""
     G = J @ J.T
     size = G.diagonal().max()
     G.flat[:: len(G) + 1] += relative * size
@@ -36,7 +45,7 @@ def gram_solve(J: Array, e: Array, relative: float = TIKHONOV) -> Array:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
         raise ProjectionError("the constraint Jacobian vanishes, so no correction is defined") from None
-    return np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
+    return lambda e: np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
 
 
 def correct_position(
@@ -62,38 +71,44 @@ def correct_position(
     Raises
     ------
     ProjectionError
-        No convergence to a scaled residual of 1e-10 in 25 steps.
+        No convergence to a scaled residual of 1e-10, or of the rounding of q, in 25 steps.
     NonFiniteError
         The constraints are not finite.
     """
-    before = np.inf
+    before, last = np.inf, False
     for step in range(STEPS + 1):
         C, C_q = position(q)
         e = scales.residual(C)
         size = largest(e)
-        if size <= EXACT or (step and size <= SETTLED and size > 0.5 * before):
+        if last or size == 0.0 or (step and size <= EXACT):
             return q, C_q
         if not np.isfinite(size):
             raise NonFiniteError("the constraints are not finite")
+        J = scales.jacobian(C_q[: len(e)])
+        rounded = scales.rounding(q, J) if given is None else np.zeros(len(e))
+        if step and size > 0.5 * before and within(e, SETTLED, rounded):
+            return q, C_q
         if step == STEPS:
             break
-        J = scales.jacobian(C_q[: len(e)])
-        dz = J.T @ gram_solve(J, e, max(TIKHONOV, size))
+        dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).mean())))(e)
         longest = largest(dz)
+        # one step at least: near configurations where rows depend on each other a small residual is no small distance
+        last = longest <= SHORT and largest(e - J @ dz) <= EXACT
         if longest > DAMPING:
             dz *= DAMPING / longest
         q = scales.move(q, -dz) if given is None else given.move(q, -scales.q * dz)
         before = size
-    if size <= ACCEPTED:
+    if within(e, ACCEPTED, rounded):
         return q, C_q
     raise ProjectionError(f"the projection onto the constraints stopped at a scaled residual of {size:.1e}")
 
 
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
-    """The nearest v (n,) with C_q v + C_t = 0; two steps, so that the Tikhonov term leaves no trace."""
+    """The nearest v (n,) with C_q v + C_t = 0."""
     J = scales.jacobian(C_q)
-    for _ in range(2):
-        v = v - scales.q * (J.T @ gram_solve(J, scales.residual(C_q @ v + C_t)))
+    solve = gram_solver(J)
+    for _ in range(PASSES):
+        v = v - scales.q * (J.T @ solve(scales.residual(C_q @ v + C_t)))
     return v
 
 
@@ -134,8 +149,10 @@ def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
     """
     J = scales.jacobian(C_q)
     z = y / scales.c[: len(y), None]
-    x = J.T @ gram_solve(J, z)
-    x += J.T @ gram_solve(J, z - J @ x)  # second step, as in correct_velocity
+    solve = gram_solver(J)
+    x = J.T @ solve(z)
+    for _ in range(PASSES - 1):
+        x += J.T @ solve(z - J @ x)
     return np.asarray(scales.q[:, None] * x)
 
 

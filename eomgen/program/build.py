@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
-from .blocks import BlockMaker
+from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
@@ -61,7 +61,12 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
-    wanted = [k for k in _select(kernels) if has.get(k.name, True)]
+    has["energy"] = bool(metadata.get("energy_known", True))
+    if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
+        has |= dict.fromkeys(SHIFTS, False)
+    if terms.given_rates:
+        has |= {"dae_residual": False, "dae_jacobian": False}
+    wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
     needed: dict[str, None] = {}
@@ -89,6 +94,7 @@ def build_program(
         **metadata,
         "abi": ABI,
         **asdict(sizes),
+        "output_accelerations": maker.outputs_need_accelerations,
         "kernels": kernel_shapes,
         "operations": {key: value.as_dict() for key, value in counts.items()},
     }
@@ -114,6 +120,8 @@ def build_program(
         coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
+        system=terms.system,
+        projects=terms.projects,
     )
 
 
@@ -134,6 +142,10 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_com=3 if terms.centroidal else 0,
         n_e=len(terms.finite_forces),
         n_g=len(terms.coordinate_slopes),
+        n_s=terms.wrenches.needed_size if terms.wrenches else 0,
+        n_w=terms.wrenches.size if terms.wrenches else 0,
+        n_m=len(terms.canonical) // 2,
+        n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 
 

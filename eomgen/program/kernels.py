@@ -25,6 +25,10 @@ class Sizes:
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
     n_e: int = 0
     n_g: int = 0  #: holonomic rows where q' is given, else 0
+    n_s: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
+    n_w: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
+    n_m: int = 0  #: momenta: n_v by method hamilton, else 0
+    n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,9 @@ class Kernel:
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
 CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
 
+#: y, then y', of which only the rates of q and v are there
+DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
+
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
     Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
@@ -76,6 +83,42 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
     Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
     Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
+    Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
     Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
+    Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
+    Kernel(
+        "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
+    ),
+    Kernel(
+        "assembly_jacobian",
+        ("q", "v"),
+        lambda s: (s.n_h + s.n_c + 2 * s.n_k, s.n_x + s.n_u + s.n_p),
+        "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
+        late=True,
+    ),
+    Kernel(
+        "output_derivatives",
+        ("q", "v", "a"),
+        lambda s: (s.n_y, s.n_q + 2 * s.n_v + s.n_u + s.n_p),
+        "outputs by [q, v, a, u, p], each at fixed others",
+        late=True,
+    ),
+    Kernel(
+        "needed_wrenches",
+        ("q", "v", "a"),
+        lambda s: (s.n_s,),
+        "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
+        late=True,
+    ),
+    Kernel(
+        "wrench_geometry",
+        ("q",),
+        lambda s: (s.n_w,),
+        "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
+        late=True,
+    ),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_m), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
+    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

@@ -7,9 +7,13 @@ from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
+from ..equations.equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from .kernels import Sizes
+
+#: Blocks that only trees have whose accelerations are known without their mass matrix.
+BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")
 
 
 @dataclass(frozen=True)
@@ -17,6 +21,7 @@ class Limits:
     """Sizes at which the generated code changes its form; every field changes the sources."""
 
     unrolled: int = 24  #: trees with at most so many velocities get a straight-line rhs, larger ones loops
+    unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
     statements: int = 1500  #: statements in one generated function at most
 
@@ -128,6 +133,8 @@ class Program:
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)
+    system: LinearSystem | None = None
+    projects: bool = True
 
     @property
     def has_loops(self) -> bool:
@@ -159,12 +166,12 @@ class Program:
     @property
     def composes_terms(self) -> bool:
         """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
-        return not self.has_loops and bool(self.drivers) and not self.by_columns
+        return not self.has_loops and not self.by_columns and any("bias" in d.blocks for d in self.drivers)
 
     @property
     def by_columns(self) -> bool:
         """Whether drivers make the mass matrix and the Jacobian of a tree column by column."""
-        return not self.block_names.isdisjoint(("mass_times", "acceleration_tangent"))
+        return not self.block_names.isdisjoint(BY_COLUMNS)
 
     @property
     def kernels(self) -> tuple[Block | Driver, ...]:

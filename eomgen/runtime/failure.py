@@ -25,7 +25,7 @@ WORDS = {
     ),
     4: (
         "the independent coordinates cannot move the mechanism here (dead centre or singular position)",
-        "choose other independent coordinates",
+        "choose other independent coordinates, or start a little away from a change point",
     ),
 }
 

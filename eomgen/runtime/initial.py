@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import AssemblyError, UsageError
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
 from ..numeric.closure import Equations, System, close, closed
-from ..numeric.continuation import follow
+from ..numeric.continuation import follow, follow_time
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 INDEPENDENT = 1e-6  #: a further row counts when it keeps this part of its length after the others are taken out
 STILL = 3e-5  #: share of a motion below which a coordinate stands still; closed positions are known to its square
+STAYS = 1e-12  #: scaled residual below which a position is closed at another time as well
 SAME = 1e-6  #: scaled distance below which two positions are one
 
 
@@ -55,11 +56,10 @@ class Initial:
         self.kernels = kernels
         self.layout = layout = kernels.layout
         self.t = t
-        self.scales = layout.scales
-        self.place = layout.place_scales  #: of coordinates; those of the velocities unless q' is given
         self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_g else None
         self._C = kernels.state("constraints", nan=True)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
+        self.scales, self.place = layout.sized(lambda: self._C_q(layout.q_reference, t=t))
         self._loop = kernels.motion("loop_coordinates") if layout.n_k else None
         self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
         self._alignment = kernels.state("alignment", nan=True) if layout.n_a else None
@@ -103,6 +103,14 @@ class Initial:
     def aligned(self, q: Array) -> bool:
         """Whether no joint closes with its axes flipped."""
         return self._alignment is None or bool((self._alignment(q, t=self.t) > 0.0).all())
+
+    def gradients(self, q: Array, name: str) -> list[Array]:
+        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
+        return self._row(q, name)
+
+    def with_values(self, q: Array, values: Mapping[str, float]) -> Array:
+        """A position with coordinates of the tree replaced; loops are not closed."""
+        return self._with(q, values)
 
     def _equations(self, values: Mapping[str, float]) -> Equations | None:
         layout = self.layout
@@ -149,11 +157,24 @@ class Initial:
 
     def reference(self) -> Array:
         """The reference position, closed again for these parameters and this time."""
+        later = self.later()
+        if later is not None:
+            return later
         declared = self.sort(self.layout.initial).positions
         try:
             return self.close(self.layout.q_reference, declared, restarts=2).q
         except AssemblyError:
             return self.close(self.layout.q_reference, {}).q
+
+    def later(self) -> Array | None:
+        """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""
+        if not self.t or largest(self.scales.residual(self.position(self.layout.q_reference)[0])) <= STAYS:
+            return None
+        first = Initial(self.kernels).reference()
+        try:
+            return follow_time(lambda t: Initial(self.kernels, t).position, first, self.place, self.t)
+        except AssemblyError:
+            return None
 
     def assembled(self, given: Mapping[str, float]) -> Array:
         """Position with the given values exact, and the declared ones where they leave room."""
@@ -162,7 +183,10 @@ class Initial:
         if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
             return self._with(self._with(layout.q_reference, declared), given)
         if not given:
-            return self.close(layout.q_reference, declared).q
+            later = self.later()
+            if later is None:
+                return self.close(layout.q_reference, declared).q
+            return self.walk(later, self.compatible(later, {}, declared))
         rest = {name: value for name, value in declared.items() if name not in given}
         try:
             start = self.reference()

@@ -13,12 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
+
+
+ENERGY = (
+    "the energy of the model {!r} is not known: its equations of motion are given without kinetic_energy; "
+    "give equations.kinetic_energy, and potential_energy where forces have one"
+)
 
 
 class Kernels:
@@ -43,6 +50,9 @@ class Kernels:
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
+        shape = self.layout.shape(name)
+        if name not in self.core.names and 0 in shape:
+            return Nothing(np.zeros(shape), self.layout.inputs(name))
         kernel: Timed = self._make(self.core.timed, name, nan)
         return kernel
 
@@ -66,7 +76,10 @@ class Kernels:
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
         if name not in self.core.names:
-            return Missing(name, f"model {self.layout.name!r} was generated without the kernel {name!r}")
+            if name == "energy" and not self.layout.energy_known:
+                return Missing(name, ENERGY.format(self.layout.name))
+            message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
+            return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
     def _culprit(self, status: int, t: float, x: Array) -> str:
@@ -80,7 +93,7 @@ class Kernels:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():
                 return ""
-            values, vectors = np.linalg.eigh(M)
+            values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
@@ -113,7 +126,7 @@ class Missing:
         ------
         UsageError
         """
-        raise UsageError(f"{self.message}; compile again with kernels=None for all, or name it in kernels")
+        raise UsageError(self.message)
 
 
 class Rows:
@@ -175,6 +188,26 @@ class Constant:
             raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
         expected = self.value.shape + shape[1:]
         return np.zeros(expected) if out is None else _fitting(out, expected)
+
+
+class Nothing:
+    """A kernel of time and state whose result has no entries."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, value: Array, n_in: int) -> None:
+        self.constant = Constant(value, n_in)
+
+    def __call__(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """An empty array, with a last axis for a batch."""
+        return self.constant(x, p=p, u=u, out=out)
 
 
 class Identity(Constant):

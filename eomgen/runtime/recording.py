@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from .signals import Forcing
 from .trajectory import Residuals, Trajectory
 
 if TYPE_CHECKING:
+    from .change_points import ChangePoint
     from .module import Module
 
 
@@ -42,7 +43,7 @@ class Columns:
             (loops, self._loops),
             (layout.y, self._outputs),
             (layout.u, lambda: self.u),
-            (("T", "V", "energy"), lambda: self.energies),
+            (("T", "V", "energy") if layout.energy_known else (), lambda: self.energies),
         ]
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
@@ -87,11 +88,23 @@ class Columns:
             y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_k, -1)
 
+    @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy."""
+        return self.module.layout.energy_known
+
     @cached_property
     def energies(self) -> Array:
         """Kinetic, potential and total energy (3, n_t), whatever the model calls T and V."""
         T, V = self.module.energy(self.x, u=self._varying(), t=self.t)
         return np.array([T, V, T + V])
+
+    @cached_property
+    def change_points(self) -> list[ChangePoint]:
+        """Where the mobility changes on the way."""
+        from .change_points import find_change_points
+
+        return find_change_points(self.module, self.t, self.x, self.u)
 
 
 def record(module: Module, forcing: Forcing, solution: Solution, method: str, options: dict[str, Any]) -> Trajectory:
@@ -102,19 +115,9 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
     ProjectionError
         A stored state cannot be brought onto the constraints.
     """
-    layout = module.layout
     residuals, x = project(module, solution.t, solution.x)
     header: dict[str, Any] = {
-        "name": module.name,
-        "q_names": list(layout.q),
-        "v_names": list(layout.v),
-        "x_names": list(layout.x),
-        "loop_names": list(layout.loops),
-        "y_names": list(layout.y),
-        "u_names": list(layout.u),
-        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
-        "model_method": layout.metadata.get("method"),
-        "docs": layout.metadata.get("docs", {}),
+        **describe(module),
         "method": method,
         "rtol": _plain(options.get("rtol")),
         "atol": _plain(options.get("atol")),
@@ -125,7 +128,7 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
         "residuals": residuals._asdict(),
     }
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
-    header["units"] = {name: layout.unit(name) for name in ("t", *columns.names) if layout.unit(name)}
+    header["units"] = units_of(module, columns.names)
     events = [project(module, t, found)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
@@ -137,6 +140,23 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
+
+
+def describe(module: Module) -> dict[str, Any]:
+    """What the columns of any run of a module are called, and its parameters."""
+    layout = module.layout
+    return {
+        "name": module.name,
+        "q_names": list(layout.q),
+        "v_names": list(layout.v),
+        "x_names": list(layout.x),
+        "loop_names": list(layout.loops),
+        "y_names": list(layout.y),
+        "u_names": list(layout.u),
+        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
+        "model_method": layout.metadata.get("method"),
+        "docs": layout.metadata.get("docs", {}),
+    }
 
 
 def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
@@ -161,6 +181,11 @@ def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
         correction_position=float(correction[:n].max()),
         correction_velocity=float(correction[n:].max()),
     ), x
+
+
+def units_of(module: Module, names: Sequence[str]) -> dict[str, str]:
+    """Units of columns, of those that have one."""
+    return {name: module.layout.unit(name) for name in ("t", *names) if module.layout.unit(name)}
 
 
 def _plain(value: Any) -> Any:

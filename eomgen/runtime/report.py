@@ -42,10 +42,12 @@ def facts(module: Module) -> list[tuple[str, str]]:
         ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
     ]
     operations = data.get("operations", {})
-    name = next((name for name in ("rhs", "terms") if operations.get(name)), None)
-    if name:  # with loops, linear algebra on the terms comes on top
-        counts = (f"{n} {kind}" for kind, n in operations[name].items() if isinstance(n, int) and n)
-        lines.append((f"operations of {name}", ", ".join(counts)))
+    parts = next((p for p in (("rhs",), ("closing", "dynamics"), ("terms",)) if operations.get(p[-1])), None)
+    if parts:  # terms alone: linear algebra comes on top
+        kinds = [kind for kind, n in operations[parts[-1]].items() if isinstance(n, int)]
+        totals = {kind: sum(operations[part][kind] for part in parts) for kind in kinds}
+        counts = (f"{n} {kind}" for kind, n in totals.items() if n)
+        lines.append((f"operations of {'terms' if parts == ('terms',) else 'rhs'}", ", ".join(counts)))
     return lines
 
 

@@ -94,6 +94,14 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    if method in (None, "kinematic"):
+        from ..analysis.driven import is_driven
+
+        if is_driven(module):
+            steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
+            return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
+        if method is not None:
+            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
     listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
@@ -106,10 +114,10 @@ def simulate(
         solver = choose_solver(method)
         title = solver.__name__
         check_options(solver, options, OPTIONS)
-    start, end = _span(span, float(declared["end"]))
+    start, end = find_span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
-    x0 = _initial_state(bound, initial, start)
+    x0 = find_state(bound, initial, start)
     u0 = forcing(start, x0)
     forcing.require_finite()
     bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
@@ -126,7 +134,7 @@ def simulate(
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end), end]
-    stored = None if t_eval is None else _times(t_eval, start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
     try:
         if compiled:
             solution, failure = integrate_compiled(
@@ -151,6 +159,29 @@ def simulate(
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
+
+
+def _follow_drivers(
+    module: Module,
+    span: float | tuple[float, float] | None,
+    initial: Mapping[str, float] | ArrayLike | None,
+    parameters: Any,
+    inputs: Mapping[str, Any] | None,
+    t_eval: ArrayLike | None,
+    events: Any,
+    options: Mapping[str, Any],
+) -> Trajectory:
+    """The motion of a mechanism that its drivers move entirely: solved, not integrated."""
+    from ..analysis.driven import simulate_driven
+
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.base = bound.u
+    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    given = {key: value for key, value in options.items() if value is not None}
+    return simulate_driven(bound, (start, end), initial, forcing, stored, [Event(e) for e in listed], given)
 
 
 class _Run:
@@ -236,7 +267,8 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
 
 
-def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
     if np.ndim(span) == 0:
@@ -247,7 +279,8 @@ def _span(span: float | tuple[float, float] | None, declared: float) -> tuple[fl
     return float(pair[0]), float(pair[1])
 
 
-def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
+def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
+    """The times wanted, in order and within the span, or a UsageError."""
     times = np.array(t_eval, dtype=float)
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)
@@ -257,7 +290,8 @@ def _times(t_eval: ArrayLike, start: float, end: float) -> Array:
     return times
 
 
-def _initial_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+def find_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected."""
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):

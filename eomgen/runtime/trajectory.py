@@ -16,6 +16,8 @@ from .names import require, unknown
 if TYPE_CHECKING:
     import pandas
 
+    from .change_points import ChangePoint
+
 
 class Residuals(NamedTuple):
     """Largest violation of the constraints over a run, all rows, redundant ones included."""
@@ -35,6 +37,8 @@ class Source(Protocol):
 
     @property
     def energies(self) -> Array: ...
+    @property
+    def has_energies(self) -> bool: ...
 
     def __getitem__(self, name: str) -> Array: ...
 
@@ -123,7 +127,7 @@ class Trajectory:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
         from .storage import Stored
 
-        columns = Stored(self.names, self.to_numpy(), self.energies)
+        columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
     def at(self, t: ArrayLike) -> Trajectory:
@@ -170,9 +174,36 @@ class Trajectory:
         return frame
 
     @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy: equations of motion may be given without."""
+        return self._columns.has_energies
+
+    @property
     def energies(self) -> Array:
-        """Kinetic, potential and total energy (J), (3, n_t)."""
+        """Kinetic, potential and total energy (J), (3, n_t).
+
+        Raises
+        ------
+        UsageError
+            The equations of motion were given without kinetic energy.
+        """
         return self._columns.energies
+
+    @property
+    def change_points(self) -> list[ChangePoint]:
+        """Moments at which the mechanism has more degrees of freedom than elsewhere, so that its motion may branch.
+
+        Each has a ``time``, the ``degrees_of_freedom`` there and the ``coordinates``.  The run itself goes straight on.
+
+        Raises
+        ------
+        UsageError
+            The trajectory was read from a file, without the model.
+        """
+        if not hasattr(self._columns, "change_points"):
+            raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
+        found: list[ChangePoint] = self._columns.change_points
+        return found
 
     @property
     def energy_drift(self) -> float:

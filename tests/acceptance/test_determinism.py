@@ -30,7 +30,7 @@ print(json.dumps(found))
 
 
 def hashes(seed: str, target: str) -> dict[str, str]:
-    command = [sys.executable, "-c", SCRIPT, str(models.EXAMPLES), target, *models.EXAMPLE_NAMES]
+    command = [sys.executable, "-c", SCRIPT, str(models.EXAMPLES), target, *models.EXAMPLE_NAMES, *models.DRIVEN_NAMES]
     done = subprocess.run(
         command, capture_output=True, text=True, check=False, env={**os.environ, "PYTHONHASHSEED": seed}
     )

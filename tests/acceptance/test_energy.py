@@ -27,6 +27,7 @@ CONSERVATIVE = {
     "spherical_pendulum": {},
     "cam_follower": {},
     "rolling_disc": {},
+    "bicycle": {},
     "free_slider_crank": {"theta_dot": 30.0},
     "skewed_four_bar": {},
     "spatial_loop": {"theta_dot": 4.0},

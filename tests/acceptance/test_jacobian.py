@@ -21,7 +21,7 @@ LOOPS = ["offset_slider_crank", "powered_slider_crank", "spatial_loop"]
 REDUNDANT = ["tilted_four_bar", "skewed_four_bar", "three_cranks"]
 
 
-def compare(mod: Any, x: np.ndarray, t: float) -> None:
+def compare(mod: Any, x: np.ndarray, t: float, h: float = 1e-5) -> None:
     n = mod.n_q
     kinds = mod.metadata["coordinate_kinds"]
     sizes = np.tile([mod.metadata["length_scale"] if kind == "length" else 1.0 for kind in kinds], 2)
@@ -29,7 +29,7 @@ def compare(mod: Any, x: np.ndarray, t: float) -> None:
     def rhs(columns: np.ndarray) -> np.ndarray:
         return mod.rhs(t, columns)
 
-    expected = np.stack([judges.first(rhs, x, d * s, h=1e-5) / s for d, s in zip(np.eye(2 * n), sizes, strict=True)], 1)
+    expected = np.stack([judges.first(rhs, x, d * s, h=h) / s for d, s in zip(np.eye(2 * n), sizes, strict=True)], 1)
     found = mod.jacobian(t, x)
     assert found.shape == (2 * n, 2 * n)
     # each of the four blocks by its own largest entry, in units that do not favour metres or radians
@@ -42,11 +42,12 @@ def compare(mod: Any, x: np.ndarray, t: float) -> None:
 
 
 @pytest.mark.parametrize("method", ["embedding", "lagrange"])
-@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *LOOPS, "powered_arm", *REDUNDANT])
+@pytest.mark.parametrize("name", [*models.EXAMPLE_NAMES, *models.DRIVEN_NAMES, *LOOPS, "powered_arm", *REDUNDANT])
 def test_jacobian_of_models(module: Callable[..., Any], name: str, method: str) -> None:
     mod = module(name, method)
     for x in judges.random_states(mod, 31, 3):
-        compare(mod, x, 0.3)
+        # off the manifold the regularisation of redundant rows follows the residual: a kink that is of second order
+        compare(mod, x, 0.3, h=1e-6 if name == "bricard" else 1e-5)
 
 
 def test_some_directions_are_transverse(module: Callable[..., Any]) -> None:

@@ -27,8 +27,8 @@ def test_what_is_printed(call: Call) -> None:
 def test_json(call: Call) -> None:
     run = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1", "--json").json
     assert set(run) == {
-        "name", "method", "choice", "report", "operations", "seconds", "integration", "loop_residual", "energy",
-        "final", "files",
+        "name", "method", "choice", "system", "report", "operations", "seconds", "integration", "loop_residual",
+        "energy", "change_points", "final", "files",
     }  # fmt: skip
     assert set(run["seconds"]) >= {"describe", "kinematics", "equations", "compile", "simulate"}
     assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls", "jacobians"}
@@ -46,9 +46,11 @@ def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
     run = call("run", path, "--json", "--out", "run.npz").json
     trajectory = eomgen.load_trajectory("run.npz")
     travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
-    assert travel > 0.4
+    driven = "type: driver" in path.read_text(encoding="utf-8")
+    assert travel > (0.1 if driven else 0.4)
     assert run["loop_residual"]["projected"] < 1e-10
-    assert run["energy"]["power_balance"] < 1e-7
+    balance = run["energy"]["power_balance"]
+    assert balance is None if driven else balance < 1e-7
 
 
 def test_the_integrator_and_its_tolerances_can_be_chosen(call: Call) -> None:

@@ -17,7 +17,7 @@ REPORT_KEYS = {
     "constraints", "constraints_declared", "rank", "ranks", "degrees_of_freedom", "configuration_freedoms",
     "nonholonomic", "gruebler_kutzbach",
     "gruebler_kutzbach_planar", "redundant", "conditioning", "length_scale", "reference", "assumed",
-    "assembly_restarts",
+    "assembly_restarts", "instantaneous_freedoms", "candidates", "notes", "elements",
 }  # fmt: skip
 MODELS = sorted(EXAMPLES.glob("*.yaml"))
 
@@ -68,7 +68,7 @@ def test_derive_prints_the_size_of_the_equations(call: Call) -> None:
 
 def test_derive_json(call: Call) -> None:
     derived = call("derive", EXAMPLES / "slider_crank.yaml", "--method", "lagrange", "--json").json
-    assert set(derived) == {"name", "method", "choice", "report", "operations", "seconds"}
+    assert set(derived) == {"name", "method", "choice", "system", "report", "operations", "seconds"}
     assert derived["method"] == "lagrange"
     counts = {"multiplications", "additions", "divisions", "negations", "functions", "choices", "total"}
     assert {frozenset(operations) for operations in derived["operations"].values()} == {frozenset(counts)}
@@ -196,3 +196,14 @@ def test_doctor_without_a_compiler_says_what_to_do(call: Call, monkeypatch: pyte
     assert result.code == 3
     assert "no-such-compiler" in result.out
     assert "pip install ziglang" in result.out
+
+
+def test_check_draws_the_mechanism(call: Call, tmp_path: Path) -> None:
+    result = call("check", EXAMPLES / "slider_crank.yaml", "--graph", "graph.svg")
+    assert result.code == 0
+    assert "wrote graph.svg" in result.out
+    assert "can be independent" in result.out
+    assert "<svg" in (tmp_path / "graph.svg").read_text(encoding="utf-8")
+    wrong = call("check", EXAMPLES / "slider_crank.yaml", "--graph", "graph.doc")
+    assert wrong.code == 2
+    assert ".svg" in wrong.err

@@ -52,6 +52,10 @@ constraints:
   d2: {type: rolling, wheel: {body: ball, at: [0, 0, r], rpy: [k, 0, 0]}, radius: r, tube: r/8}
   d3: {type: knife_edge, marker: ball, axis: x, on: one}
   d4: {type: gear, joints: [A, B], cones: [0.5, 0.6]}
+  e1: {type: driver, coordinate: A, value: k*sin(n*t) + t**2}
+  e2: {type: driver, between: [ball, {body: one, at: [r, 0, 0]}], value: 1 + k*t}
+  e3: {type: driver, angle: [ground, sat], value: n*t}
+  e4: {type: driver, marker: ball, axis: [0, 0.6, 0.8], on: arm, value: r*t}
 """
 
 
@@ -84,6 +88,10 @@ def from_python() -> eg.Model:
     m.rolling("d2", ball.at(0, 0, r, rpy=(k, 0, 0)), radius=r, tube=r / 8)
     m.knife_edge("d3", ball, axis="x", on=one)
     m.gear("d4", A, B, cones=(0.5, 0.6))
+    m.driver("e1", A, k * sympy.sin(n * m.t) + m.t**2)
+    m.driver("e2", between=(ball, one.at(r, 0, 0)), value=1 + k * m.t)
+    m.driver("e3", angle=(m.ground, sat), value="n*t")
+    m.driver("e4", marker=ball, axis=(0, 0.6, 0.8), on=arm, value=r * m.t)
     return m
 
 
@@ -113,7 +121,7 @@ def test_python_and_file_say_the_same_and_both_round_trip(tmp_path: Path) -> Non
     models = [load(tmp_path, TEXT), from_python()]
     models += [load(tmp_path, m.to_yaml()) for m in models]
     first, *others = map(equations, models)
-    assert len(first) == 13 + 1 + 1 + 3 + 2  # one each, and more of planetary, roller, sphere and disc
+    assert len(first) == 17 + 1 + 1 + 3 + 2  # one each, and more of planetary, roller, sphere and disc
     assert all(np.isfinite(x) and x != 0 for x in first.values())
     for other in others:
         assert list(other) == list(first)
@@ -192,6 +200,18 @@ BROKEN = [
     ("shape: sphere, no_spin", "shape: disc, no_spin", 28, "d1.no_spin", "only a sphere", "leave it out"),
     ("wheel: ball, plane: ground", "wheel: ball, plane: ball", 28, "d1.plane", "on the same body", "another"),
     ("axis: x, on", "axis: w, on", 30, "d3.axis", "not an axis", "allowed"),
+    ("k*sin(n*t) + t**2", "k*sin(n*t) + u", 32, "e1.value", "the input 'u' cannot stand", "no known rate"),
+    ("k*sin(n*t) + t**2", "k*s", 32, "e1.value", "the coordinate 's' cannot stand", "a coupling relates"),
+    ("k*sin(n*t) + t**2", "k*s_dot", 32, "e1.value", "the velocity 's_dot' cannot stand", "a coupling relates"),
+    ("k*sin(n*t) + t**2", "x(one)", 32, "e1.value", "x(...) of a marker cannot be used here", "in outputs"),
+    ("coordinate: A, value", "coordinate: F, value", 32, "e1.coordinate", "has 6 coordinates", "F_x"),
+    ("coordinate: A, value", "value", 32, "e1", "coordinate or between or angle or marker is missing", "give one of"),
+    ("coordinate: A, value", "coordinate: A, marker: one, value", 32, "e1", "both coordinate and marker", "give one"),
+    ("coordinate: A, value", "coordinate: A, axis: y, value", 32, "e1.axis", "a driver of a marker", "leave it out"),
+    (", value: n*t}", "}", 34, "e3.value", "is missing", "give a number or an expression"),
+    ("angle: [ground, sat]", "angle: [sat, sat]", 34, "e3.angle", "on the same body", "another body"),
+    ("axis: [0, 0.6, 0.8], on: arm", "axis: [0, 0, 0], on: arm", 35, "e4.axis", "has no length", ""),
+    ("axis: [0, 0.6, 0.8], on: arm", "on: ball", 35, "e4.on", "on the same body", "another body"),
     ("  d4: {", "  c3: {", 31, "c3", "given twice", "rename"),
     ("  d4: {", "  d-4: {", 31, "d-4", "not an identifier", ""),
 ]

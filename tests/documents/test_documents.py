@@ -53,6 +53,7 @@ def test_python_blocks_run_in_order(path: Path, here: Path) -> None:
         ("two_link_manipulator.py", [], "tip acceleration against the book"),
         ("four_bar.py", [], "the rocker keeps its length"),
         ("chain.py", ["4"], "4 rods fell"),
+        ("bicycle.py", [], "stable from 4.2923825363 to 6.0242620154 m/s"),
     ],
 )
 def test_example_scripts_run(here: Path, name: str, words: list[str], said: str) -> None:
@@ -60,20 +61,20 @@ def test_example_scripts_run(here: Path, name: str, words: list[str], said: str)
     result = subprocess.run([sys.executable, "-W", "error", script, *words], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
     assert said in result.stdout
-    for error in re.findall(r"(?:kept to|book:|length to) ([0-9.e+-]+)", result.stdout):
+    for error in re.findall(r"(?:kept to|book:|length to|equal to) ([0-9.e+-]+)", result.stdout):
         assert float(error) < 1e-8
 
 
 def test_every_example_script_is_run() -> None:
     scripts = {path.name for path in (ROOT / "examples").glob("*.py")} - {"__init__.py"}
-    assert scripts == {"slider_crank.py", "two_link_manipulator.py", "four_bar.py", "chain.py"}
+    assert scripts == {"slider_crank.py", "two_link_manipulator.py", "four_bar.py", "chain.py", "bicycle.py"}
 
 
 @pytest.mark.parametrize("path", having("yaml"), ids=lambda p: p.name)
 def test_yaml_blocks_pass_check(path: Path, here: Path) -> None:
     for text in blocks(path, "yaml"):
         (here / "model.yaml").write_text(text, encoding="utf-8")
-        assert eomgen.load("model.yaml").check().degrees_of_freedom > 0
+        assert eomgen.load("model.yaml").check().degrees_of_freedom >= 0
 
 
 @pytest.mark.slow

@@ -29,7 +29,8 @@ static int accelerate(double t, const double *restrict u, const double *restrict
                       partition *restrict parts, double *restrict a, double *restrict w)
 {
     double *const mass = w + AT_MASS, *const h = w + AT_H, *const scaled = w + AT_A;
-    const double *const s = w + AT_SCALES, *const packed = w + AT_TERMS, *const rows = w + AT_ROWS;
+    const double *const s = w + AT_SCALES, *const packed = w + AT_TERMS;
+    double *const r = w + AT_RATE;
     const double *const bias = packed + N * (N + 1) / 2, *const C_q = bias + N, *const gamma = C_q + M * N;
     (void)terms_block(t, w + AT_X, u, c, w + AT_TERMS, w);
     form_scaled(C_q, s, w + AT_J);
@@ -47,11 +48,12 @@ static int accelerate(double t, const double *restrict u, const double *restrict
         h[i] = bias[i] * s[i];
         scaled[i] = 0.0;
     }
-    for (int j = 0; j < R; j++) {
-        scaled[parts->dependent[j]] = rows[parts->row[j] * width + N];
+    for (int i = 0; i < M; i++) {
+        r[i] = gamma[i] / s[N + i];
     }
+    correct_linear(M, w + AT_G, r, scaled, w); /* of minimum norm: no small pivot makes it large */
     embed_mass(w);
-    status = ldl_factor(embedded_size(w + AT_B, w + AT_MASS), w + AT_EMBEDDED);
+    status = ldl_factor(w + AT_B, w + AT_MASS, w + AT_EMBEDDED);
     if (status != 0) {
         return status;
     }

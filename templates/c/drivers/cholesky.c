@@ -1,3 +1,7 @@
+/* Regularises J J^T, relative to its largest entry: where rows come to depend on each other, rounding of C and C_q is not
+   blown up; elsewhere a few passes leave no trace of it. */
+#define GENTLE 1e-8
+
 /* G = L L^T in place, lower triangle of the first `rows` rows of the M x M matrix; status 3 where G is not positive definite. */
 static int cholesky(int rows, double *restrict g)
 {

@@ -9,7 +9,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
     }
     int status = close_position(t, q, u, c, w);
     if (status == 0 && MH < M) { /* nonholonomic rows join here */
-        status = factor_gram(M, w + AT_J, 1e-12, w + AT_G);
+        status = factor_gram(M, w + AT_J, GENTLE, w + AT_G);
     }
     if (status != 0) {
         return status;

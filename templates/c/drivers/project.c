@@ -1,11 +1,11 @@
-/* x -= J^T G^-1 (J x + r), twice so that the term 1e-12 leaves no trace: the nearest x with J x + r = 0, in the first
+/* x -= J^T G^-1 (J x + r), five times so that the term GENTLE leaves no trace: the nearest x with J x + r = 0, in the first
    rows of J. */
 static void correct_linear(int rows, const double *restrict G, const double *restrict r, double *restrict x,
                            double *restrict w)
 {
     const double *const J = w + AT_J;
     double *const e = w + AT_E;
-    for (int pass = 0; pass < 2; pass++) {
+    for (int pass = 0; pass < 5; pass++) {
         for (int i = 0; i < rows; i++) {
             e[i] = r[i];
             for (int k = 0; k < N; k++) {
@@ -28,6 +28,7 @@ static int close_position(double t, double *restrict q, const double *restrict u
     const double *const s = w + AT_SCALES, *const C = w + AT_POSITION, *const J = w + AT_J;
     double *const e = w + AT_E, *const dz = w + AT_STEP;
     double before = 0.0;
+    int last = 0;
     for (int step = 0; step <= 25; step++) {
         (void)position_block(t, q, u, c, w + AT_POSITION, w);
         const double size = largest_residual(C, s);
@@ -36,12 +37,12 @@ static int close_position(double t, double *restrict q, const double *restrict u
         }
         form_scaled(C + MH, s, w + AT_J);
         /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
-        const int status = factor_gram(MH, J, fmax(1e-12, size), w + AT_G);
-        if (status != 0 || has_settled(step, size, before)) {
+        const int status = factor_gram(MH, J, fmax(GENTLE, mean_residual(C, s)), w + AT_G);
+        if (status != 0 || last || has_settled(step, size, before, C, J, q, s)) {
             return status;
         }
         if (step == 25) {
-            return size <= 1e-10 ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(1e-10, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
         for (int i = 0; i < MH; i++) {
             e[i] = C[i] / s[N + i];
@@ -54,6 +55,7 @@ static int close_position(double t, double *restrict q, const double *restrict u
             }
         }
         const double part = damping(dz, N);
+        last = arrives(longest_of(dz, N), largest_left(J, C, dz, s));
         for (int k = 0; k < N; k++) {
             dz[k] *= -s[k] * part;
         }

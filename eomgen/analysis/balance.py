@@ -1,0 +1,151 @@
+"""Analysis: a position at rest -> the generalized forces along its degrees of freedom, and how they change.
+
+The principle of virtual work (A. A. Shabana, Computational Dynamics, "virtual work in static analysis"): B^T Q = 0 for
+all virtual displacements B that the constraints allow, Q all forces of the model at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..numeric.partitions import partition
+from ..numeric.ranks import rank
+from ..numeric.scales import Array, Indices
+from .tangent import find_tangent
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+
+class Balance(NamedTuple):
+    """A position at rest, with k of its coordinates held or none."""
+
+    x: Array  #: (n_x,) independent velocities 0
+    velocities: Indices  #: (n_dof - k,) independent velocities
+    B: Array  #: (n_v, n_dof - k) virtual displacements of the tree
+    a: Array  #: (n_dof - k,) accelerations of the independent velocities when let go, nothing held
+    forces: Array  #: (n_dof - k,) B^T Q
+    tree: Array  #: (n_v,) Q of the tree
+    size: float  #: largest entry of Q, scaled, to compare with
+
+
+def weigh(module: Module, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None) -> Balance:
+    """The forces at a position on the constraints.
+
+    Where constraints move in time the velocities are those that they enforce, and the forces are those of that motion.
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    q : (n_q,) array
+    held : (k, n_v) array, optional
+        Gradients of held coordinates by displacements, which no virtual displacement may change.
+    preferred : (n_dof,) indices, optional
+    """
+    layout = module.layout
+    scales, n_q, order = layout.scales, layout.n_q, layout.independent if preferred is None else preferred
+    rest = np.concatenate([q, np.zeros(layout.n_v)])
+    J = scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
+    split = partition(J, layout.rank, order)
+    rate = scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
+    x = np.concatenate([q, scales.q * split.particular(-rate)])
+    a = module.rhs(t, x)[n_q:]
+    if rate.any():
+        tree = module.mass_matrix(q, t=t) @ a
+    else:  # nothing moves: no mass matters
+        tree = -module.bias(t, x)
+    if held is not None and len(held):
+        stacked = np.vstack([J, unit_rows(held * scales.q)])
+        split = partition(stacked, rank(stacked).rank, order)
+    B = scales.q[:, None] * split.B / scales.q[split.independent]
+    size = float(np.abs(scales.q * tree).max(initial=0.0))
+    return Balance(x, split.independent, B, a[split.independent], B.T @ tree, tree, size)
+
+
+def unit_rows(rows: Array) -> Array:
+    """Rows of length 1, so that all weigh alike."""
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300))
+
+
+class Slopes(NamedTuple):
+    """How the accelerations at rest change."""
+
+    Z: Array  #: (n_v, n_z) independent displacements
+    by_position: Array  #: (n_dof, n_z) along them
+    by_unknown: Array  #: (n_dof, k) for unit changes of the unknowns
+    motion: Array  #: (n_v, k) displacements that these take along
+    velocities: Indices  #: (n_dof,) rows
+
+
+def slopes(
+    module: Module, t: float, x: Array, held: Array, held_by: Array, parameters: Sequence[int], inputs: Sequence[int]
+) -> Slopes:
+    """Exact derivatives of the accelerations at rest by independent displacements, parameters and inputs.
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    x : (n_x,) array
+    held : (k_h, n_v) array
+        Gradients of held coordinates by displacements: unknowns leave them where they are.
+    held_by : (k_h, n_p) array
+        Their derivatives by the parameters, for coordinates of cut joints.
+    parameters, inputs : sequences of int
+        The unknowns.
+    """
+    layout = module.layout
+    n_q, n_h, scales = layout.n_q, layout.n_h, layout.scales
+    J = module.jacobian(t, x)
+    tangent = find_tangent(module, t, x, J)
+    rows = n_q + tangent.velocities
+    P = module.parameter_jacobian(t, x)[:, list(parameters)]
+    U = module.input_jacobian(t, x)[:, list(inputs)]
+    by_unknown = np.hstack([P, U])[rows]
+    motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
+    if len(parameters) and n_h:
+        moved = assembly_jacobian(module, t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
+        C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
+        stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
+        wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
+        step = -np.linalg.lstsq(stacked, wanted, rcond=1e-10)[0]
+        motion[:, : len(parameters)] = scales.q[:, None] * step
+        by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[rows]
+    return Slopes(tangent.Z, (J @ tangent.T)[rows, : tangent.Z.shape[1]], by_unknown, motion, tangent.velocities)
+
+
+def assembly_jacobian(module: Module, t: float, x: Array) -> Array:
+    """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
+    return module.kernels.state("assembly_jacobian")(x, t=t)
+
+
+def force_slopes(module: Module, t: float, here: Balance, gradients: object, step: float = 1e-5) -> Array:
+    """Change (n_dof - k, n_dof - k) of the forces along the virtual displacements that held coordinates leave.
+
+    Central differences at closed positions.
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    here : Balance
+    gradients : callable
+        q -> gradients of the held coordinates, as for :func:`weigh`.
+    step : float
+        Scaled displacement.
+    """
+    assert callable(gradients)
+    layout, scales = module.layout, module.layout.scales
+    columns = []
+    for k, column in zip(here.velocities, here.B.T, strict=True):
+        h, sides = step * scales.q[k], []
+        for sign in (1.0, -1.0):
+            q = scales.move(here.x[: layout.n_q], sign * h * column / scales.q)
+            q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[: layout.n_q]
+            sides.append(weigh(module, t, q, gradients(q), here.velocities).forces)
+        columns.append((sides[0] - sides[1]) / (2.0 * h))
+    return np.array(columns).reshape(len(columns), len(columns)).T

@@ -1,0 +1,127 @@
+"""Analysis: the result of a search for equilibrium: position, what was solved for, supports, stability."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+from ..runtime.initial import Initial
+from ..runtime.names import unknown
+from .balance import Balance, force_slopes, weigh
+from .linear import linearise
+from .linearisation import Linearisation, judge
+from .tables import as_html, as_text, number
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+    from .search import Search
+
+
+class Equilibrium:
+    """A position in which all forces are in balance; ``eq["theta"]`` reads a coordinate or an unknown found.
+
+    Attributes
+    ----------
+    x : (n_x,) array
+        The state, at rest.
+    q : (n_q,) array
+    coordinates : dict of str to float
+        All of them, those of cut joints included.
+    unknowns : dict of str to float
+        Parameters and inputs that were solved for.
+    forces : dict of str to float
+        What is left of the generalized force along each independent coordinate (N, N m).
+    supports : dict of str to float
+        Generalized force (N, N m) that holds each held coordinate, where no unknowns balance it.
+    eigenvalues : (n,) complex array
+        Of the motion near it, held coordinates held (1/s).
+    stability : {'asymptotically stable', 'marginal', 'unstable'}
+        By their largest real part; 'marginal' where it vanishes.
+    linear : Linearisation or None
+        About the equilibrium; None where supports hold it.
+    module : Module
+        With the unknowns found bound.
+    steps : int
+        Steps of Newton's iteration.
+    """
+
+    def __init__(self, module: Module, t: float, x: Array, found: dict[str, Any]) -> None:
+        self.module, self.t, self.x, self.q = module, t, x, x[: module.n_q]
+        self.coordinates: dict[str, float] = found["coordinates"]
+        self.unknowns: dict[str, float] = found["unknowns"]
+        self.forces: dict[str, float] = found["forces"]
+        self.supports: dict[str, float] = found["supports"]
+        self.linear: Linearisation | None = found["linear"]
+        self.eigenvalues: Any = found["eigenvalues"]
+        self.stability: str = found["stability"]
+        self.steps: int = found["steps"]
+
+    def __getitem__(self, name: str) -> float:
+        values = {**self.coordinates, **self.unknowns}
+        if name not in values:
+            raise unknown("coordinate or unknown", name, values)
+        return values[name]
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value of each line of the description."""
+        lines = [(name, f"{value:.10g}") for name, value in self.coordinates.items()]
+        lines += [(f"{name} (solved)", f"{value:.10g}") for name, value in self.unknowns.items()]
+        lines += [(f"support at {name}", f"{value:.6g}") for name, value in self.supports.items()]
+        lines.append(("largest force left", f"{max(map(abs, self.forces.values()), default=0.0):.2g}"))
+        lines.append(("eigenvalues", ", ".join(number(value) for value in self.eigenvalues)))
+        return [*lines, ("stability", self.stability)]
+
+    def __repr__(self) -> str:
+        return as_text(f"Equilibrium of {self.module.name}", self.facts)
+
+    def _repr_html_(self) -> str:
+        return as_html(f"Equilibrium of {self.module.name}", self.facts)
+
+
+def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: int) -> Equilibrium:
+    """The result at a balanced position."""
+    t, layout = search.t, module.layout
+    held = search.gradients(module, q) if search.supported else None
+    here = weigh(module, t, q, held)
+    found: dict[str, Any] = {
+        "coordinates": read_coordinates(module, q, t),
+        "unknowns": dict(zip(search.names, unknowns.tolist(), strict=True)),
+        "forces": {layout.freedoms[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
+        "supports": {},
+        "linear": None,
+        "steps": steps,
+    }
+    if held is None:
+        linear = linearise(module, here.x, t)
+        found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
+    else:
+        free = weigh(module, t, q)
+        pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=1e-10)[0]
+        rows = search.held_rows(module, q)
+        found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
+        A = _held_motion(search, module, here, t)
+        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": judge(A)}
+    return Equilibrium(module, t, here.x, found)
+
+
+def _held_motion(search: Search, module: Module, here: Balance, t: float) -> Array:
+    """A of the motion with the held coordinates held."""
+    n_q = module.n_q
+    M = here.B.T @ module.mass_matrix(here.x[:n_q], t=t) @ here.B
+    K = -force_slopes(module, t, here, lambda q: search.gradients(module, q))
+    tree = module.mass_matrix(here.x[:n_q], t=t)
+    C = -here.B.T @ tree @ module.jacobian(t, here.x)[n_q:, n_q:] @ here.B
+    n = len(M)
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+
+
+def read_coordinates(module: Module, q: Array, t: float) -> dict[str, float]:
+    """All coordinates by name, those of cut joints included."""
+    values = dict(zip(module.q_names, q.tolist(), strict=True))
+    if module.layout.n_k:
+        y = Initial(module.kernels, t).loops(q)[0]
+        values |= dict(zip(module.layout.loops, y.tolist(), strict=True))
+    return values

@@ -1,0 +1,155 @@
+"""Analysis: states -> their accelerations, constraint Jacobians and multipliers, all states of a batch at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array, Scales
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+RANK = 1e-10  #: relative to the largest singular value of the scaled constraint Jacobian
+
+
+class States(NamedTuple):
+    """Projected states and times, k of them, and what they are evaluated with."""
+
+    module: Module
+    t: Array  #: (k,)
+    x: Array  #: (n_x, k)
+    options: dict[str, Any]  #: p and u
+    single: bool  #: whether one state (n_x,) was given
+
+    @property
+    def q(self) -> Array:
+        """Coordinates (n_q, k)."""
+        return self.x[: self.module.n_q]
+
+    @property
+    def v(self) -> Array:
+        """Velocities (n_v, k)."""
+        return self.x[self.module.n_q :]
+
+    def evaluate(self, kernel: Any, *arrays: Array) -> Array:
+        """A kernel of positions or of motions at these times."""
+        return np.asarray(kernel(*arrays, t=self.t, **self.options))
+
+    def jacobian(self) -> Array:
+        """C_q of all rows, (k, n_c, n_v)."""
+        C_q = self.evaluate(_all_rows(self.module), self.q)
+        return np.ascontiguousarray(np.moveaxis(C_q, -1, 0))
+
+    def accelerations(self) -> Array:
+        """v' of the model itself, (n_v, k)."""
+        return np.asarray(self.module.rhs(self.t, self.x, **self.options))[self.module.n_q :]
+
+    def residual(self, a: Array) -> Array:
+        """M a + h, (n_v, k)."""
+        return self.evaluate(self.module.inverse_dynamics, self.q, self.v, a)
+
+    def shaped(self, result: Array, out: Array | None = None) -> Array:
+        """A result (..., k) as it was asked for."""
+        result = result[..., 0] if self.single else result
+        if out is None:
+            return np.ascontiguousarray(result)
+        if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != result.dtype:
+            raise UsageError(f"out must be an array of shape {result.shape} and type {result.dtype}")
+        out[...] = result
+        return out
+
+
+def _all_rows(module: Module) -> Any:
+    return module.kernels.constraint_jacobian.every
+
+
+def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> States:
+    """Check and project states.
+
+    Raises
+    ------
+    UsageError
+        A wrong shape.
+    ProjectionError
+        The constraints cannot be met near a state.
+    """
+    layout = module.layout
+    state = np.asarray(x, dtype=float)
+    if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
+        raise UsageError(
+            f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
+        )
+    single = state.ndim == 1
+    columns = state[:, None] if single else state
+    time = np.asarray(t, dtype=float)
+    if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
+        raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
+    times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
+    options = {"p": p, "u": u}
+    projected = module.project(np.ascontiguousarray(columns), t=times, **options)
+    return States(module, times, np.asarray(projected), options, single)
+
+
+def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
+    """l with C_q^T l = -force, the smallest in scaled rows where rows depend on each other.
+
+    Parameters
+    ----------
+    C_q : (k, n_c, n_v) array
+    force : (n_v, k) array
+        M a + h.
+    scales : Scales
+
+    Returns
+    -------
+    (n_c, k) array
+    """
+    if not C_q.shape[1]:
+        return np.zeros((0, force.shape[1]))
+    J = C_q * (scales.q / scales.c[:, None])
+    U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
+    kept = sizes > RANK * np.maximum(sizes[:, :1], np.finfo(float).tiny)
+    inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
+    right = -(scales.q[:, None] * force).T[:, :, None]
+    scaled = U @ (inverse[:, :, None] * (Vt @ right))
+    return np.asarray(scaled[:, :, 0].T / scales.c[:, None])
+
+
+def multipliers(
+    module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
+) -> Array:
+    """See :meth:`~..runtime.analyses.Analyses.multipliers`."""
+
+    def find(states: States) -> Array:
+        force = states.residual(states.accelerations())
+        return solve_multipliers(states.jacobian(), force, module.layout.scales)
+
+    return evaluate(find, module, t, x, p, u, out)
+
+
+def evaluate(
+    find: Callable[[States], Array],
+    module: Module,
+    t: ArrayLike,
+    x: ArrayLike,
+    p: Any = None,
+    u: Any = None,
+    out: Array | None = None,
+) -> Array:
+    """``find`` of all states; where inputs are given state by state, (n_u, k), of each state with its own."""
+    states = prepare(module, t, x, p, None if np.ndim(u) == 2 else u)
+    if np.ndim(u) != 2:
+        return states.shaped(find(states), out)
+    inputs = np.asarray(u, dtype=float)
+    if states.single or inputs.shape != (module.n_u, len(states.t)):
+        raise UsageError(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
+    parts = [
+        find(prepare(module, states.t[k : k + 1], states.x[:, k : k + 1], p, np.ascontiguousarray(inputs[:, k])))
+        for k in range(len(states.t))
+    ]
+    return states.shaped(np.concatenate(parts, axis=-1), out)

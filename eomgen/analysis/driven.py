@@ -1,0 +1,172 @@
+"""Analysis: a Module that drivers move entirely -> Trajectory over a span of time, without integration or forces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import SimulationError, UsageError
+from ..numeric.scales import Array
+from ..runtime.integrate import Event
+from ..runtime.signals import Forcing
+from .following import Follower
+from .gaps import describe_gap
+from .kinematic import complete, start_from, walk_in
+from .motions import KinematicAnalysis, keep
+from .roots import find_root
+from .tracks import Track
+from .walking import Path
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+FEWEST = 201  #: points stored where none are asked for
+
+
+def is_driven(module: Module) -> bool:
+    """Whether the positions follow from the time alone."""
+    layout = module.layout
+    return layout.n_dof == 0 and layout.n_q > 0 and layout.n_h == layout.n_c
+
+
+def simulate_driven(
+    module: Module,
+    span: tuple[float, float],
+    initial: Mapping[str, float] | ArrayLike | None,
+    forcing: Forcing,
+    t_eval: Array | None,
+    events: Sequence[Event],
+    given: Mapping[str, Any],
+) -> KinematicAnalysis:
+    """The motion over a span; see :func:`~..runtime.simulate.simulate`.
+
+    Parameters
+    ----------
+    module : Module
+        With the parameters and constant inputs of the run bound.
+    span : (float, float)
+    t_eval : (n_t,) array, optional
+        Within the span, in order.
+    events : sequence of Event
+    given : mapping
+        Options meant for an integrator; tolerances and steps have no meaning here.
+
+    Raises
+    ------
+    PartitionError
+        The start is a singular position.
+    SimulationError
+        The drivers come to a position from which they cannot go on.
+    """
+    for name in given:
+        if name not in ("rtol", "atol", "max_step", "first_step"):
+            raise UsageError(f"a mechanism that drivers move entirely takes no option {name!r}; give method= as well")
+    start, end = span
+    nothing = np.empty(0)
+    if initial is None:
+        t0, q = start_from(module, None, start)
+        module.x0(t=t0)  # declared rates that contradict the drivers are told here
+    elif isinstance(initial, Mapping):
+        t0, q = start, module.x0(initial, t=start)[: module.n_q]
+    else:
+        t0, q = start_from(module, initial, start)
+    follower = Follower(module, complete(module, q, t0, ()))
+    q = walk_in(follower, q, (t0, nothing), (start, nothing))
+    sense = 1.0 if end >= start else -1.0
+    track = Track(follower, Path(start, nothing, sense, nothing), q, abs(end - start))
+    if track.stop is not None:
+        beyond = 0.9 * track.reached + 0.1 * track.end
+        gap = describe_gap(follower, *track.path.at(beyond), track.stop.q)
+        raise SimulationError(
+            f"the drivers cannot go on from t = {track.stop.t:.6g} s of {end:.6g} s: {track.stop}; {gap}; "
+            "change the drivers' values, or the dimensions"
+        )
+    own = track.nodes[track.nodes <= track.end]
+    if t_eval is None:
+        s = np.unique(
+            np.concatenate([own, np.linspace(0.0, track.end, FEWEST)]) if len(own) < FEWEST else [*own, track.end]
+        )
+        t = start + sense * s
+    else:
+        t = t_eval
+        s = sense * (t - start)
+    run = _Run(track, forcing, start, sense)
+    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [track.end]])))
+    message, status = ("A termination event occurred.", 1) if last is not None else ("The end was reached.", 0)
+    if last is not None:
+        kept = s < last
+        s, t = s[kept], t[kept]
+        if t_eval is None:
+            s, t = np.append(s, last), np.append(t, start + sense * last)
+    return run.keep(
+        t,
+        s,
+        t_events,
+        x_events,
+        {"status": status, "message": message, "span": [start, float(t[-1])] if t.size else [start, start]},
+    )
+
+
+class _Run:
+    """Samples of one track as states."""
+
+    def __init__(self, track: Track, forcing: Forcing, start: float, sense: float) -> None:
+        self.track, self.forcing, self.start, self.sense = track, forcing, start, sense
+
+    def state(self, s: float) -> Array:
+        q, v, _ = self.track.motion(np.array([s]), None)
+        return np.concatenate([q[:, 0], v[:, 0]])
+
+    def _value(self, event: Event, s: float) -> float:
+        return event(self.start + self.sense * s, self.state(s))
+
+    def find(self, events: Sequence[Event], grid: Array) -> tuple[list[Array], list[Array], float | None]:
+        """Times and states of events, and where a terminal one ends the run."""
+        found: list[list[float]] = [[] for _ in events]
+        if events:
+            q, v, _ = self.track.motion(grid, None)
+            states = np.concatenate([q, v])
+        last: float | None = None
+        for event, places in zip(events, found, strict=True):
+            values = [event(self.start + self.sense * s, x) for s, x in zip(grid, states.T, strict=True)]
+            for k in range(len(grid) - 1):
+                up, down = values[k] <= 0.0 <= values[k + 1], values[k] >= 0.0 >= values[k + 1]
+                if (up and event.direction >= 0) or (down and event.direction <= 0):
+                    low, high = float(grid[k]), float(grid[k + 1])
+                    places.append(find_root(partial(self._value, event), low, high, values[k], values[k + 1]))
+            if event.terminal and len(places) >= event.terminal:
+                ends = places[int(event.terminal) - 1]
+                last = ends if last is None else min(last, ends)
+        kept = [np.array([s for s in places if last is None or s <= last]) for places in found]
+        times = [self.start + self.sense * s for s in kept]
+        states_at = [np.array([self.state(float(s)) for s in places]).reshape(len(places), -1).T for places in kept]
+        width = self.track.follower.layout.n_x
+        return times, [x if x.size else np.empty((width, 0)) for x in states_at], last
+
+    def keep(
+        self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
+    ) -> KinematicAnalysis:
+        """The trajectory at parameters s."""
+        motion = self.track.motion(s, None)
+        sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
+            times, self.sense * (times - self.start), [], [], header
+        )
+        u = self.forcing.sample(t, np.concatenate(motion[:2]))
+        return keep(
+            self.track.follower,
+            t,
+            [motion],
+            self.track.singular,
+            None,
+            len(t),
+            (),
+            u=u,
+            header=header,
+            t_events=t_events,
+            x_events=x_events,
+            sample=sample,
+        )

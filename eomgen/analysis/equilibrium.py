@@ -1,0 +1,83 @@
+"""Analysis: a guess -> a position where all forces are in balance, with parameters that make it so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import AssemblyError, UsageError
+from ..numeric.scales import Array
+from ..runtime.analyses import require_velocities
+from ..runtime.initial import Initial
+from ..runtime.names import unknown
+from .balanced import Equilibrium, describe, read_coordinates
+from .search import Search
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+
+def find_equilibrium(
+    module: Module,
+    guess: Mapping[str, float] | ArrayLike | None = None,
+    t: float = 0.0,
+    *,
+    p: Any = None,
+    u: Any = None,
+    hold: Mapping[str, float | None] | Sequence[str] = (),
+    unknowns: Sequence[str] = (),
+) -> Equilibrium:
+    """See :meth:`~..runtime.analyses.Analyses.equilibrium`."""
+    require_velocities(module.layout)
+    module = module if p is None and u is None else module.bind(p, u)
+    time = float(t)
+    unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
+    names = (hold,) if isinstance(hold, str) else hold
+    wanted: dict[str, float | None] = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)
+    given = {name: float(value) for name, value in wanted.items() if value is not None}
+    initial = Initial(module.kernels, time)
+    if initial.sort(given).rates:
+        raise UsageError(f"hold takes coordinates, not rates: {', '.join(initial.sort(given).rates)}")
+    q = _start(module, guess, given, time)
+    here = read_coordinates(module, q, time)
+    for name in wanted:
+        if name not in here:
+            raise unknown("coordinate", name, here)
+        given.setdefault(name, here[name])
+    given = initial.sort(given).positions
+    search = Search(module, time, given, unknowns)
+    rows = len(search.gradients(module, q))
+    if unknowns and len(unknowns) < rows:
+        raise UsageError(
+            f"{rows} held coordinates need as many unknowns to be in balance, given: {', '.join(unknowns)}; without "
+            "unknowns what is held is supported"
+        )
+    point, steps = search.run(q)
+    return describe(search, point.module, point.q, point.unknowns, steps)
+
+
+def _start(module: Module, guess: Any, held: Mapping[str, float], t: float) -> Array:
+    """A closed position near the guess that has the held values."""
+    initial = Initial(module.kernels, t)
+    if guess is None or isinstance(guess, Mapping):
+        values = {name: float(value) for name, value in (guess or {}).items()}
+        if initial.sort(values).rates:
+            raise UsageError("a guess is a position: name coordinates, not rates")
+        loose = {name: value for name, value in values.items() if name not in held}
+        q = initial.from_guess(loose) if loose else initial.assembled({})
+    else:
+        q = np.array(guess, dtype=float)
+        if q.shape not in ((module.n_q,), (module.n_x,)):
+            raise UsageError(f"guess must name coordinates or have shape ({module.n_q},), not {q.shape}")
+        q = q[: module.n_q]
+    if held:
+        if not module.layout.n_h:
+            return initial.with_values(q, held)
+        try:
+            return initial.walk(q, held)
+        except AssemblyError:
+            return initial.close(q, held).q
+    return initial.close(q, {}).q if module.layout.n_h else q

@@ -1,0 +1,283 @@
+"""Analysis: a Module, times and led coordinates -> positions, velocities and accelerations over the range.
+
+Masses and forces play no part.  The range is walked from the initial position, so that the mechanism stays on its
+branch; positions between the points of the walk are then solved from cubic guesses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import AssemblyError, PartitionError, UsageError
+from ..numeric.projection import largest
+from ..numeric.scales import Array
+from .following import Follower
+from .gaps import describe_gap
+from .motions import KinematicAnalysis, keep
+from .singular import NEAR, Singular
+from .tracks import Track
+from .walking import Path
+
+if TYPE_CHECKING:
+    from ..runtime.initial import Initial
+    from ..runtime.module import Module
+
+ALIGNED = 1e-12  #: relative difference of two directions that count as one
+MOVES = 1e-12  #: scaled change below which a coordinate stands still
+
+
+class Range(NamedTuple):
+    """What is asked for: n points."""
+
+    t: Array  #: (n,)
+    names: tuple[str, ...]  #: of the led coordinates
+    y: Array  #: (n_led, n)
+    y1: Array  #: their rates
+    y2: Array
+
+
+def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
+    """Sort names into led coordinates, their rates and accelerations.
+
+    Raises
+    ------
+    UsageError
+    """
+    from ..runtime.names import unknown
+
+    layout = module.layout
+    coordinates = layout.q + layout.loops
+    known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
+    for name in named:
+        if name not in known:
+            raise unknown("coordinate or rate", name, known)
+    names = tuple(name for name in named if name in coordinates)
+    for name in named:
+        base = next((c for c in coordinates if name in (c + "_dot", c + "_ddot")), None)
+        if name not in names and base not in names:
+            raise UsageError(f"{name} is given, and no values of {base}; give both")
+    arrays = {name: _column(name, value) for name, value in named.items()}
+    if t is not None:
+        arrays["t"] = _column("t", t)
+    sizes = {name: x.size for name, x in arrays.items() if x.ndim}
+    if not sizes:
+        raise UsageError("there is no range: give times t, or values of a coordinate, as an array")
+    if len(set(sizes.values())) > 1:
+        raise UsageError(f"all must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
+    n = next(iter(sizes.values()))
+
+    def stack(suffix: str) -> Array:
+        rows = [np.broadcast_to(arrays.get(name + suffix, np.zeros(())), n) for name in names]
+        return np.array(rows, dtype=float).reshape(len(names), n)
+
+    times = np.broadcast_to(arrays.get("t", np.zeros(())), n)
+    y, y1 = stack(""), stack("_dot")
+    for k, name in enumerate(names):
+        if np.ptp(times) and np.ptp(y[k]) and name + "_dot" not in named:
+            raise UsageError(f"{name} varies with t: give {name}_dot too (and {name}_ddot, unless it is 0)")
+    return Range(np.array(times), names, y, y1, stack("_ddot"))
+
+
+def _column(name: str, value: Any) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.ndim > 1 or not array.size or not np.isfinite(array).all():
+        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
+    return array
+
+
+def analyse(
+    module: Module, asked: Range, initial: Mapping[str, float] | ArrayLike | None, partial: bool
+) -> KinematicAnalysis:
+    """Walk the range; see :meth:`~..runtime.analyses.Analyses.kinematic_analysis`."""
+    if module.layout.n_h < module.layout.n_c:
+        module.layout.require_minimal_form()
+    t0, y0 = float(asked.t[0]), asked.y[:, 0]
+    start_t, q = start_from(module, initial, t0)
+    try:
+        names = complete(module, q, start_t, asked.names)
+    except PartitionError:
+        if initial is not None or not asked.names:
+            raise
+        # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
+        start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
+        names = complete(module, q, start_t, asked.names)
+    follower = Follower(module, names)
+    further = follower.led_values(q, start_t)[len(asked.names) :]
+    start_y = follower.led_values(q, start_t)
+    led = len(asked.names)
+    for k in np.flatnonzero(follower.wraps[:led]):  # the same angle, counted as asked for
+        start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
+    rest = np.repeat(further[:, None], len(asked.t), axis=1)
+    still = np.zeros_like(rest)
+    asked = Range(
+        asked.t,
+        names,
+        np.concatenate([asked.y, rest]),
+        np.concatenate([asked.y1, still]),
+        np.concatenate([asked.y2, still]),
+    )
+    q = walk_in(follower, q, (start_t, start_y), (t0, asked.y[:, 0]))
+    return walk_range(follower, asked, q, partial, led)
+
+
+def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, t0: float) -> tuple[float, Array]:
+    """A closed position and its time: as given, or the declared one at t = 0."""
+    from ..runtime.initial import Initial
+
+    layout = module.layout
+    if initial is None:
+        first = Initial(module.kernels, 0.0)
+        try:
+            return 0.0, first.assembled({})
+        except AssemblyError:
+            if not t0:
+                raise
+            return t0, Initial(module.kernels, t0).assembled({})
+    here = Initial(module.kernels, t0)
+    if isinstance(initial, Mapping):
+        given = here.sort({name: float(value) for name, value in initial.items()})
+        if given.rates:
+            raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
+        return t0, here.assembled(given.positions)
+    q = np.array(initial, dtype=float)
+    if q.shape == (layout.n_x,):
+        q = q[: layout.n_q]
+    if q.shape != (layout.n_q,):
+        raise UsageError(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
+    return t0, here.close(q, {}).q if layout.n_h else q
+
+
+def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
+    """The led coordinates, and those of the independent ones that stand still besides.
+
+    Raises
+    ------
+    UsageError
+        Too many are led, or they depend on each other.
+    PartitionError
+        The position is singular for them.
+    """
+    from ..runtime.initial import Initial
+
+    layout = module.layout
+    initial: Initial = Initial(module.kernels, t)
+    if len(names) > layout.n_dof:
+        what = "none is left to lead, the drivers move all; give t" if not layout.n_dof else f"at most {layout.n_dof}"
+        raise UsageError(f"{', '.join(names)} cannot all be led: {layout.n_dof} degrees of freedom, {what}")
+    free = [layout.freedoms[i] for i in layout.independent if layout.freedoms[i] in layout.q]
+    others = [name for name in [*free, *layout.q] if name not in names]
+    values = dict.fromkeys(list(dict.fromkeys(others)), 0.0)
+    fine = initial.compatible(q, (), dict.fromkeys(names, 0.0))
+    for name in names:
+        if name not in fine:
+            place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
+            raise PartitionError(
+                f"{name} cannot be led from the initial position ({place}): it stands still there whatever moves, or "
+                "branches meet; give an initial position beside it",
+                t,
+                q,
+            )
+    held = list(initial.compatible(q, names, values))[: layout.n_dof - len(names)]
+    if len(names) + len(held) < layout.n_dof:
+        module.layout.require_minimal_form()
+        raise UsageError(f"{layout.n_dof} degrees of freedom, and too few coordinates to lead them at this position")
+    result = (*names, *held)
+    Q = Follower(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
+    if Q < NEAR:
+        place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
+        raise PartitionError(
+            f"the initial position is singular ({place}): branches meet there; give an initial position beside it", t, q
+        )
+    return result
+
+
+def walk_in(follower: Follower, q: Array, start: tuple[float, Array], first: tuple[float, Array]) -> Array:
+    """From the initial position to the first point of the range.
+
+    Raises
+    ------
+    PartitionError
+        The way is blocked.
+    """
+    (t, y), (t0, y0) = start, first
+    length = largest(np.concatenate([(y0 - y) / follower.led_scales, [t0 - t]]))
+    if length <= MOVES:
+        return q
+    track = Track(follower, Path(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
+    if track.stop is not None:
+        raise PartitionError(
+            f"the way from the initial position to the first point is blocked: {track.stop}; give initial={{...}} "
+            "nearer to the first point",
+            t0,
+            q,
+        )
+    return track.position(length)
+
+
+def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
+    """Straight pieces one after the other."""
+    n = len(asked.t)
+    pieces = _pieces(follower, asked)
+    columns: list[tuple[Array, Array, Array]] = []
+    found: list[Singular] = []
+    stop: Singular | None = None
+    count = 0
+    for first, last in pieces:
+        t, y = float(asked.t[first]), asked.y[:, first]
+        dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
+        length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
+        path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
+        along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0)
+        track = Track(follower, path, q, length)
+        new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
+        reach = np.array([track.holds(s) for s in along])
+        taken = np.arange(len(along))[new][reach[new]]
+        index = first + taken
+        columns.append(track.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
+        count += len(taken)
+        found += track.singular
+        if track.stop is not None:
+            stop = track.stop
+            found.append(track.stop)
+            break
+        q = columns[-1][0][:, -1] if len(taken) else q
+    result = keep(follower, asked.t[:count], columns, found, stop, n, asked.names[:led])
+    if count < n and not partial:
+        gap = "" if stop is None else describe_gap(follower, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
+        error = PartitionError(
+            f"the range cannot be followed to its end: {stop}; {gap}partial=True gives the part that can be reached, "
+            f"{count} of {n} points",
+            None if stop is None else stop.t,
+            None if stop is None else stop.q,
+        )
+        error.reached = result  # type: ignore[attr-defined]
+        raise error
+    return result
+
+
+def _pieces(follower: Follower, asked: Range) -> list[tuple[int, int]]:
+    """First and last indices of straight pieces of the range."""
+    scaled = np.concatenate([asked.t[None, :], asked.y / follower.led_scales[:, None]])
+    steps = np.diff(scaled, axis=1)
+    sizes = np.abs(steps).max(axis=0) if steps.size else np.empty(0)
+    pieces: list[tuple[int, int]] = []
+    first, direction = 0, None
+    for k in range(len(sizes)):
+        if sizes[k] <= MOVES:
+            continue
+        here = steps[:, k] / sizes[k]
+        if (
+            direction is not None
+            and np.abs(here - direction).max() > ALIGNED + 1e-15 * np.abs(scaled[:, k]).max() / sizes[k]
+        ):
+            pieces.append((first, k))
+            first = k
+            direction = here
+        elif direction is None:
+            direction = here
+    pieces.append((first, len(asked.t) - 1))
+    return pieces

@@ -1,0 +1,87 @@
+"""Analysis: the equations of motion near a state -> x' = A x + B u, y = C x + D u, and M z'' + C z' + K z = 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.analyses import require_velocities
+from .linearisation import Linearisation
+from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+FORMS = ("minimal", "full")
+
+
+def linearise(
+    module: Module,
+    x: ArrayLike | None = None,
+    t: float = 0.0,
+    *,
+    p: Any = None,
+    u: Any = None,
+    form: str = "minimal",
+    independent: Sequence[str] | None = None,
+) -> Linearisation:
+    """See :meth:`~..runtime.analyses.Analyses.linearise`."""
+    require_velocities(module.layout)
+    if form not in FORMS:
+        raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
+    module = module if p is None and u is None else module.bind(p, u)
+    layout, time = module.layout, float(t)
+    state = module.x0(t=time) if x is None else np.array(x, dtype=float)
+    if state.shape != (layout.n_x,):
+        raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+    state = module.project(state, t=time)
+    rates, J, U = module.rhs(time, state), module.jacobian(time, state), module.input_jacobian(time, state)
+    if form == "full":
+        if independent is not None:
+            raise UsageError("independent= chooses the states of the minimal form; the full form has all of x")
+        P = projected_directions(module, time, state, J)
+        A, B, drift, states = J, U, rates, layout.x
+        C, D = _outputs(module, time, state, rates, P, J, U)
+        return Linearisation(layout, time, state, module.u, (A, B, C, D), states, drift)
+    tangent = find_tangent(module, time, state, J, independent)
+    n_q, n_z = layout.n_q, len(tangent.positions)
+    moved = J @ tangent.T
+    turned = np.hstack([tangent.Z, np.zeros_like(tangent.B)])
+    z = displacement_rates(layout, state, moved[:n_q], turned)[tangent.positions]
+    A = np.vstack([z, moved[n_q:][tangent.velocities]])
+    pushed = displacement_rates(layout, state, U[:n_q], np.zeros((layout.n_v, layout.n_u)))
+    B = np.vstack([pushed[tangent.positions], U[n_q:][tangent.velocities]])
+    C, D = _outputs(module, time, state, rates, tangent.T, moved, U)
+    v = state[n_q:]
+    drift = np.concatenate([v[tangent.positions], rates[n_q:][tangent.velocities]])
+    names = displacement_names(layout)
+    states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
+    mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
+    damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
+    return Linearisation(
+        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent
+    )
+
+
+def _outputs(
+    module: Module, t: float, x: Array, rates: Array, directions: Array, moved: Array, U: Array
+) -> tuple[Array, Array]:
+    """C and D: changes of the outputs for changes of x along directions, with the accelerations that follow."""
+    layout = module.layout
+    n_q, n_v, n_x = layout.n_q, layout.n_v, layout.n_x
+    if not layout.n_y:
+        return np.zeros((0, directions.shape[1])), np.zeros((0, layout.n_u))
+    Y = output_derivatives(module, t, x, rates[n_q:])
+    by_a = Y[:, n_x : n_x + n_v]
+    return Y[:, :n_x] @ directions + by_a @ moved[n_q:], Y[:, n_x + n_v : n_x + n_v + layout.n_u] + by_a @ U[n_q:]
+
+
+def output_derivatives(module: Module, t: float, x: Array, a: Array) -> Array:
+    """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
+    n_q = module.n_q
+    return module.kernels.motion("output_derivatives")(x[:n_q], x[n_q:], a, t=t)

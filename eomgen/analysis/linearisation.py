@@ -1,0 +1,226 @@
+"""Analysis: the result of a linearisation, its eigenvalues and its second-order form."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.names import unknown
+from .tables import as_html, as_text, number
+
+if TYPE_CHECKING:
+    from ..runtime.layout import Layout
+    from .tangent import Tangent
+
+STILL = 1e-7  #: scaled rates below which a state counts as an equilibrium
+MARGIN = 1e-6  #: real parts below this part of the largest eigenvalue (at least 1/s) count as zero
+LOOSEST = 1e-4  #: the same for eigenvalues that rounding moves far
+COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
+
+
+def judge(A: Array) -> str:
+    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
+
+    Eigenvalues that rounding can move far, such as repeated zeros, count as zero within ten times that distance (their
+    condition numbers: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., section 7.2.2).
+    """
+    if not A.size:
+        return "asymptotically stable"
+    values, vectors = np.linalg.eig(A)
+    size = max(1.0, float(np.abs(values).max()))
+    with np.errstate(over="ignore", invalid="ignore"):
+        try:
+            condition = np.linalg.norm(np.linalg.inv(vectors), axis=1)
+        except np.linalg.LinAlgError:
+            condition = np.full(len(A), np.inf)
+        rounding = 10.0 * np.finfo(float).eps * float(np.linalg.norm(A, 2)) * condition
+    margin = np.minimum(np.maximum(MARGIN * size, rounding), LOOSEST * size)
+    if (values.real > margin).any():
+        return "unstable"
+    return "marginal" if (values.real >= -margin).any() else "asymptotically stable"
+
+
+class Linearisation:
+    """The motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
+
+    In the minimal form s holds the n_z independent displacements, then the n_dof independent velocities; in the full
+    form it is the change of x.  At a steady motion the matrices are those of the motion with respect to it.
+
+    Attributes
+    ----------
+    A, B, C, D : arrays (n, n), (n, n_u), (n_y, n), (n_y, n_u)
+    states, inputs, outputs : tuple of str
+        Names of the rows and columns; a small rotation in the place of Euler parameters is ``<joint>_rx, _ry, _rz``.
+    x : (n_x,) array
+        The state, projected onto the constraints.
+    t : float
+    u : (n_u,) array
+    drift : (n,) array
+        Rates at the state itself; 0 at an equilibrium.  The last n_dof are the accelerations: 0 in a steady motion.
+    mass : (n_dof, n_dof) array or None
+    damping : (n_dof, n_dof) array or None
+        Gyroscopic terms included.
+    stiffness : (n_dof, n_z) array or None
+        ``mass w' + damping w + stiffness z = forces`` for displacements z and velocities w; symmetric at an
+        equilibrium of conservative forces.  None in the full form.
+    velocity_names, position_names : tuple of str
+        Of w and z.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        t: float,
+        x: Array,
+        u: Array,
+        matrices: tuple[Array, Array, Array, Array],
+        states: tuple[str, ...],
+        drift: Array,
+        second: tuple[Array, Array, Array] | None = None,
+        tangent: Tangent | None = None,
+    ) -> None:
+        self.layout, self.name, self.t, self.x, self.u = layout, layout.name, t, x, u
+        self.A, self.B, self.C, self.D = matrices
+        self.states, self.inputs, self.outputs, self.drift = states, layout.u, layout.y, drift
+        self.mass: Array | None = None
+        self.damping: Array | None = None
+        self.stiffness: Array | None = None
+        if second is not None:
+            self.mass, self.damping, self.stiffness = second
+        self.tangent = tangent
+        n_z = len(states) - layout.n_dof if tangent is not None else layout.n_q
+        self.position_names, self.velocity_names = states[:n_z], states[n_z:]
+
+    @cached_property
+    def _sorted(self) -> tuple[Any, Any]:
+        values, vectors = np.linalg.eig(self.A)
+        order = np.lexsort((values.imag, np.round(values.real, 9), np.round(np.abs(values), 9)))
+        return values[order], vectors[:, order]
+
+    @property
+    def eigenvalues(self) -> Any:
+        """(n,) complex array (1/s), slow ones first; pairs stand together."""
+        return np.asarray(self._sorted[0], dtype=complex)
+
+    @property
+    def eigenvectors(self) -> Any:
+        """(n, n) complex array; columns in the order of the eigenvalues, of length 1."""
+        return np.asarray(self._sorted[1], dtype=complex)
+
+    @property
+    def is_equilibrium(self) -> bool:
+        """Whether nothing moves, up to 1e-7 in units of the length scale, radians and seconds."""
+        return bool((np.abs(self._scaled_drift) <= STILL).all())
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether no velocity changes, up to 1e-7."""
+        return bool((np.abs(self._scaled_drift[len(self.position_names) :]) <= STILL).all())
+
+    @property
+    def _scaled_drift(self) -> Array:
+        layout, tangent = self.layout, self.tangent
+        s = layout.scales.q
+        if tangent is None:
+            plain = np.array([layout.length if kind == "length" else 1.0 for kind in layout.coordinate_kinds])
+            return np.asarray(self.drift / np.concatenate([plain, s]))
+        return np.asarray(self.drift / np.concatenate([s[tangent.positions], s[tangent.velocities]]))
+
+    @property
+    def stability(self) -> str:
+        """By the largest real part of the eigenvalues: 'asymptotically stable', 'marginal' or 'unstable'.
+
+        'marginal' where it vanishes within 1e-6 of the largest eigenvalue, or of what rounding can do to repeated ones:
+        the linear equations do not decide.
+        """
+        return judge(self.A)
+
+    def second_order(self, *names: str) -> tuple[Array, Array, Array]:
+        """M, C, K of ``M z'' + C z' + K z = 0``, square.
+
+        Parameters
+        ----------
+        *names : str
+            Coordinates to keep; by default all independent ones.  They must not depend on the others.
+
+        Returns
+        -------
+        M, C, K : (k, k) arrays
+
+        Raises
+        ------
+        UsageError
+            The full form has none; a name is unknown; other coordinates act on those named, or they are not the
+            integrals of the velocities (nonholonomic constraints).
+        """
+        if self.mass is None or self.damping is None or self.stiffness is None:
+            raise UsageError("the full form has no second-order form; linearise with form='minimal'")
+        chosen = names or self.position_names
+        rows = []
+        positions, tangent = list(self.position_names), self.tangent
+        assert tangent is not None
+        for name in chosen:
+            if name not in positions:
+                raise unknown("independent coordinate", name, positions)
+            which = np.flatnonzero(tangent.velocities == tangent.positions[positions.index(name)])
+            if not which.size:
+                raise UsageError(
+                    f"the rate of {name} is no independent velocity here ({', '.join(self.velocity_names)} are), so "
+                    "that it has no equation of second order; name coordinates whose rates are independent"
+                )
+            rows.append(int(which[0]))
+        columns = [positions.index(name) for name in chosen]
+        matrices = []
+        for label, matrix, kept in (("M", self.mass, rows), ("C", self.damping, rows), ("K", self.stiffness, columns)):
+            others = np.delete(matrix[rows], kept, axis=1)
+            size = float(np.abs(matrix).max(initial=0.0))
+            if others.size and float(np.abs(others).max()) > COUPLED * size:
+                worst = int(np.abs(others).max(axis=0).argmax())
+                have = positions if label == "K" else [str(n) for n in self.velocity_names]
+                other = [n for k, n in enumerate(have) if k not in kept][worst]
+                raise UsageError(f"{other} acts on {', '.join(chosen)} through {label}; name it too")
+            matrices.append(matrix[np.ix_(rows, kept)])
+        kinematic = self.A[np.ix_(columns, range(len(positions), len(self.states)))] - np.eye(self.layout.n_dof)[rows]
+        if np.abs(kinematic).max(initial=0.0) > COUPLED or np.abs(self.A[columns, : len(positions)]).max() > COUPLED:
+            raise UsageError(f"the rates of {', '.join(chosen)} are not their velocities alone; use A, B, C, D")
+        return matrices[0], matrices[1], matrices[2]
+
+    def state_space(self) -> Any:
+        """The system as a ``scipy.signal.StateSpace``.
+
+        Raises
+        ------
+        UsageError
+            The model has no inputs or no outputs.
+        MissingDependencyError
+            SciPy is not installed.
+        """
+        from ..runtime.names import require
+
+        signal = require("scipy.signal", "scipy", "state_space")
+        if not self.inputs or not self.outputs:
+            missing = "inputs" if not self.inputs else "outputs"
+            raise UsageError(f"model {self.name!r} has no {missing}, and StateSpace needs some; A, B, C, D are arrays")
+        return signal.StateSpace(self.A, self.B, self.C, self.D)
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value of each line of the description."""
+        kind = "equilibrium" if self.is_equilibrium else "steady motion" if self.is_steady else "no steady motion"
+        lines = [("at", f"{kind}, t = {self.t:.6g} s"), ("states", ", ".join(self.states))]
+        lines += [("inputs", ", ".join(self.inputs) or "-"), ("outputs", ", ".join(self.outputs) or "-")]
+        if kind == "no steady motion":
+            worst = int(np.abs(self._scaled_drift).argmax())
+            lines.append(("largest drift", f"{self.states[worst]}, {self.drift[worst]:.6g}"))
+        lines.append(("eigenvalues", ", ".join(number(value) for value in self.eigenvalues)))
+        return [*lines, ("stability", self.stability)]
+
+    def __repr__(self) -> str:
+        return as_text(f"Linearisation of {self.name}", self.facts)
+
+    def _repr_html_(self) -> str:
+        return as_html(f"Linearisation of {self.name}", self.facts)

@@ -1,0 +1,162 @@
+"""Analysis: a linearisation at rest -> natural frequencies, mode shapes, damping ratios.
+
+Undamped modes solve ``K s = omega^2 M s`` (L. Meirovitch, Fundamentals of Vibrations, 2001, sections 4.6 and 7.5),
+damped ones are the eigenvalues of A.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .linearisation import Linearisation
+from .tables import as_html, as_text, number
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+RIGID = 1e-9  #: squares of frequencies below this part of the largest (at least 1/s^2) are rigid-body modes
+SYMMETRIC = 1e-9  #: relative difference up to which K counts as symmetric
+
+
+class Damped(NamedTuple):
+    """One damped mode: a pair of complex eigenvalues, or one real one."""
+
+    eigenvalue: complex  #: 1/s, with the positive imaginary part
+    frequency: float  #: natural frequency abs(eigenvalue), rad/s
+    damped: float  #: frequency of the oscillation, its imaginary part, rad/s
+    ratio: float  #: damping ratio, 1 or -1 for real eigenvalues, 0 for a zero
+
+
+class Modes:
+    """Small motions about an equilibrium.
+
+    Attributes
+    ----------
+    squares : (n_dof,) array
+        omega^2 of ``K s = omega^2 M s``, ascending (1/s^2); negative for modes that diverge.
+    frequencies : (n_dof,) array
+        omega (rad/s), 0 where the square is negative or belongs to a rigid-body mode.
+    hertz : (n_dof,) array
+    shapes : (n_dof, n_dof) array
+        Columns: amplitudes of the independent velocities' displacements, with s^T M s = 1 and the largest positive.
+    motions : (n_v, n_dof) array
+        The same for all velocities of the tree, ``v_names``.
+    names : tuple of str
+        Rows of shapes.
+    rigid, diverging : int
+        Numbers of rigid-body modes and of modes with negative squares.
+    damped : list of Damped
+        The modes with damping and gyroscopic terms, slow ones first.
+    linear : Linearisation
+    """
+
+    def __init__(self, linear: Linearisation) -> None:
+        assert linear.mass is not None
+        assert linear.tangent is not None
+        self.linear, self.name = linear, linear.name
+        self.names, self.v_names = linear.velocity_names, linear.layout.v
+        self.squares, self.shapes = _undamped(linear.mass, stiffness(linear))
+        size = RIGID * max(1.0, float(np.abs(self.squares).max(initial=0.0)))
+        still = np.abs(self.squares) <= size
+        self.rigid, self.diverging = int(still.sum()), int((self.squares < -size).sum())
+        self.frequencies = np.sqrt(np.where(still, 0.0, np.maximum(self.squares, 0.0)))
+        self.hertz = self.frequencies / (2.0 * np.pi)
+        self.motions = linear.tangent.B @ self.shapes
+
+    @cached_property
+    def damped(self) -> list[Damped]:
+        """The modes with damping and gyroscopic terms, slow ones first."""
+        values = self.linear.eigenvalues
+        tiny = 1e-9 * max(1.0, float(np.abs(values).max(initial=0.0)))
+        found = []
+        for value in values:
+            if value.imag < -tiny:
+                continue
+            size = float(abs(value))
+            ratio = 0.0 if size <= tiny else float(-value.real / size)
+            imaginary = float(value.imag) if value.imag > tiny else 0.0
+            found.append(Damped(complex(value), size, imaginary, ratio))
+        return sorted(found, key=lambda mode: mode.frequency)
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """Label and value of each line of the description."""
+        lines = []
+        for k, square in enumerate(self.squares):
+            shape = ", ".join(f"{name.removesuffix('_dot')} {x:.4g}" for name, x in zip(self.names, self.shapes[:, k],
+                                                                                         strict=True))  # fmt: skip
+            what = f"{self.frequencies[k]:.6g} rad/s, {self.hertz[k]:.6g} Hz"
+            if self.frequencies[k] == 0.0:
+                what = "rigid body" if abs(square) <= RIGID * max(1.0, np.abs(self.squares).max()) else (
+                    f"diverges, {np.sqrt(-square):.6g} 1/s"
+                )  # fmt: skip
+            lines.append((f"mode {k + 1}", f"{what}: {shape}"))
+        for mode in self.damped:
+            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {mode.ratio:.4g}"))
+        return lines
+
+    def __repr__(self) -> str:
+        return as_text(f"Modes of {self.name}", self.facts)
+
+    def _repr_html_(self) -> str:
+        return as_html(f"Modes of {self.name}", self.facts)
+
+
+def stiffness(linear: Linearisation) -> Array:
+    """K (n_dof, n_dof) by the displacements that the independent velocities make."""
+    assert linear.stiffness is not None
+    n_z = len(linear.position_names)
+    return np.asarray(linear.stiffness @ linear.A[:n_z, n_z:])
+
+
+def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
+    """Squares of the frequencies and mode shapes."""
+    if not M.size:
+        return np.zeros(0), np.zeros((0, 0))
+    factor = np.linalg.cholesky(M)
+    inverse = np.linalg.inv(factor)
+    reduced = inverse @ K @ inverse.T
+    if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):
+        squares, vectors = np.linalg.eigh(0.5 * (reduced + reduced.T))
+    else:
+        values, complexes = np.linalg.eig(reduced)
+        if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
+            raise UsageError(
+                "the undamped modes are not real, because the stiffness is not symmetric (forces that follow the "
+                "motion); see the eigenvalues of linearise"
+            )
+        order = np.argsort(values.real)
+        squares, vectors = values.real[order], complexes.real[:, order]
+    shapes = inverse.T @ vectors
+    shapes /= np.sqrt(np.einsum("ik,ij,jk->k", shapes, M, shapes))
+    largest = np.abs(shapes).argmax(axis=0)
+    shapes *= np.where(shapes[largest, np.arange(len(squares))] < 0.0, -1.0, 1.0)
+    return np.asarray(squares), np.asarray(shapes)
+
+
+def find_modes(
+    module: Module, x: ArrayLike | None = None, t: float = 0.0, *, p: Any = None, u: Any = None, independent: Any = None
+) -> Modes:
+    """See :meth:`~..runtime.analyses.Analyses.modes`."""
+    module = module if p is None and u is None else module.bind(p, u)
+    if x is None:
+        from .equilibrium import find_equilibrium
+
+        x = find_equilibrium(module, t=t).x
+    state = np.array(x, dtype=float)
+    if state.shape == (module.n_q,):
+        state = np.concatenate([state, np.zeros(module.n_v)])
+    linear = module.linearise(state, t, independent=independent)
+    if not linear.is_equilibrium:
+        k = int(np.abs(linear.drift).argmax())
+        raise UsageError(
+            f"modes are those about an equilibrium, and here {linear.states[k]} changes at a rate of "
+            f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearise()"
+        )
+    return Modes(linear)

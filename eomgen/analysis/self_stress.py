@@ -1,0 +1,128 @@
+"""Analysis: reactions of a loop with more constraints than it needs -> the smallest ones, and where they are a choice.
+
+Rigid bodies do not tell how a self-stress, a set of reactions that balance each other on every body, is shared out
+(J. Garcia de Jalon, M.D. Gutierrez-Lopez, Multibody dynamics with redundant constraints and singular mass matrix,
+Multibody System Dynamics 30 (2013), 311-341; M. Wojtyra, Joint reactions in rigid body mechanisms with dependent
+constraints, Mechanism and Machine Theory 44 (2009), 2265-2278).  All joints are taken into account, with the
+equations that the mechanism's symmetry makes vanish, so that it does not matter where loops were cut.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+from .constrained import States
+from .reactions import GROUND, RANK, SEEN, Geometry, along_free, free_of, shift, transmitted
+
+
+def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:
+    """Orthonormal columns (k, 6, r) of the wrenches that each joint can exert at S, moments in units of the length.
+
+    A state in which there are fewer than in others has columns of zeros.
+    """
+    found = []
+    for joint in range(len(table["ends"])):
+        reach = [i for i, owner in enumerate(table["reach"]) if owner == joint]
+        if reach:
+            G = np.moveaxis(geometry.reach[reach], -1, 0) * _per(length)
+            _, sizes, Vt = np.linalg.svd(G, full_matrices=False)
+            kept = sizes > RANK * sizes[:, :1]
+        else:
+            F = np.moveaxis(geometry.free[free_of(table, joint)], -1, 0) / _per(length)
+            size = np.sqrt((F**2).sum(axis=2, keepdims=True))
+            _, sizes, Vt = np.linalg.svd(F / np.where(size > 0.0, size, 1.0))
+            kept = np.ones(Vt.shape[:2], dtype=bool)
+            kept[:, : sizes.shape[1]] = sizes <= RANK
+        columns = Vt[:, kept.any(axis=0)] * kept[:, kept.any(axis=0), None]
+        found.append(np.swapaxes(columns, 1, 2))
+    return found
+
+
+def _per(length: float) -> Array:
+    """Factors that take a wrench to one in units of force."""
+    return np.array([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length])
+
+
+def element_wrenches(states: States, table: dict[str, Any], geometry: Geometry) -> Array:
+    """What unit multipliers of constraint elements exert on each body, along coordinates of the tree too.
+
+    Returns
+    -------
+    (n_e, n_bodies, 6, k) array
+    """
+    rows = [i for i, joint in enumerate(table["rows"]) if joint == GROUND]
+    result = np.array(geometry.rows[rows])
+    if not rows:
+        return result
+    C_q = states.jacobian()[:, rows]
+    for e in range(len(rows)):
+        passed = transmitted(table, geometry, geometry.rows[rows[e]])
+        for _, _, joint, _ in table["tree"]:
+            own = free_of(table, joint)
+            if not own:
+                continue
+            forces, _ = along_free(geometry.free[own], passed[joint])
+            rest = C_q[:, e, [table["velocities"][i] for i in own]].T - forces
+            couple = _driving(geometry.free[own], rest)
+            for body, sign in zip(table["ends"][joint], (-1.0, 1.0), strict=True):
+                if body != GROUND:
+                    result[e, body] += sign * shift(couple, geometry.points[joint], geometry.origins[body])
+    return result
+
+
+def _driving(free: Array, forces: Array) -> Array:
+    """The wrench (6, k) at S with these generalized forces (n, k): torques where directions turn."""
+    directions = np.moveaxis(free, -1, 0)
+    _, unit = along_free(free, (np.linalg.pinv(directions) @ forces.T[:, :, None])[:, :, 0].T)
+    return unit
+
+
+def remove_self_stress(
+    states: States, table: dict[str, Any], geometry: Geometry, reactions: Array, multipliers: Array
+) -> tuple[Array, Array]:
+    """The smallest reactions, and which components a self-stress changes.
+
+    The measure is the sum of squares of all joint forces and of all moments over the model's length, and of scaled
+    multipliers of constraint elements.
+    """
+    length, scales = states.module.layout.length, states.module.layout.scales
+    element_rows = [i for i, joint in enumerate(table["rows"]) if joint == GROUND]
+    sizes = scales.c[element_rows] / length
+    per, n_b, count = _per(length), len(geometry.origins), reactions.shape[-1]
+    joints = bases(table, geometry, length)
+    ends = np.cumsum([0, *(B.shape[2] for B in joints), len(element_rows)])
+    A = np.zeros((count, n_b, 6, ends[-1]))
+    for j, B in enumerate(joints):
+        for body, sign in zip(table["ends"][j], (-1.0, 1.0), strict=True):
+            if body != GROUND:
+                arm = (geometry.points[j] - geometry.origins[body]) / length
+                A[:, body, :, ends[j] : ends[j + 1]] += sign * (_shifts(arm) @ B)
+    elements = element_wrenches(states, table, geometry) * per[:, None] / sizes[:, None, None, None]
+    A[..., ends[-2] :] = -np.moveaxis(elements, (0, 3), (3, 0))
+    _, found, Vt = np.linalg.svd(A.reshape(count, 6 * n_b, ends[-1]))
+    null = np.ones(Vt.shape[:2], dtype=bool)
+    null[:, : found.shape[1]] = found <= RANK * found.max(axis=1, initial=0.0)[:, None]
+    N = Vt * null[:, :, None]  # its rows span the self-stresses
+    scaled = np.moveaxis(reactions * per[:, None], -1, 0)
+    forces = [np.einsum("kij,ki->kj", B, scaled[:, j]) for j, B in enumerate(joints)]
+    forces.append((multipliers[element_rows] * sizes[:, None]).T)
+    stress = np.einsum("kni,kn->ki", N, np.einsum("kni,ki->kn", N, np.concatenate(forces, axis=1)))
+    result, flags = np.array(reactions), np.zeros(reactions.shape, dtype=bool)
+    for j, B in enumerate(joints):
+        part = slice(ends[j], ends[j + 1])
+        result[j] -= (np.einsum("kij,kj->ki", B, stress[:, part]) / per).T
+        flags[j] = (np.sqrt(((B @ np.swapaxes(N[:, :, part], 1, 2)) ** 2).sum(axis=2)) > SEEN).T
+    return result, flags
+
+
+def _shifts(arm: Array) -> Array:
+    """Matrices (k, 6, 6) that take wrenches to a point from which they act at ``arm`` (3, k)."""
+    x, y, z = arm
+    result = np.zeros((arm.shape[1], 6, 6))
+    result[:, range(6), range(6)] = 1.0
+    for row, column, value in ((3, 1, -z), (3, 2, y), (4, 0, z), (4, 2, -x), (5, 0, -y), (5, 1, x)):
+        result[:, row, column] = value
+    return result

@@ -1,0 +1,244 @@
+"""Analysis: walks -> the singular positions on them: where they are, and which coordinates and joints are to blame.
+
+At a singular position a motion is possible while the led coordinates (and the drivers) stand still.  Either the branch
+goes on through it, beside others (a change point: the sign of det K changes), or the led coordinates turn back there (a
+stop: a dead centre of theirs, the end of the mechanism's reach).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numeric.projection import largest
+from ..numeric.scales import Array
+from .bridging import Bridge, build_bridge
+from .following import Follower, Tangent
+from .roots import find_root
+from .walking import LEAPS, Point, Walk
+
+NEAR = 1e-6  #: quality below which a position counts as singular
+LOW = 0.03  #: quality below which a minimum is looked into
+SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
+NARROW = 0.02  #: scaled motion to which a change of sign is narrowed by steps
+
+
+class Singular(NamedTuple):
+    """A singular position.
+
+    Attributes
+    ----------
+    kind : {'change point', 'stop'}
+    t : float
+        Time (s).
+    values : dict
+        Led coordinate -> its value there.
+    q : (n_q,) array
+    moving : tuple of str
+        Coordinates that can move while the led ones stand still.
+    joints : tuple of str
+        Joints and constraints whose equations do not hold that motion.
+    """
+
+    kind: str
+    t: float
+    values: Mapping[str, float]
+    q: Array
+    moving: tuple[str, ...]
+    joints: tuple[str, ...]
+
+    def __str__(self) -> str:
+        place = ", ".join([f"{name} = {value:.9g}" for name, value in self.values.items()] or [f"t = {self.t:.9g} s"])
+        if self.kind == "stop":
+            what = f"{', '.join(self.values) or 'the drivers'} can go no further"
+        else:
+            what = "the motion may branch"
+        joints = f" (joints {', '.join(self.joints)})" if self.joints else ""
+        return f"{self.kind} at {place}: {what}; {', '.join(self.moving)} can still move{joints}"
+
+
+def name_singular(follower: Follower, kind: str, t: float, q: Array, tangent: Tangent) -> Singular:
+    """Put names to a singular position."""
+    layout = follower.layout
+    free = np.abs(tangent.free)
+    moving = tuple(layout.freedoms[i] for i in np.flatnonzero(free >= SHARE * free.max()))
+    held = np.abs(tangent.rows[: layout.n_c])
+    labels = [layout.constraint_labels[i] for i in np.flatnonzero(held >= SHARE * np.abs(tangent.rows).max())]
+    joints = tuple(dict.fromkeys(label.partition(".")[0] for label in labels))
+    values = dict(zip(follower.led, follower.led_values(q, t).tolist(), strict=True))
+    return Singular(kind, t, values, q, moving, joints)
+
+
+def cross(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | None:
+    """The bridge over a change of sign between two points, and where det K = 0 on it; None if there is none."""
+    follower, scales = walk.follower, walk.follower.scales
+    for _ in range(60):
+        if largest(scales.distance(after.q, before.q)) <= NARROW:
+            break
+        middle = 0.5 * (before.s + after.s)
+        found = walk.solve(middle, Bridge([before, after], scales).at(middle)[0])
+        if found is None or found.tangent.quality < NEAR:
+            break
+        before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
+    rough = Bridge([before, after], scales)
+    middle = _root(walk, rough, before.s, after.s)
+    bridge = build_bridge(walk, before, after, middle)
+    if bridge is None:
+        return None
+    low, high = bridge.piers[1].s, bridge.piers[2].s
+    middle = _root(walk, bridge, low, high)
+    t = walk.path.at(middle)[0]
+    quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
+    return (bridge, middle) if quality < NEAR else None
+
+
+def _root(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
+    """Where det K changes its sign on a bridge; where it does not, the nearest to singular."""
+
+    def value(s: float) -> float:
+        return walk.follower.determinant(walk.path.at(s)[0], bridge.at(s)[0])
+
+    f_low, f_high = value(low), value(high)
+    if not f_low * f_high < 0.0:
+        return _worst(walk, bridge, low, high)
+    return find_root(value, low, high, f_low, f_high)
+
+
+def _worst(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
+    """Where a bridge is nearest to singular, by golden section."""
+
+    def quality(s: float) -> float:
+        return walk.tangent(s, bridge.at(s)[0]).quality
+
+    part = 0.5 * (5.0**0.5 - 1.0)
+    for _ in range(60):
+        a, b = high - part * (high - low), low + part * (high - low)
+        low, high = (low, b) if quality(a) < quality(b) else (a, high)
+    return 0.5 * (low + high)
+
+
+def find_stop(walk: Walk, last: Point) -> tuple[float, Point]:
+    """The stop of a blocked walk, s and the position there, to full precision where one coordinate is led.
+
+    There the path is followed by the coordinate that still moves, w: s(w) has its extreme at the stop.
+    """
+    follower, scales = walk.follower, walk.follower.scales
+    y1, t1 = walk.path.y1, walk.path.t1
+    tangent = last.tangent
+    if t1 or np.count_nonzero(y1) != 1:
+        return last.s, last
+    k = int(np.flatnonzero(y1)[0])
+    free = tangent.free
+    order = [int(i) for i in np.argsort(-np.abs(free)) if follower.layout.freedoms[i] in follower.layout.q]
+    for i in order[:1]:
+        name = follower.layout.freedoms[i]
+        if name in follower.led:
+            break
+        led = (*follower.led[:k], name, *follower.led[k + 1 :])
+        other = Follower(follower.module, led)
+        t = walk.path.t
+        q = last.q
+        for _ in range(30):  # dy/dw = 0 by secant steps, w the scaled value of the free coordinate
+            y = other.led_values(q, t)
+            step = _to_extreme(other, follower, k, t, q)
+            if step is None or not abs(step) < 1.0:
+                return last.s, last
+            y[k] += step * other.led_scales[k]
+            found = other.position(t, y, scales.move(q, step * _along(other, k, t, q)))
+            if found is None:
+                return last.s, last
+            q = found
+            if abs(step) < 1e-13:
+                break
+        s = float((follower.led_values(q, t)[k] - walk.path.y[k]) / y1[k])
+        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < 1e-6:
+            return s, Point(s, q, follower.tangent(t, q, 0.0, y1))
+    return last.s, last
+
+
+def _along(other: Follower, k: int, t: float, q: Array) -> Array:
+    unit = np.zeros(len(other.led))
+    unit[k] = other.led_scales[k]
+    return other.tangent(t, q, 0.0, unit).rate / other.scales.q
+
+
+def _to_extreme(other: Follower, follower: Follower, k: int, t: float, q: Array) -> float | None:
+    """Newton's step in w to where dy_k/dw = 0, by a central difference of dy_k/dw."""
+    h = 1e-4
+
+    def slope(q: Array) -> float:
+        row = follower.matrix(q, t)[follower.layout.n_c + k]
+        return float(row @ _along(other, k, t, q))
+
+    y = other.led_values(q, t)
+    slopes = []
+    for part in (-h, h):
+        ahead = np.array(y)
+        ahead[k] += part * other.led_scales[k]
+        found = other.position(t, ahead, other.scales.move(q, part * _along(other, k, t, q)))
+        if found is None:
+            return None
+        slopes.append(slope(found))
+    curvature = (slopes[1] - slopes[0]) / (2.0 * h)
+    return -slope(q) / curvature if curvature else None
+
+
+def touch(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | None:
+    """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
+    follower, scales = walk.follower, walk.follower.scales
+    for _ in range(60):
+        if largest(scales.distance(after.q, before.q)) <= NARROW:
+            break
+        rough = Bridge([before, after], scales)
+        third = (after.s - before.s) / 3.0
+        found = [walk.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
+        one, other = found
+        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < NEAR:
+            break
+        before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
+    bridge = build_bridge(walk, before, after, 0.5 * (before.s + after.s))
+    if bridge is None:
+        return None
+    middle = _worst(walk, bridge, bridge.piers[1].s, bridge.piers[2].s)
+    t = walk.path.at(middle)[0]
+    quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
+    return (bridge, middle) if quality < NEAR else None
+
+
+def judge_walk(walk: Walk) -> tuple[list[tuple[Bridge, float]], list[Singular]]:
+    """Bridges over the change points of a walk, and the change points themselves, in order."""
+    leapt = {id(before) for before, _ in walk.leaps}
+    points = walk.points
+    crossings: list[tuple[Bridge, float]] = []
+    for k in range(len(points) - 1):
+        before, after = points[k], points[k + 1]
+        here = None
+        if id(before) in leapt or before.tangent.sign != after.tangent.sign:
+            here = cross(walk, _good(points, before, after) if id(before) in leapt else before, after)
+        elif k + 2 < len(points) and _dips(points[k : k + 3]):
+            here = touch(walk, before, points[k + 2])
+        if here is not None:
+            crossings.append(here)
+    found = []
+    for bridge, middle in crossings:
+        q = bridge.at(middle)[0]
+        found.append(name_singular(walk.follower, "change point", walk.path.at(middle)[0], q, walk.tangent(middle, q)))
+    return crossings, found
+
+
+def _dips(points: Sequence[Point]) -> bool:
+    """Whether the quality has a low minimum at the second of three points, without a change of sign."""
+    first, middle, last = (p.tangent for p in points)
+    low = middle.quality < LOW and middle.quality < first.quality and middle.quality <= last.quality
+    return low and first.sign == middle.sign == last.sign
+
+
+def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
+    """The last point before a leap that is not too near to the singular position."""
+    width = after.s - before.s
+    return next(
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > LEAPS[0] * 1e-2),
+        points[0],
+    )

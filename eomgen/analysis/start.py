@@ -1,0 +1,179 @@
+"""Analysis: how an assembled initial state changes with parameters and with the values it was assembled from.
+
+Values that are held stay (or change by one, for a sensitivity to an initial value); the constraints give the rest by
+implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.projection import minimum_norm
+from ..numeric.scales import Array
+from ..runtime.initial import Initial
+from .balance import assembly_jacobian
+
+if TYPE_CHECKING:
+    from ..runtime.layout import Layout
+    from ..runtime.module import Module
+
+CONSISTENT = 1e-8  #: scaled residual up to which held values and constraints can change together
+
+
+class Columns(NamedTuple):
+    """What a trajectory is differentiated by: k names, each a parameter, an input or an initial value."""
+
+    names: tuple[str, ...]
+    parameters: tuple[tuple[int, int], ...]  #: (column, index of the parameter)
+    inputs: tuple[tuple[int, int], ...]  #: (column, index of the input)
+    initial: tuple[tuple[int, str], ...]  #: (column, name of the coordinate or rate)
+
+    def spread(self, by_parameters: Array, by_inputs: Array) -> Array:
+        """Derivatives (rows, k) from those by all parameters and all inputs; zero for initial values."""
+        result = np.zeros((len(by_parameters), len(self.names)))
+        for column, index in self.parameters:
+            result[:, column] = by_parameters[:, index]
+        for column, index in self.inputs:
+            result[:, column] = by_inputs[:, index]
+        return result
+
+
+def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Columns:
+    """Sort names into parameters, inputs and held initial values.
+
+    Raises
+    ------
+    UsageError
+        A name is none of them.
+    """
+    from ..runtime.names import unknown
+
+    parameters, inputs, initial = [], [], []
+    for column, name in enumerate(names):
+        if name in layout.p:
+            parameters.append((column, layout.p.index(name)))
+        elif name in layout.u:
+            inputs.append((column, layout.u.index(name)))
+        elif name in held:
+            initial.append((column, name))
+        elif name in (*layout.x, *layout.loops, *layout.loop_rates):
+            raise UsageError(
+                f"{name} is not held at the start ({', '.join(held)} are), so nothing depends on it alone; name it in "
+                "hold="
+            )
+        else:
+            raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))
+    if not names:
+        raise UsageError("name at least one parameter, input or initial value")
+    if len(set(names)) != len(names):
+        raise UsageError(f"each name counts once: {', '.join(names)}")
+    return Columns(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
+
+
+def held_names(module: Module, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
+    """Coordinates and rates that an assembly at x holds: given ones, declared ones and independent ones, while they
+    leave each other room."""
+    layout = module.layout
+    initial = Initial(module.kernels, t)
+    q, found = x[: layout.n_q], []
+    declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
+    free = [layout.freedoms[i] for i in layout.independent] + list(layout.q)
+    rates = [layout.v[i] for i in layout.independent] + list(layout.v)
+    for first, second, rest, positions in (
+        (chosen.positions, declared.positions, [n for n in free if n in layout.q], True),
+        (chosen.rates, declared.rates, rates, False),
+    ):
+        wanted = dict.fromkeys([*second, *rest], 0.0)
+        soft = initial.compatible(q, first, {n: x for n, x in wanted.items() if n not in first}, positions=positions)
+        found += [*first, *soft]
+    return found
+
+
+def start_sensitivity(module: Module, t: float, x: Array, held: Sequence[str], columns: Columns) -> Array:
+    """dx0 (n_x, k) of an assembled state.
+
+    Raises
+    ------
+    UsageError
+        The held values cannot all stay when a parameter changes.
+    """
+    layout, scales = module.layout, module.layout.scales
+    n_q, n_v, n_x, n_h, n_c = layout.n_q, layout.n_v, layout.n_x, layout.n_h, layout.n_c
+    count = len(columns.names)
+    E = assembly_jacobian(module, t, x)
+    other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
+    initial = Initial(module.kernels, t)
+    wanted = {name: np.zeros(count) for name in held}
+    for column, name in columns.initial:
+        if len(initial.gradients(x[:n_q], name)) != 1:
+            raise UsageError(f"{name} cannot change alone; take the angular velocity, or rotation: euler_angles")
+        wanted[name][column] = 1.0
+    N = scales.rates(x[:n_q], np.eye(n_v))
+    # positions
+    rows, right = [*scales.jacobian(E[:n_h, :n_q] @ N)], [*(-other[:n_h] / scales.c[:n_h, None])]
+    for name in held:
+        if name in layout.q:
+            for row in initial.gradients(x[:n_q], name):
+                rows.append(row)
+                right.append(wanted[name] / scales.q[np.flatnonzero(row)[0]])
+        elif name in layout.loops:
+            k = layout.loops.index(name)
+            line, size = n_h + n_c + k, layout.loop_scales[k]
+            rows.append(E[line, :n_q] @ N * scales.q / size)
+            right.append((wanted[name] - other[line]) / size)
+    dz = scales.q[:, None] * _solve(rows, right, n_v, count, columns)
+    dq = scales.rates(x[:n_q], dz)
+    # velocities
+    lines = slice(n_h, n_h + n_c)
+    rows = [*scales.jacobian(E[lines, n_q:n_x])]
+    right = [*(-(other[lines] + E[lines, :n_q] @ dq) / scales.c[:, None])]
+    for name in held:
+        if name in layout.v:
+            k = layout.v.index(name)
+            rows.append(np.eye(n_v)[k])
+            right.append(wanted[name] / scales.q[k])
+        elif name in layout.loop_rates:
+            k = layout.loop_rates.index(name)
+            line, size = n_h + n_c + layout.n_k + k, layout.loop_scales[k]
+            rows.append(E[line, n_q:n_x] * scales.q / size)
+            right.append((wanted[name] - other[line] - E[line, :n_q] @ dq) / size)
+    dv = scales.q[:, None] * _solve(rows, right, n_v, count, columns)
+    return np.vstack([dq, dv])
+
+
+def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, columns: Columns) -> Array:
+    """The smallest solution (n, k) of rows that must be consistent."""
+    A, b = np.array(rows).reshape(len(rows), n), np.array(right).reshape(len(rows), count)
+    if not A.size or not count:
+        return np.zeros((n, count))
+    found = np.linalg.lstsq(A, b, rcond=1e-10)[0]
+    left = np.abs(A @ found - b).max(axis=0)
+    bad = np.flatnonzero(left > CONSISTENT * np.maximum(1.0, np.abs(b).max(axis=0)))
+    if bad.size:
+        raise UsageError(
+            f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values leave "
+            "no room for it; hold fewer values"
+        )
+    return np.asarray(found)
+
+
+def keep_consistent(module: Module, t: float, x: Array, S: Array, columns: Columns) -> Array:
+    """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them."""
+    layout, scales = module.layout, module.layout.scales
+    n_q, n_x, n_h, n_c = layout.n_q, layout.n_x, layout.n_h, layout.n_c
+    if not n_c:
+        return S
+    E = assembly_jacobian(module, t, x)
+    other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
+    N = scales.rates(x[:n_q], np.eye(layout.n_v))
+    dq, dv = S[:n_q], S[n_q:]
+    if n_h:
+        C_q = E[:n_h, :n_q]
+        dq = dq - scales.rates(x[:n_q], minimum_norm(C_q @ N, C_q @ dq + other[:n_h], scales))
+    lines = slice(n_h, n_h + n_c)
+    gap = E[lines, :n_q] @ dq + E[lines, n_q:n_x] @ dv + other[lines]
+    return np.vstack([dq, dv - minimum_norm(E[lines, n_q:n_x], gap, scales)])

@@ -1,0 +1,29 @@
+"""Analysis: labels and values of a result -> text, and HTML for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+
+def number(value: complex, digits: int = 6) -> str:
+    """A real or complex number as people read it."""
+    value = complex(value)
+    if abs(value.imag) <= 1e-12 * max(1.0, abs(value)):
+        return f"{value.real:.{digits}g}"
+    return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"
+
+
+def as_text(title: str, facts: Sequence[tuple[str, str]]) -> str:
+    """Several aligned lines."""
+    width = max((len(label) for label, _ in facts), default=0)
+    return "\n".join([title, *(f"  {label:<{width}}  {value}" for label, value in facts)])
+
+
+def as_html(title: str, facts: Sequence[tuple[str, str]]) -> str:
+    """A small table."""
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(label)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
+        for label, value in facts
+    )
+    return f"<b>{escape(title)}</b><table>{rows}</table>"

@@ -1,0 +1,48 @@
+"""Stage cli, sensitivity: model file -> derivatives of a run by parameters, inputs and initial values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..errors import UsageError
+from .analysis import Prepared, analysis_options
+from .options import require_folder
+from .screen import finite, print_heading, print_json, print_table, stage
+
+
+@click.command()
+@analysis_options
+@click.option("--by", multiple=True, metavar="NAME", help="Parameter, input or initial value; all parameters if none.")
+@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write them to FILE.npz or FILE.csv.")
+def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Path | None, as_json: bool) -> None:
+    """Integrate a model together with its derivatives, and report those at the end."""
+    if out is not None and out.suffix not in (".npz", ".csv"):
+        raise UsageError(f"--out {out}: sensitivities are written as .npz or .csv")
+    require_folder("--out", out)
+    module = work.module
+    names = [name for words in by for name in words.split(",") if name] or list(module.p_names)
+    if not names:
+        raise UsageError("the model has no parameters; name an input or an initial value with --by")
+    with stage("integrate"):
+        found = module.sensitivities(names, end, work.initial or None)
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        found.save(out)
+    rows = dict.fromkeys((*module.x_names, *module.y_names))
+    final = {row: {name: finite(found[row, name][-1]) for name in found.names} for row in rows}
+    if as_json:
+        end_time = float(found.t[-1])
+        print_json(
+            work.heading(end_time) | {"names": found.names, "held": found.held, "steps": len(found.t) - 1} |
+            {"final": final, "files": [] if out is None else [str(out)]}
+        )  # fmt: skip
+        return
+    print_heading(f"derivatives at t = {found.t[-1]:g} s, by")
+    lines = [[row, *("-" if x is None else f"{x:.6g}" for x in values.values())] for row, values in final.items()]
+    print_table(["", *found.names], lines, right=range(1, len(found.names) + 1))
+    click.echo(f"held at the start: {', '.join(found.held)}")
+    if out is not None:
+        click.echo(f"wrote {out}")

@@ -1,0 +1,190 @@
+"""Stage kinematics: drivers at the reference and over time -> closed positions, or what contradicts what.
+
+Drivers take their degrees of freedom in the order of the model; one that finds none left over-drives the mechanism.
+It may stay where it asks for nothing that the others do not give, at all times tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constraints import Driver
+from ..errors import AssemblyError, ModelError
+from ..graph.substitute import symbols_of
+from ..numeric import Assembly, rank
+
+if TYPE_CHECKING:
+    from .mobility import ConstraintFunctions
+
+Array = NDArray[np.float64]
+FIRST = 1e-3  #: part of the span in the first step of a walk
+STEPS = 16  #: at most
+MOVE = 0.3  #: largest scaled motion in one step, so that the branch is kept
+TOLERANCE = 1e-8  #: scaled residual that counts as a contradiction
+
+
+def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
+    """Row -> name of its driver."""
+    labels = functions.kinematics.constraints.labels
+    names = {c.name for c in functions.kinematics.mechanism.constraints if isinstance(c, Driver)}
+    found = {i: label.partition(".")[0] for i, label in enumerate(labels)}
+    return {i: name for i, name in found.items() if name in names}
+
+
+def close_driven(functions: ConstraintFunctions, given: Mapping[str, float], guess: Mapping[str, float]) -> Assembly:
+    """Assemble at t = 0; where that fails for the drivers, say so.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or not with the values that the drivers ask for.
+    ModelError
+        There are more drivers than degrees of freedom, and they contradict each other.
+    """
+    drivers = driver_rows(functions)
+    try:
+        found = functions.close(given, guess)
+    except AssemblyError as error:
+        if not drivers:
+            raise
+        raise _explain(functions, drivers, given, guess, error) from None
+    if drivers:
+        _refuse_contradictions(functions, drivers, found.q)
+    return found
+
+
+def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
+    """Closed positions at later times, as further samples; none without drivers, or where they cannot be followed."""
+    drivers = driver_rows(functions)
+    jacobian = [e for row in functions.kinematics.constraints.jacobian for e in row]
+    if not drivers or "t" in symbols_of(jacobian):
+        return []
+    return [position for _, position in _walk(functions, q)][1::4]
+
+
+def _walk(functions: ConstraintFunctions, q: Array) -> Iterator[tuple[float, Array]]:
+    """Closed positions at times after 0, a small motion apart; the functions are at that time meanwhile."""
+    t, step = 0.0, FIRST * functions.kinematics.mechanism.simulation.end
+    try:
+        for _ in range(STEPS):
+            functions.set_time(t + step)
+            try:
+                found = functions.close({}, _guess(functions, q), restarts=0).q
+            except AssemblyError:
+                found = None
+            if found is None or np.abs(functions.scales.distance(found, q)).max() > MOVE:
+                step *= 0.3
+                continue
+            t, q, step = t + step, found, 2.0 * step
+            yield t, q
+    finally:
+        functions.set_time(0.0)
+
+
+def _guess(functions: ConstraintFunctions, q: Array) -> dict[str, float]:
+    """Coordinates of a position, but for those that have a better guess of their own."""
+    hinted = {name for name, _ in functions.kinematics.hints}
+    return {n: float(x) for n, x in zip(functions.kinematics.names, q, strict=True) if n not in hinted}
+
+
+def _others(functions: ConstraintFunctions, drivers: Sequence[int]) -> list[int]:
+    return [i for i in range(functions.m) if i not in drivers]
+
+
+def _needed(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> tuple[list[int], list[int]]:
+    """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
+    J = functions.scaled_jacobian(q)
+    kept = _others(functions, list(drivers))
+    spare = []
+    for row in drivers:
+        if rank(J[[*kept, row]]).rank > rank(J[kept]).rank:
+            kept.append(row)
+        else:
+            spare.append(row)
+    return sorted(kept), spare
+
+
+def _explain(
+    functions: ConstraintFunctions,
+    drivers: Mapping[int, str],
+    given: Mapping[str, float],
+    guess: Mapping[str, float],
+    error: AssemblyError,
+) -> AssemblyError | ModelError:
+    """Why the mechanism cannot be assembled with its drivers."""
+    free = functions.with_rows(_others(functions, list(drivers)))
+    try:
+        q = free.close(given, guess).q
+    except AssemblyError as loops:
+        return loops  # not for the drivers' sake
+    kept, spare = _needed(functions, drivers, q)
+    if spare:
+        try:
+            q = functions.with_rows(kept).close(given, guess).q
+        except AssemblyError:
+            pass
+        else:
+            return _contradiction(functions, drivers, spare, q, 0.0)
+    if given:
+        try:
+            functions.close({}, {**guess, **given})
+        except AssemblyError:
+            pass
+        else:
+            held = f"{error}; at t = 0 the drivers hold {', '.join(drivers.values())} as well"
+            return AssemblyError(held, error.rows)
+    C = functions.position(q)[0]
+    gaps = [f"{drivers[i]} by {abs(C[i]):.3g} {_unit(functions, i)}" for i in drivers]
+    rows = [functions.kinematics.constraints.labels[i] for i in drivers]
+    text = str(error).partition("; check")[0]
+    words = (
+        f"the drivers ask at t = 0 for a position that the loops do not reach: {text}; where the loops do close next "
+        f"to the guess, they miss {', '.join(gaps)}; give the drivers values within reach, or a guess nearer to them"
+    )
+    return AssemblyError(words, [*rows, *error.rows])
+
+
+def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> None:
+    """Follow the drivers that count; those left over must agree with them."""
+    kept, spare = _needed(functions, drivers, q)
+    if not spare:
+        return
+    needed = functions.with_rows(kept)
+    for t, here in _walk(needed, q):
+        functions.set_time(t)
+        if len(_needed(functions, drivers, here)[0]) > len(kept):
+            break  # the first position was singular; elsewhere all of them count
+        C = functions.scales.residual(functions.position(here)[0])
+        if np.abs(C[spare]).max() > TOLERANCE:
+            raise _contradiction(functions, drivers, spare, here, t)
+
+
+def _contradiction(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], spare: Sequence[int], q: Array, t: float
+) -> ModelError:
+    mechanism = functions.kinematics.mechanism
+    functions.set_time(t)
+    C = functions.position(q)[0]
+    functions.set_time(0.0)
+    others = [name for row, name in drivers.items() if row not in spare]
+    freedoms = len(others)
+    problems = []
+    for row in spare:
+        gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
+        verb = "moves" if freedoms == 1 else "move"
+        who = f"{' and '.join(others)} {verb} it already" if others else "it cannot move"
+        message = (
+            f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
+            f"{len(drivers)} drivers; {who}, and {drivers[row]} is off by {gap}"
+        )
+        remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
+        problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy))
+    return ModelError(problems)
+
+
+def _unit(functions: ConstraintFunctions, row: int) -> str:
+    return "m" if functions.kinematics.constraints.kinds[row] == "length" else "rad"

@@ -1,0 +1,46 @@
+"""Stage kinematics: Mobility -> what a person should know before trusting the model, each with a remedy."""
+
+from __future__ import annotations
+
+from .kinematics import Kinematics
+from .mobility import Mobility
+
+POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
+SHOWN = 6
+
+
+def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
+    """Locked and overconstrained mechanisms, change points, badly chosen independent coordinates."""
+    notes = []
+    if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
+        held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
+        notes.append(
+            f"locked: no degree of freedom is left, and nothing drives the mechanism (held by {held}); "
+            "take a constraint away, or free a joint"
+        )
+    if mobility.redundant and not mobility.assumed:
+        joints = _few([*dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)])
+        notes.append(
+            f"overconstrained: {_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from the "
+            f"other constraints; motion is not affected, reactions there are not unique; "
+            f"give {joints} more freedom (a cylindrical or spherical joint) if they matter"
+        )
+    if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
+        notes.append(
+            f"change point: {mobility.instantaneous} degrees of freedom at the initial configuration, {mobility.n_dof} "
+            "elsewhere, so which branch the motion takes is open there; start a little away from it"
+        )
+    elif mobility.n_dof and mobility.conditioning < POOR and mobility.candidates:
+        better = [(name, x) for name, x in mobility.candidates if name not in mobility.independent]
+        if better and better[0][1] > 10.0 * mobility.conditioning:
+            name, value = better[0]
+            notes.append(
+                f"{', '.join(mobility.independent)} hardly moves the mechanism at the initial configuration "
+                f"(conditioning {mobility.conditioning:.1g}); {name} would do better there ({value:.1g})"
+            )
+    return notes
+
+
+def _few(names: tuple[str, ...] | list[str]) -> str:
+    shown = ", ".join(names[:SHOWN])
+    return shown if len(names) <= SHOWN else f"{shown}, ... ({len(names) - SHOWN} more)"

@@ -1,0 +1,354 @@
+"""Stage kinematics: Kinematics -> the wrenches that joints and constraints must exert, body by body.
+
+Newton's and Euler's equations of each body (Shabana, Computational Dynamics, ch. 6: constraint forces), and the
+virtual work of each constraint equation in a displacement of each body alone: ``dC = D . (dr, dtheta)``, so that a
+multiplier l with M v' + h + C_q^T l = 0 acts on the body as the wrench -l D.  All in ground axes; wrenches are (force,
+moment about the body's origin).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from ..describe.mechanism import JointSpec
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.substitute import substitute
+from ..graph.vectors import Mat3, Vec3
+from .couplings import couple
+from .kinematics import Kinematics
+from .motion import Motion
+from .tree import Poses, Twist
+from .turns import sum_of_turns
+
+Row6 = tuple[Expr, ...]  # force, moment
+
+
+@dataclass(frozen=True)
+class CutJoint:
+    """A cut joint: by how much its equations and coordinates change when S moves against P, about S, ground axes."""
+
+    spec: JointSpec
+    rows: tuple[tuple[str, Row6], ...]  #: label, dC
+    coordinates: tuple[tuple[str, Row6], ...]  #: name, dy
+
+
+class _Displaced(Poses):
+    """Poses in which each body is moved a little: by symbols that stand for 0."""
+
+    def __init__(self, kinematics: Kinematics, origins: list[Vec3], moves: list[tuple[Vec3, Vec3]]) -> None:
+        super().__init__(kinematics.mechanism, kinematics.links)
+        self._true, self._origins, self._moves = kinematics.poses, origins, moves
+
+    def link(self, link: int, base: int = GROUND) -> Frame:
+        frame = self._true.link(link)
+        if link == GROUND:
+            return frame
+        body = self.links[link].body
+        shift, turn = self._moves[body]
+        arm = vec.sub(frame.position, self._origins[body])
+        columns = [vec.add(c, vec.cross(turn, c)) for c in vec.transpose(frame.rotation)]
+        rotation = vec.transpose((columns[0], columns[1], columns[2]))
+        return Frame(rotation, vec.add(frame.position, vec.add(shift, vec.cross(turn, arm))))
+
+    def common(self, a: Marker, b: Marker) -> int:
+        return GROUND
+
+
+class JointWrenches:
+    """The straight-line parts of joint reactions; each is formed when it is asked for.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        Of a mechanism with bodies.
+    """
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self.kinematics = kinematics
+        self.mechanism = kinematics.mechanism
+        self.specs = kinematics.mechanism.joints
+        self.cut_specs = [self.specs[k] for k in kinematics.topology.cut]
+
+    # -- what metadata tells of it --------------------------------------------------------------------------------
+    @cached_property
+    def columns(self) -> list[int]:
+        """Joint of each free direction of joints that have coordinates, in order."""
+        return [k for k, spec in enumerate(self.specs) if spec.joint.role != "loop" for _ in spec.joint.velocities]
+
+    @cached_property
+    def reach(self) -> list[int]:
+        """Joint of each equation of joints without coordinates, those that vanish identically too."""
+        return [
+            k
+            for k in self.kinematics.topology.cut
+            if self.specs[k].joint.role == "loop"
+            for _ in self._closure_labels(self.specs[k])
+        ]
+
+    def _closure_labels(self, spec: JointSpec) -> list[str]:
+        graph = self.kinematics.graph
+        return [row.label for row in spec.joint.closure(graph, vec.identity(graph), vec.zero(graph))]
+
+    @property
+    def size(self) -> int:
+        """Length of :attr:`geometry`."""
+        rows = len(self.kinematics.constraints.labels)
+        directions = len(self.columns) + len(self.reach) + len(self.kinematics.loop_coordinates.names)
+        return 6 * (rows * len(self.mechanism.bodies) + directions) + 3 * len(self.specs)
+
+    @property
+    def needed_size(self) -> int:
+        """Length of :attr:`needed`."""
+        return 6 * (len(self.mechanism.bodies) + len(self.cut_specs))
+
+    def metadata(self) -> dict[str, Any]:
+        """Names and numbers that go with the arrays: bodies of joints, order of the tree, joint of each row."""
+        number = {spec.name: k for k, spec in enumerate(self.specs)}
+        cut = {self.specs[k].name for k in self.kinematics.topology.cut}
+        coupled = set(self.kinematics.coupled)
+        labels = self.kinematics.constraints.labels
+        owner = [label.partition(".")[0] for label in labels]
+        return {
+            "tree": [[b.body, b.parent, b.joint, int(b.reversed)] for b in self.kinematics.topology.branches],
+            "ends": [[s.predecessor.body, s.successor.body] for s in self.specs],
+            "columns": self.columns,
+            "velocities": [
+                self.kinematics.velocity_names.index(name) if name in self.kinematics.velocity_names else -1
+                for s in self.specs
+                if s.joint.role != "loop"
+                for name in s.velocities
+            ],
+            "reach": self.reach,
+            "rows": [
+                number[o] if o in cut and label not in coupled else -1 for o, label in zip(owner, labels, strict=True)
+            ],
+            "loops": [k for k in self.kinematics.topology.cut for _ in self.specs[k].coordinates],
+            "cut": list(self.kinematics.topology.cut),
+        }
+
+    # -- placements -----------------------------------------------------------------------------------------------
+    @cached_property
+    def origins(self) -> list[Vec3]:
+        """Origins of the bodies, ground axes."""
+        graph = self.kinematics.graph
+        frame = Frame(vec.identity(graph), vec.zero(graph))
+        return [
+            self.kinematics.poses.marker(Marker(k, frame, body.name)).position
+            for k, body in enumerate(self.mechanism.bodies)
+        ]
+
+    def _at_body(self, body: int, point: Vec3, wrench: Row6, sign: float = 1.0) -> Row6:
+        """A wrench about a point, about the origin of a body instead."""
+        force: Vec3 = (wrench[0], wrench[1], wrench[2])
+        moment = vec.add((wrench[3], wrench[4], wrench[5]), vec.cross(vec.sub(point, self.origins[body]), force))
+        return tuple(x if sign > 0 else -x for x in (*force, *moment))
+
+    @cached_property
+    def cut(self) -> list[CutJoint]:
+        """Gradients of the equations and coordinates of cut joints."""
+        return [self._cut_joint(spec) for spec in self.cut_specs]
+
+    def _cut_joint(self, spec: JointSpec) -> CutJoint:
+        graph, poses = self.kinematics.graph, self.kinematics.poses
+        base = poses.common(spec.predecessor, spec.successor)
+        outer, inner = poses.marker(spec.predecessor, base), poses.marker(spec.successor, base)
+        rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
+        position = vec.transpose_times(outer.rotation, vec.sub(inner.position, outer.position))
+        R: Mat3 = tuple(tuple(graph.symbol(f"R({i},{k})") for k in range(3)) for i in range(3))  # type: ignore[assignment]
+        r: Vec3 = (graph.symbol("r(0)"), graph.symbol("r(1)"), graph.symbol("r(2)"))
+        turn = graph.symbol("turn(z)")
+        angles = [k for k, coordinate in enumerate(spec.joint.coordinates) if coordinate.kind == "angle"]
+        turns = sum_of_turns(graph, rotation, self.kinematics.q) if len(angles) == 1 else None
+        if turns is None:
+            rows = spec.joint.closure(graph, R, r)
+        else:
+            rows = spec.joint.closure_in_turns(graph, R, r, turn)
+        measured = spec.joint.measure(graph, R, r)
+        if turns is not None:
+            measured[angles[0]] = turn
+        true = dict(zip((x for row in R for x in row), (x for row in rotation for x in row), strict=True))
+        true |= dict(zip(r, position, strict=True)) | ({turn: turns[0]} if turns is not None else {})
+        expressions = [*(row.expression for row in rows), *measured]
+        symbols = [*r, *(R[i][k] for k in range(3) for i in range(3)), turn]
+        entries = jacobian(expressions, symbols)
+        to_ground = poses.marker(spec.predecessor).rotation
+        gradients: list[Row6] = []
+        for k in range(len(expressions)):
+            d = [entries.get((k, j), graph.zero) for j in range(13)]
+            moment = (graph.zero, graph.zero, d[12])
+            for c in range(3):  # a column of R turns by theta x column
+                column = (R[0][c], R[1][c], R[2][c])
+                moment = vec.add(moment, vec.cross(column, (d[3 + 3 * c], d[4 + 3 * c], d[5 + 3 * c])))
+            values = substitute([d[0], d[1], d[2], *moment], true)
+            force = vec.times(to_ground, (values[0], values[1], values[2]))
+            turned = vec.times(to_ground, (values[3], values[4], values[5]))
+            gradients.append((*force, *turned))
+        labels = [row.label for row in rows]
+        if {"r_x", "r_y", "r_z"} <= set(labels):  # then these rows are along the axes of the base (see close_loop)
+            axes = poses.link(base).rotation
+            for k, letter in enumerate("xyz"):
+                gradients[labels.index(f"r_{letter}")] = (*(row[k] for row in axes), *vec.zero(graph))
+        named = [f"{spec.name}.{label}" for label in labels]
+        return CutJoint(
+            spec,
+            tuple(zip(named, gradients[: len(rows)], strict=True)),
+            tuple(zip(spec.coordinates, gradients[len(rows) :], strict=True)),
+        )
+
+    def _on_ends(self, spec: JointSpec, gradient: Row6) -> dict[int, Row6]:
+        """A wrench on S about S, and its opposite on P, about the origins of the two bodies."""
+        point = self.kinematics.poses.marker(spec.successor).position
+        ends = ((spec.successor.body, 1.0), (spec.predecessor.body, -1.0))
+        return {body: self._at_body(body, point, gradient, sign) for body, sign in ends if body != GROUND}
+
+    # -- the kernels ----------------------------------------------------------------------------------------------
+    @cached_property
+    def geometry(self) -> Row6:
+        """D of the constraint rows (n_c, n_bodies, 6); S of the joints (n_j, 3); their free directions as (linear,
+        angular) at S (n_f, 6); gradients of the equations of joints without coordinates (n_r, 6), and of the
+        coordinates of cut joints (n_k, 6), for displacements of S."""
+        graph, n = self.kinematics.graph, len(self.mechanism.bodies)
+        empty = (graph.zero,) * 6
+        flat: list[Expr] = []
+        on_bodies = self._element_rows() | {
+            label: self._on_ends(joint.spec, gradient) for joint in self.cut for label, gradient in joint.rows
+        }
+        for label in self.kinematics.constraints.labels:
+            wrenches = on_bodies[label]
+            for body in range(n):
+                flat += wrenches.get(body, empty)
+        for spec in self.specs:
+            flat += self.kinematics.poses.marker(spec.successor).position
+        for spec in self.specs:
+            if spec.joint.role != "loop":
+                flat += self._free_directions(spec)
+        for joint in self.cut:
+            if joint.spec.joint.role == "loop":
+                for _, gradient in joint.rows:
+                    flat += gradient
+        for joint in self.cut:
+            for _, gradient in joint.coordinates:
+                flat += gradient
+        return tuple(flat)
+
+    def _free_directions(self, spec: JointSpec) -> list[Expr]:
+        graph = self.kinematics.graph
+        values = [self.kinematics.motion.coordinates[name][0] for name in spec.coordinates]
+        axes = self.kinematics.poses.marker(spec.successor).rotation
+        flat: list[Expr] = []
+        for angular, linear in spec.joint.subspace(graph, values):
+            flat += [*vec.times(axes, linear), *vec.times(axes, angular)]
+        return flat
+
+    def _element_rows(self) -> dict[str, dict[int, Row6]]:
+        """D of the equations of constraint elements, body by body; what acts along coordinates of the tree is not in
+        it."""
+        kinematics, graph = self.kinematics, self.kinematics.graph
+        if not kinematics.coupled:
+            return {}
+        names = [[f"move({b},{k})" for k in range(6)] for b in range(len(self.mechanism.bodies))]
+        symbols = [[graph.symbol(name) for name in six] for six in names]
+        moves = [((s[0], s[1], s[2]), (s[3], s[4], s[5])) for s in symbols]
+        changes: dict[str, Expr] = {}
+        for joint in self.cut:
+            for name, gradient in joint.coordinates:
+                change = graph.zero
+                for body, wrench in self._on_ends(joint.spec, gradient).items():
+                    for x, d in zip(symbols[body], wrench, strict=True):
+                        change = change + x * d
+                changes[name] = change
+        known = kinematics.motion.coordinates
+        placed = {n: (y + changes[n] if n in changes else y, r, a) for n, (y, r, a) in known.items()}
+        moving = {n: (y, r + changes[n] if n in changes else r, a) for n, (y, r, a) in known.items()}
+        plain, state, turning = kinematics.poses, kinematics.motion.state, kinematics.motion.turning
+        displaced = Motion(_Displaced(kinematics, self.origins, moves), kinematics.twists, state, placed, turning)
+        pushed = Motion(plain, self._pushed_twists(moves), state, moving, turning)
+        rows = [r for r in couple(self.mechanism, displaced).rows if r.level == "position"]
+        rows += [r for r in couple(self.mechanism, pushed).rows if r.level != "position"]
+        every = [s for six in symbols for s in six]
+        entries = jacobian([row.expression for row in rows], every)
+        at_rest = dict.fromkeys(every, graph.zero)
+        found: dict[str, dict[int, Row6]] = {}
+        for k, row in enumerate(rows):
+            found[row.label] = {}
+            for b in range(len(symbols)):
+                six = [entries.get((k, 6 * b + j), graph.zero) for j in range(6)]
+                if not all(x.is_zero for x in six):
+                    found[row.label][b] = tuple(substitute(six, at_rest))
+        return found
+
+    def _pushed_twists(self, moves: list[tuple[Vec3, Vec3]]) -> list[Twist]:
+        """Twists of the links with a velocity added to each body alone."""
+        twists: list[Twist] = []
+        for k, (link, (angular, linear)) in enumerate(zip(self.kinematics.links, self.kinematics.twists, strict=True)):
+            frame = self.kinematics.poses.link(k)
+            shift, turn = moves[link.body]
+            arm = vec.sub(frame.position, self.origins[link.body])
+            own = vec.transpose_times(frame.rotation, turn)
+            moved = vec.transpose_times(frame.rotation, vec.add(shift, vec.cross(turn, arm)))
+            twists.append((vec.add(angular, own), vec.add(linear, moved)))
+        return twists
+
+    @cached_property
+    def needed(self) -> Row6:
+        """Per body (6): rate of its momentum less gravity and force elements, what joints and constraints exert.
+
+        Loads along coordinates of cut joints act on both bodies, and stand behind, per cut joint (6) on S about S;
+        those along coordinates of the tree pass through their joints and are left in.
+        """
+        kinematics, poses = self.kinematics, self.kinematics.poses
+        order = sorted(range(len(kinematics.links)), key=lambda k: kinematics.links[k].body)
+        momenta: list[Expr] = []
+        for k in order:
+            turning, push = kinematics.links[k].spatial.times(*kinematics.twists[k])
+            axes = poses.link(k).rotation
+            momenta += [*vec.times(axes, push), *vec.times(axes, turning)]
+        rates = kinematics.total_derivative(momenta)
+        total: list[list[Expr]] = []
+        for b, k in enumerate(order):
+            link, frame = kinematics.links[k], poses.link(k)
+            p: Vec3 = (momenta[6 * b], momenta[6 * b + 1], momenta[6 * b + 2])
+            force: Vec3 = (rates[6 * b], rates[6 * b + 1], rates[6 * b + 2])
+            speed = vec.times(frame.rotation, kinematics.twists[k][1])
+            moment = vec.add((rates[6 * b + 3], rates[6 * b + 4], rates[6 * b + 5]), vec.cross(speed, p))
+            gravity = self.mechanism.gravity
+            force = vec.sub(force, vec.scale(link.spatial.mass, gravity))
+            moment = vec.sub(moment, vec.cross(vec.times(frame.rotation, link.spatial.moment), gravity))
+            total.append(list(self._at_body(b, frame.position, (*force, *moment))))
+        for terms in kinematics.forces:
+            for load in terms.marker_loads:
+                if load.marker.body != GROUND:
+                    point = poses.marker(load.marker).position
+                    _take(total, load.marker.body, self._at_body(load.marker.body, point, (*load.force, *load.torque)))
+        through = [[kinematics.graph.zero] * 6 for _ in self.cut]
+        for name, value in self._loads_on_cut():
+            k, gradient = next((k, g) for k, joint in enumerate(self.cut) for n, g in joint.coordinates if n == name)
+            for body, wrench in self._on_ends(self.cut[k].spec, gradient).items():
+                _take(total, body, tuple(value * x for x in wrench))
+            _take(through, k, tuple(-(value * x) for x in gradient))
+        total += through
+        return tuple(x for six in total for x in six)
+
+    def _loads_on_cut(self) -> list[tuple[str, Expr]]:
+        """Force elements and inertias of drives along coordinates of cut joints."""
+        loop = self.kinematics.loop_coordinates
+        loads = [(c.coordinate, c.value) for terms in self.kinematics.forces for c in terms.coordinate_loads]
+        for spec in self.specs:
+            if spec.armature is not None and spec.coordinates[0] in loop.names:
+                k = loop.names.index(spec.coordinates[0])
+                loads.append((spec.coordinates[0], -(spec.armature * loop.accelerations[k])))
+        return [(name, value) for name, value in loads if name in loop.names]
+
+
+def _take(total: list[list[Expr]], body: int, wrench: Row6) -> None:
+    total[body] = [a - b for a, b in zip(total[body], wrench, strict=True)]
+
+
+def find_wrenches(kinematics: Kinematics) -> JointWrenches | None:
+    """The parts of joint reactions of a mechanism with bodies."""
+    return None if kinematics.mechanism.bare or not kinematics.mechanism.bodies else JointWrenches(kinematics)

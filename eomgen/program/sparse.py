@@ -1,0 +1,137 @@
+"""Stage program: sparse matrices on the graph -> straight-line factors and solutions that know every zero.
+
+The order of elimination is chosen by minimum degree (Tinney and Walker 1967), so that loops that are coupled in a row
+cost the same each, however many there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..graph.core import Expr
+
+Row = dict[int, Expr]  #: column -> entry; zeros left out
+
+
+def rows_of(matrix: Sequence[Sequence[Expr]]) -> list[Row]:
+    """The entries of a dense matrix that are not identically zero."""
+    return [{k: x for k, x in enumerate(row) if not x.is_zero} for row in matrix]
+
+
+def transpose(rows: Sequence[Mapping[int, Expr]], n: int) -> list[Row]:
+    """The columns of a matrix with n of them, as rows."""
+    result: list[Row] = [{} for _ in range(n)]
+    for i, row in enumerate(rows):
+        for k, x in row.items():
+            result[k][i] = x
+    return result
+
+
+def dot(a: Mapping[int, Expr], b: Mapping[int, Expr]) -> Expr | None:
+    """The sum of products of what both have; None if that is nothing."""
+    total: Expr | None = None
+    for k, x in a.items():
+        if k in b:
+            total = x * b[k] if total is None else total + x * b[k]
+    return None if total is None or total.is_zero else total
+
+
+def times(rows: Sequence[Mapping[int, Expr]], x: Sequence[Expr]) -> list[Expr]:
+    """The product of a matrix and a dense vector."""
+    result = []
+    for row in rows:
+        total = x[0].graph.zero if x else None
+        for k, entry in row.items():
+            total = entry * x[k] if total is None or total.is_zero else total + entry * x[k]
+        assert total is not None
+        result.append(total)
+    return result
+
+
+def gram(rows: Sequence[Mapping[int, Expr]]) -> list[Row]:
+    """Both triangles of A A^T."""
+    touching: dict[int, list[int]] = {}
+    for i, row in enumerate(rows):
+        for k in row:
+            touching.setdefault(k, []).append(i)
+    result: list[Row] = [{} for _ in rows]
+    for i, row in enumerate(rows):
+        for j in sorted({j for k in row for j in touching[k] if j <= i}):
+            entry = dot(row, rows[j])
+            if entry is not None:
+                result[i][j] = result[j][i] = entry
+    return result
+
+
+def minimum_degree(pattern: Sequence[Mapping[int, object]]) -> list[int]:
+    """An order of elimination with little fill of a symmetric pattern; the first of equals."""
+    near = [set(row) - {i} for i, row in enumerate(pattern)]
+    left = set(range(len(near)))
+    order = []
+    while left:
+        i = min(left, key=lambda k: (len(near[k]), k))
+        order.append(i)
+        left.remove(i)
+        for k in near[i]:
+            near[k] |= near[i]
+            near[k] -= {i, k}
+    return order
+
+
+def fill(pattern: Sequence[Mapping[int, object]]) -> int:
+    """About how many multiplications the factor of a symmetric pattern takes."""
+    near = [set(row) - {i} for i, row in enumerate(pattern)]
+    total = 0
+    for i in minimum_degree(pattern):
+        total += len(near[i]) * (len(near[i]) + 3) // 2
+        for k in near[i]:
+            near[k] |= near[i]
+            near[k] -= {i, k}
+    return total
+
+
+@dataclass(frozen=True)
+class Factor:
+    """P A P^T = L D L^T: ``columns[i]`` holds column i of L below its pivot, in the original indices."""
+
+    order: tuple[int, ...]
+    columns: tuple[Row, ...]
+    pivots: tuple[Expr, ...]  #: by index
+    reciprocals: tuple[Expr, ...]
+
+    def solve(self, right: Sequence[Expr]) -> list[Expr]:
+        """x with A x = right."""
+        x = list(right)
+        for i in self.order:
+            if not x[i].is_zero:
+                for k, ratio in self.columns[i].items():
+                    x[k] = x[k] - ratio * x[i]
+        for i in reversed(self.order):
+            total = x[i] * self.reciprocals[i]
+            for k, ratio in self.columns[i].items():
+                if not x[k].is_zero:
+                    total = total - ratio * x[k]
+            x[i] = total
+        return x
+
+
+def factorize(matrix: Sequence[Mapping[int, Expr]]) -> Factor:
+    """Factor a symmetric positive definite matrix given by both triangles, without square roots."""
+    work = [dict(row) for row in matrix]
+    order = minimum_degree(matrix)
+    columns: list[Row] = [{} for _ in work]
+    pivots = [row[i] for i, row in enumerate(work)]
+    reciprocals = list(pivots)
+    for i in order:
+        pivot = pivots[i] = work[i].pop(i)
+        inverse = reciprocals[i] = 1.0 / pivot
+        below = sorted(work[i])
+        for k in below:
+            columns[i][k] = work[i][k] * inverse
+            del work[k][i]
+        for a, k in enumerate(below):
+            for j in below[: a + 1]:
+                change = columns[i][k] * work[i][j]
+                work[k][j] = work[j][k] = work[k][j] - change if j in work[k] else -change
+    return Factor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals))

@@ -1,0 +1,45 @@
+/* The nearest q with C(q) = 0, in place; nonzero where that takes large steps or many. */
+static int close_directly(double t, double *restrict q, const double *restrict u, const double *restrict c,
+                          double *restrict w)
+{
+    double *const found = w + AT_CLOSING;
+    for (int step = 0; step < 6; step++) {
+        (void)closing_block(t, q, u, c, found, w);
+        const double left = found[1], length = found[2];
+        if (!(length <= 0.25)) { /* or not a number */
+            break;
+        }
+        move(q, found + 3);
+        if (arrives(length, left)) {
+            return 0;
+        }
+    }
+    return EOMGEN_PROJECTION_FAILED;
+}
+
+static int rhs_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                     double *restrict out, double *restrict w)
+{
+    double *const y = w + AT_X;
+    const double *const found = w + AT_DYNAMICS;
+    for (int k = 0; k < NQ + N; k++) {
+        y[k] = x[k];
+    }
+    if (close_directly(t, y, u, c, w) == 0) {
+        const int status = dynamics_block(t, y, u, c, w + AT_DYNAMICS, w);
+        if (status == 0 && found[2 * N] != 0.0) {
+            form_rates(y, found, out);
+            for (int k = 0; k < N; k++) {
+                out[NQ + k] = found[N + k];
+            }
+            return 0;
+        }
+    }
+    partition parts; /* far away, or the preferred coordinates do not move the mechanism well here */
+    int status = close_loops(t, x, u, c, w);
+    if (status == 0) {
+        status = accelerate(t, u, c, N + 1, &parts, out + NQ, w);
+    }
+    form_rates(w + AT_X, w + AT_V, out);
+    return status;
+}
