@@ -137,6 +137,11 @@ def project(
     """
     if not scales.c.size:
         return q, v
+    C, C_q = position(q)  # a state that is on the constraints already stays as it is, to the last bit
+    if largest(scales.residual(C)) <= EXACT and largest(scales.residual(C_q @ v + rate(q))) <= EXACT * max(
+        1.0, largest(v / scales.q)
+    ):
+        return q, v
     q, C_q = correct_position(position, q, scales, given)
     return q, correct_velocity(C_q, rate(q), v, scales)
 
