@@ -11,8 +11,11 @@ LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
+    "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),
+    "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
+    "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
 }
 
 

@@ -7,7 +7,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -180,7 +180,7 @@ def _build(
         _command([*compiler.command, *compiled, *further, "-o", product, *flags[""]], directory, directory / product)
         for file in compiled:
             (directory / file).unlink()
-        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags)}
+        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
         return cache.publish(directory, key, kind, name, product, recipe)
 
 

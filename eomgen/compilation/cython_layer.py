@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingDependencyError, ToolchainError
+from ..layer import LAYER
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, raise_failure, run
 from .options import layer_flags, stepper_flags
 
 SOURCE = "_core.pyx"
 HEADER = "eomgen.h"
-STEPPERS = "eomgen_steppers.c"
-_OBJECTS = ("_core.o", "eomgen_steppers.o")
+C_FILES = tuple(name for name in LAYER if name.endswith(".c"))
+_OBJECTS = ("_core.o", *(f"{name}.o" for name in C_FILES))
 _lock = threading.Lock()  # Cython keeps state of its own
 
 
@@ -93,7 +94,7 @@ def build_layer(
         for name, text in {**texts, HEADER: header}.items():
             (directory / name).write_text(text, encoding="utf-8")
         commands = [
-            [*compiler.command, *stepper_flags(compiler), "-I.", "-c", STEPPERS, "-o", _OBJECTS[1]],
+            *([*compiler.command, *stepper_flags(compiler), "-I.", "-c", name, "-o", f"{name}.o"] for name in C_FILES),
             [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECTS[0]],
         ]
 
@@ -102,11 +103,11 @@ def build_layer(
             if result.returncode != 0:
                 raise_failure(f"compiling the Cython layer {directory / command[-3]}", result, directory)
 
-        with ThreadPoolExecutor(1) as pool:  # the steppers while Cython translates
-            steppers = pool.submit(compile_one, commands[0])
+        with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
+            others = pool.map(compile_one, commands[:-1])
             _run_cython(directory / SOURCE)
-            compile_one(commands[1])
-            steppers.result()
+            compile_one(commands[-1])
+            list(others)
         (directory / "_core.c").unlink()
         recipe = {"commands": commands, "cython": version}
         return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))

@@ -19,6 +19,7 @@ from .layout import Layout
 from .momenta import Momenta
 
 if TYPE_CHECKING:
+    from ..ensembles.ensemble import Ensemble
     from .minimal import Minimal
     from .paths import Path
     from .protocols import Core, Motion, State, Timed
@@ -256,6 +257,34 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         from .simulate import simulate
 
         return simulate(self, span, initial, parameters, inputs, method=method, **options)
+
+    def simulate_many(
+        self,
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, Any] | ArrayLike | None = None,
+        parameters: Mapping[str, Any] | ArrayLike | None = None,
+        inputs: Mapping[str, Any] | ArrayLike | None = None,
+        **options: Any,
+    ) -> Ensemble:
+        """Integrate many runs on all processors, or on a cluster; see
+        :func:`~..ensembles.simulate_many.simulate_many`.
+
+        Parameters
+        ----------
+        span : (float, float) or float, optional
+        initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
+        parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
+        **options
+            count, method, rtol, atol, t_eval, reduce, threads, cluster, store, block, max_steps, max_step, first_step,
+            progress.
+
+        Returns
+        -------
+        Ensemble
+        """
+        from ..ensembles.simulate_many import simulate_many
+
+        return simulate_many(self, span, initial, parameters, inputs, **options)
 
     def report(self) -> str:
         """What the model is made of, as text."""

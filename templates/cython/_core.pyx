@@ -345,3 +345,4 @@ def capsule(str name not None):
     return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)
 
 include "_steppers.pxi"
+include "_ensembles.pxi"

@@ -68,6 +68,24 @@ cdef class Interpolant:
         return result[0] if times.ndim == 0 else np.ascontiguousarray(result.T)
 
 
+cdef const eomgen_signal *make_signals(signals, list held) except? NULL:
+    """The inputs over time as C reads them, in arrays that `held` keeps alive."""
+    cdef eomgen_signal *table
+    cdef cnp.npy_intp bytes = MODEL.n_u * sizeof(eomgen_signal)
+    if not signals:
+        return NULL
+    memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
+    table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
+    held.append(memory)
+    for index, order, times, values in signals:
+        pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
+        held.extend(pair)
+        table[<int>index].n, table[<int>index].order = len(times), order
+        table[<int>index].times = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[0])
+        table[<int>index].values = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[1])
+    return table
+
+
 cdef class Stepper:
     """One integration of the right-hand side.
 
@@ -95,7 +113,6 @@ cdef class Stepper:
 
     cdef eomgen_run run
     cdef const eomgen_method *method
-    cdef eomgen_signal *signals
     cdef Context context
     cdef cnp.ndarray memory, atol
     cdef list held
@@ -127,24 +144,8 @@ cdef class Stepper:
         run.rtol, run.max_step, run.h_abs = rtol, max_step, first_step
         run.t = run.t_old = t0
         run.t_bound, run.direction = t_bound, -1.0 if t_bound < t0 else 1.0
-        self.listen(signals)
+        run.signals = make_signals(signals, self.held)
         eomgen_start(self.method, run)
-
-    cdef listen(self, signals):
-        cdef eomgen_signal *table
-        cdef cnp.npy_intp bytes = MODEL.n_u * sizeof(eomgen_signal)
-        if not signals:
-            return
-        memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
-        table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
-        self.held.append(memory)
-        for index, order, times, values in signals:
-            pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
-            self.held.extend(pair)
-            table[<int>index].n, table[<int>index].order = len(times), order
-            table[<int>index].times = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[0])
-            table[<int>index].values = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[1])
-        self.run.signals = table
 
     def step(self):
         """Take one step; False if it would have to be too small."""
