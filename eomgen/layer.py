@@ -13,9 +13,12 @@ LAYER = {
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
-    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),
+    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
+    "eomgen_steppers.c": ("c/steppers/control.c", "c/steppers/plain.c"),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
+    "eomgen_lane_runs.h": ("c/ensembles/lane_runs.c",),
+    **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 
 

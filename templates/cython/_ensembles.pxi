@@ -5,6 +5,8 @@ cdef extern from "eomgen_ensembles.h" nogil:
         const eomgen_method *method
         const eomgen_model *model
         eomgen_function rhs
+        eomgen_lane_function lane_rhs
+        int lane_width
         int n
         long count
         const double *x0
@@ -91,6 +93,8 @@ cdef class Ensemble:
         self.held = [x0, p, u, nodes, atol, asked]
         all.method, all.model = METHODS[methods.index(method)], MODEL
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
+        if LANES != NULL:
+            all.lane_rhs, all.lane_width = LANES.kernels[index], LANES.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
         all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
         all.signals = make_signals(signals, self.held)

@@ -4,10 +4,33 @@
 
 #include "eomgen_ensembles.h"
 
-enum { GLANCE = 64 }; /* steps between looks at `stop` */
+EOMGEN_PIECE extern const eomgen_lane_worker eomgen_lane_worker2, eomgen_lane_worker4, eomgen_lane_worker8;
 
-/* The next trajectory of the queue, or -1. */
-static long take(eomgen_ensemble *e)
+static const eomgen_lane_worker *const lane_workers[] = {
+#if EOMGEN_LANES & 8
+    &eomgen_lane_worker8,
+#endif
+#if EOMGEN_LANES & 4
+    &eomgen_lane_worker4,
+#endif
+#if EOMGEN_LANES & 2
+    &eomgen_lane_worker2,
+#endif
+    NULL
+};
+
+/* Who runs this ensemble in lanes; NULL: nobody. */
+static const eomgen_lane_worker *find_worker(const eomgen_ensemble *e)
+{
+    for (int i = 0; e->lane_rhs != NULL && lane_workers[i] != NULL; i++) {
+        if (lane_workers[i]->width == e->lane_width) {
+            return lane_workers[i];
+        }
+    }
+    return NULL;
+}
+
+long eomgen_ensemble_take(eomgen_ensemble *e)
 {
     if (__atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
         return -1;
@@ -18,6 +41,10 @@ static long take(eomgen_ensemble *e)
 
 long eomgen_ensemble_memory(const eomgen_ensemble *e)
 {
+    const eomgen_lane_worker *const worker = find_worker(e);
+    if (worker != NULL) {
+        return worker->memory(e);
+    }
     const long rows = 4 + e->method->rows_K + e->method->rows_F;
     return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n;
 }
@@ -43,7 +70,7 @@ static int run_part(eomgen_ensemble *e, eomgen_run *run, long k, long *done)
         if (e->steps[k] >= e->max_steps) {
             return EOMGEN_TOO_MANY_STEPS;
         }
-        if (e->steps[k] % GLANCE == GLANCE - 1 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
+        if (e->steps[k] % EOMGEN_GLANCE == EOMGEN_GLANCE - 1 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
             return EOMGEN_NOT_RUN;
         }
         const int status = eomgen_step(e->method, run);
@@ -86,6 +113,11 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, double *constants, long
 
 void eomgen_ensemble_work(eomgen_ensemble *e, double *memory)
 {
+    const eomgen_lane_worker *const worker = find_worker(e);
+    if (worker != NULL) {
+        worker->work(e, memory);
+        return;
+    }
     const int n = e->n;
     eomgen_run run;
     memset(&run, 0, sizeof run);
@@ -98,7 +130,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, double *memory)
     run.y_old = run.y + n, run.f = run.y_old + n, run.failure_state = run.f + n;
     run.K = run.failure_state + n;
     run.F = run.K + e->method->rows_K * n;
-    for (long k = take(e); k >= 0; k = take(e)) {
+    for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
         run_one(e, &run, constants, k);
         __atomic_fetch_add(&e->done, 1, __ATOMIC_RELAXED);
     }

@@ -11,12 +11,16 @@ enum {
     EOMGEN_BAD_PARAMETERS = -102
 };
 
+enum { EOMGEN_GLANCE = 64 }; /* steps between looks at `stop` */
+
 /* The trajectories of one batch and what became of them. The caller owns every array; rows belong to trajectories. Results do
-   not depend on which thread takes which trajectory. */
+   not depend on which thread or lane takes which trajectory. */
 typedef struct {
     const eomgen_method *method;
     const eomgen_model *model;
     eomgen_function rhs;
+    eomgen_lane_function lane_rhs; /* NULL: one trajectory at a time */
+    int lane_width;
     int n;                        /* states */
     long count;                   /* trajectories */
     const double *x0;             /* count rows of n */
@@ -39,6 +43,16 @@ typedef struct {
     long next, done;              /* queue; shared between threads */
     int stop;                     /* set by anyone: no further trajectory is begun, those under way end as not run */
 } eomgen_ensemble;
+
+/* How trajectories are run side by side; one for each width that was compiled. */
+typedef struct {
+    int width;
+    long (*memory)(const eomgen_ensemble *e);
+    void (*work)(eomgen_ensemble *e, double *memory);
+} eomgen_lane_worker;
+
+/* The next trajectory of the queue, or -1. */
+long eomgen_ensemble_take(eomgen_ensemble *e);
 
 /* Doubles of memory that one thread needs. */
 long eomgen_ensemble_memory(const eomgen_ensemble *e);

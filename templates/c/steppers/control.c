@@ -5,7 +5,7 @@
 
 #include "eomgen_steppers.h"
 
-static double interpolated(const eomgen_signal *s, double t)
+double eomgen_interpolated(const eomgen_signal *s, double t)
 {
     int low = 0, high = s->n - 1;
     const int size = s->order == 3 ? 4 : 1;
@@ -38,7 +38,7 @@ void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
     if (run->signals != NULL) {
         for (int i = 0; i < run->n_u; i++) {
             if (run->signals[i].n > 0) {
-                run->u[i] = interpolated(run->signals + i, t);
+                run->u[i] = eomgen_interpolated(run->signals + i, t);
             }
         }
     }

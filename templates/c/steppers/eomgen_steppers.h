@@ -12,6 +12,9 @@ typedef struct {
     const double *values; /* n values; for order 3, 4 coefficients a point: value, slope, curvature / 2, third / 6 */
 } eomgen_signal;
 
+/* The value of a table at time t. */
+double eomgen_interpolated(const eomgen_signal *s, double t);
+
 /* One integration. The caller owns every array; y, f, K, F change. */
 typedef struct {
     eomgen_function rhs;
