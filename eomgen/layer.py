@@ -10,6 +10,7 @@ from pathlib import Path
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),
