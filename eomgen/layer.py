@@ -10,6 +10,7 @@ from pathlib import Path
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-ffp-contract=off")
+STRICT = ("-std=c99", "-DEOMGEN_LANES=0", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-ffp-contract=off")
 POINTER = ctypes.POINTER(ctypes.c_double)
 FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[POINTER] * 5)
 PRECOMPUTE = ctypes.CFUNCTYPE(ctypes.c_int, POINTER, POINTER)
