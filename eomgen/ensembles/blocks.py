@@ -37,7 +37,7 @@ def keep(module: Module, cases: Cases, plan: Plan, reduction: Reduction, block: 
 def choose_size(count: int, bytes_of_a_run: int, workers: int = 1) -> int:
     """Runs of a block: several blocks for each of several workers, in whole grains, within the room."""
     shared = -(-count // (4 * workers)) if workers > 1 else count
-    whole = min(-(-shared // GRAIN) * GRAIN, LARGEST)
+    whole = min(max(-(-shared // GRAIN), 1) * GRAIN, LARGEST)
     fitting = max(ROOM // max(bytes_of_a_run, 1), 1)
     return whole if whole <= fitting else max(fitting // GRAIN * GRAIN, min(fitting, GRAIN))
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import distributed
 import numpy as np
 import pytest
 
@@ -17,7 +18,6 @@ from eomgen.ensembles.handle import describe
 
 from .test_simulate_many import TIGHT, angles
 
-distributed: Any = pytest.importorskip("distributed")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 

@@ -106,9 +106,8 @@ def test_what_a_function_keeps_of_each_block(pendulum: Any) -> None:
 
 def test_a_loop_is_kept_closed_and_a_run_that_cannot_begin_holds_up_none(crank: Any) -> None:
     lengths = np.array([0.1, 0.5, 0.2, 0.12])  # the second is longer than the rod
-    ensemble = crank.simulate_many(
-        2, {"theta": 1.2, "theta_dot": 10.0}, {"r": lengths}, t_eval=[0.0, 1.0, 2.0], **TIGHT
-    )
+    options = {"t_eval": [0.0, 1.0, 2.0], **TIGHT}
+    ensemble = crank.simulate_many(2, {"theta": 1.2, "theta_dot": 10.0}, {"r": lengths}, **options)
     (failure,) = ensemble.failures()
     assert failure.run == 1
     assert "cannot close" in failure.message
@@ -229,7 +228,8 @@ def test_what_an_ensemble_offers(pendulum: Any, tmp_path: Path) -> None:
         np.testing.assert_array_equal(data["samples"], ensemble.samples)
     axes = ensemble.plot("theta2")
     assert len(axes.lines) == 6
-    assert axes.get_ylabel() == "theta2 (rad)"
+    assert axes.get_ylabel() == "theta2"
+    assert ensemble.plot("bend").get_ylabel() == "bend (rad)"
     with pytest.raises(KeyError, match="theta2"):
         ensemble["theta3"]
     assert "6 runs" in repr(ensemble)
