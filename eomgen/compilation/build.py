@@ -82,7 +82,7 @@ def compile_sources(
     _check(sources, name)
     if HEADER not in sources:
         raise UsageError(f"the sources of {name!r} lack {HEADER}; there are {', '.join(sources)}")
-    sources, width = choose_lanes(sources)
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, width, extension=True)
     parts = {
@@ -113,7 +113,7 @@ def compile_c_library(
     options = options or Options()
     sources = {file: text for file, text in sources.items() if file not in LAYER}
     _check(sources, name)
-    sources, width = choose_lanes(sources)
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, width, extension=False)
     parts = {
