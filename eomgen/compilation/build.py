@@ -84,7 +84,7 @@ def compile_sources(
         if header not in sources:
             raise UsageError(f"the sources of {name!r} lack {header}; there are {', '.join(sources)}")
     headers = {header: sources[header] for header in HEADERS}
-    sources, width = choose_lanes(sources)
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, width, extension=True)
     parts = {
@@ -115,7 +115,7 @@ def compile_c_library(
     options = options or Options()
     sources = {file: text for file, text in sources.items() if file not in LAYER}
     _check(sources, name)
-    sources, width = choose_lanes(sources)
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, width, extension=False)
     parts = {

@@ -30,6 +30,9 @@ class Options:
         More flags for compiling and linking. Changes the build.
     compiler : str or None
         Command line of the compiler; None finds one. Changes the build.
+    lanes : {0, 2, 4, 8} or None
+        States that batches take at a time in vector registers; None takes what suits this processor, 0 leaves them
+        out. Results are the same, to the last bit. Changes the build.
     jobs : int or None
         Files compiled at a time; None takes the number of processors. Does not change the build.
     """
@@ -39,11 +42,14 @@ class Options:
     warnings: bool = False
     extra: Sequence[str] = ()
     compiler: str | None = None
+    lanes: int | None = None
     jobs: int | None = None
 
     def __post_init__(self) -> None:
         if self.optimize not in (None, 0, 1, 2, 3):
             raise UsageError(f"optimize must be None, 0, 1, 2 or 3, not {self.optimize!r}")
+        if self.lanes not in (None, 0, 2, 4, 8):
+            raise UsageError(f"lanes must be None, 0, 2, 4 or 8, not {self.lanes!r}")
         if isinstance(self.extra, str):
             raise UsageError(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))

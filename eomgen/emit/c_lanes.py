@@ -13,8 +13,13 @@ from .sources import render
 #: Public functions that have lanes where they are straight-line code.
 LANES = ("rhs", "mass_matrix", "bias", "inverse_dynamics", "energy", "outputs")
 
-#: Width -> instructions it needs on x86-64 beyond those that every such processor has.
-WIDTHS: dict[int, tuple[str, ...]] = {2: (), 4: ("avx2",), 8: ("avx512f", "avx512vl", "avx512dq")}
+#: Width -> instructions it needs on x86-64 beyond those that every such processor has, and their name in
+#: eomgen_processor.h.
+WIDTHS: dict[int, tuple[tuple[str, ...], str]] = {
+    2: ((), ""),
+    4: (("avx2",), "EOMGEN_AVX2"),
+    8: (("avx512f", "avx512vl", "avx512dq"), "EOMGEN_AVX512"),
+}
 
 
 def lane_blocks(program: Program) -> dict[str, Block]:
@@ -37,7 +42,7 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
         "blocks": [context["printed"][b] for b in blocks],
     }
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
-    for width, tests in WIDTHS.items():
-        shown = {"name": name, "width": width, "tests": tests, "feature": ", ".join(tests)}
+    for width, (tests, feature) in WIDTHS.items():
+        shown = {"name": name, "width": width, "tests": tests, "feature": feature}
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
     return files

@@ -64,12 +64,12 @@ const eomgen_model *eomgen_model_table(void);
 
 /* Widths to compile, added up: 2 for any processor, 4 and 8 for those with AVX2 and AVX-512. */
 #ifndef EOMGEN_LANES
-#if defined(__GNUC__) && defined(__x86_64__)
-#define EOMGEN_LANES 14
-#elif defined(__GNUC__)
-#define EOMGEN_LANES 2
-#else
+#if !defined(__GNUC__) || defined(EOMGEN_PORTABLE)
 #define EOMGEN_LANES 0
+#elif defined(__x86_64__)
+#define EOMGEN_LANES 14
+#else
+#define EOMGEN_LANES 2
 #endif
 #endif
 

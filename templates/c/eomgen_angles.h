@@ -1,6 +1,6 @@
 /* sincos_one, _two, _four: of so many angles, into consecutive places; what they return tells any_far whether some are. */
 
-#if !defined(__GNUC__)
+#ifndef EOMGEN_VECTORS
 static inline bits sincos_one(real a, real *restrict sines, real *restrict cosines)
 {
     *sines = sin(a);

@@ -7,6 +7,11 @@
 #include <stdint.h>
 #include <string.h>
 
+/* EOMGEN_PORTABLE: do without the vector types of GCC and Clang. */
+#if defined(__GNUC__) && !defined(EOMGEN_PORTABLE)
+#define EOMGEN_VECTORS
+#endif
+
 #ifdef EOMGEN_WIDTH
 typedef double real __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 typedef int64_t flag __attribute__((vector_size(8 * EOMGEN_WIDTH))); /* all bits where true */

@@ -11,7 +11,7 @@
 
 #define EOMGEN_NEAR 1.0e6
 
-#ifdef __GNUC__
+#ifdef EOMGEN_VECTORS
 #ifndef EOMGEN_PLAIN
 #define EOMGEN_PACK EOMGEN_WIDTH
 #elif defined(__AVX2__)

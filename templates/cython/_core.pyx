@@ -17,7 +17,6 @@ from libc.stdint cimport uintptr_t
 from libc.string cimport memcmp, memcpy
 
 import json
-import os
 import numpy as np
 cnp.import_array()
 

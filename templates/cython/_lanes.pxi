@@ -1,17 +1,17 @@
 # Lanes: the columns of a batch -> groups of as many as the processor takes at a time. The kernels' entry points are in
 # LANES.kernels, by the kernel's index (eomgen_lane_function in eomgen.h tells how to call them); NULL: no lanes.
 
-cdef const eomgen_lanes *find_lanes(int most) noexcept:
-    """The widest lanes that this processor has, of at most so many states; NULL without any."""
+cdef const eomgen_lanes *find_lanes() noexcept:
+    """The widest lanes that were compiled and that this processor has; NULL without any."""
     cdef int i = 0
     while MODEL.lanes != NULL and MODEL.lanes[i] != NULL:
-        if MODEL.lanes[i].width <= most and MODEL.lanes[i].usable():
+        if MODEL.lanes[i].usable():
             return MODEL.lanes[i]
         i += 1
     return NULL
 
 
-cdef const eomgen_lanes *LANES = find_lanes(int(os.environ.get("EOMGEN_LANES", WIDEST)))
+cdef const eomgen_lanes *LANES = find_lanes()
 lane_width = 1 if LANES == NULL else LANES.width  # states that batches take at a time
 
 
