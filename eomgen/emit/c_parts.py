@@ -8,7 +8,7 @@ from ..program import Program
 from .c_text import Printed
 
 #: Pieces that take more text than this (bytes) go into files of their own, of about this length each.
-LENGTH = 400_000
+LENGTH = 150_000
 
 
 def part_names(printed: Sequence[Printed]) -> list[str]:

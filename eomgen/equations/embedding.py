@@ -10,6 +10,8 @@ operations and minimum parameters of the dynamic models of tree structure robots
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -18,9 +20,10 @@ from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.inertia import SpatialInertia, Wrench
-from ..kinematics.loads import applied_wrenches, coordinate_forces
+from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.rates import JointRates, joint_rates, slide_accelerations
 from ..kinematics.regroup import regroup
+from ..kinematics.turned import Block, Rows, Turned, falling, turn_forces, turn_links
 from .equations import TreeEquations
 
 
@@ -35,6 +38,14 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
         inertias, inverse = given, plain
     rest = tuple(graph.zero for _ in kinematics.v)
+    own_axes, blocks = turn_links(kinematics)
+
+    def turned() -> tuple[Rows, tuple[Expr, ...]]:
+        mass = [list(row) for row in _composite_mass_matrix(own_axes, inertias)]
+        for k, drive in drive_inertias(kinematics).items():
+            mass[k][k] = mass[k][k] + drive
+        return tuple(map(tuple, mass)), _sweep(own_axes, inertias, rates, rest, blocks)
+
     return TreeEquations(
         method="embedding",
         mass_matrix=_composite_mass_matrix(kinematics, inertias),
@@ -42,6 +53,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),
         potential_energy=potential_energy(kinematics),
+        turned=Turned(turned, blocks) if blocks else None,
     )
 
 
@@ -83,9 +95,13 @@ def _moment(inertia: Mat3, omega: Vec3, alpha: Vec3, turning: Mat3) -> Vec3:
 
 
 def _sweep(
-    kinematics: Kinematics, inertias: list[SpatialInertia], rates: list[JointRates], a: tuple[Expr, ...]
+    kinematics: Kinematics,
+    inertias: list[SpatialInertia],
+    rates: list[JointRates],
+    a: tuple[Expr, ...],
+    blocks: Sequence[Block] = (),
 ) -> tuple[Expr, ...]:
-    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints."""
+    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
     graph, links = kinematics.graph, kinematics.links
     still = vec.zero(graph)
     lifted = vec.neg(kinematics.mechanism.gravity)  # gravity as an acceleration of ground
@@ -94,9 +110,10 @@ def _sweep(
     wrenches: list[Wrench] = []
     applied = applied_wrenches(kinematics)
     slides = slide_accelerations(kinematics, rates, a)
+    afloat = falling(blocks)
     for k, link in enumerate(links):
         rate, omega = rates[k], kinematics.twists[k][0]
-        above, base = still, (still, (still, still, still), lifted)
+        above, base = still, (still, (still, still, still), still if k in afloat else lifted)
         if link.parent != GROUND:
             above, base = kinematics.twists[link.parent][0], motions[link.parent]
         relative = vec.add(rate.slide_rate, slides[k])
@@ -111,7 +128,7 @@ def _sweep(
         push = vec.add(vec.scale(inertia.mass, linear), vec.times(turning, inertia.moment))
         turn = vec.add(_moment(inertia.inertia, omega, alpha, turning), vec.cross(inertia.moment, linear))
         wrenches.append((vec.sub(turn, applied[k][0]), vec.sub(push, applied[k][1])))
-    result = [-f for f in coordinate_forces(kinematics)]
+    result = [-f for f in turn_forces(blocks, coordinate_forces(kinematics))]
     for k in reversed(range(len(links))):
         link = links[k]
         for c, column in enumerate(link.columns):

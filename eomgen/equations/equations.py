@@ -9,6 +9,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
+from ..kinematics.turned import Turned
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -77,6 +78,7 @@ class TreeEquations:
     pivots : (n_v,) with ``accelerations``: all positive exactly where M is positive definite
     system : the linear system that the method solves for its accelerations; None where M and h are enough
     canonical : (2 n_v,) of a method in canonical variables: p = dT/dv, then -dH/dq + Q; else empty
+    turned : the same system in velocities in which it is shorter, where there are free joints; else None
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class TreeEquations:
         pivots: tuple[Expr, ...] = (),
         system: LinearSystem | None = None,
         canonical: tuple[Expr, ...] = (),
+        turned: Turned | None = None,
     ) -> None:
         self.method = method
         self._mass_matrix = mass_matrix
@@ -102,6 +105,7 @@ class TreeEquations:
         self.pivots = pivots
         self.system = system
         self.canonical = canonical
+        self.turned = turned
 
     @property
     def mass_matrix(self) -> Rows:

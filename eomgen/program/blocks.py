@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import exceeding, factorize, outward, positivity, solve
+from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
@@ -44,8 +44,9 @@ class BlockMaker:
     @property
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
-        small = self.sizes.n_v <= self.limits.unrolled
-        return not self.has_loops and self.terms.system is None and (small or self.terms.accelerations is not None)
+        if self.has_loops or self.terms.system is not None:
+            return False
+        return self.terms.accelerations is not None or is_unrolled(self.terms.parent, self.limits.unrolled)
 
     @cached_property
     def _loops(self) -> LoopBlocks | None:
@@ -81,9 +82,11 @@ class BlockMaker:
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
             checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
             return list(terms.accelerations), [*self._turned, *checks]
-        factor = factorize(terms.mass_matrix, terms.parent)
-        checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
-        return solve(factor, [-h for h in terms.bias]), [*self._turned, *checks]
+        mass, bias = terms.turned.system if terms.turned else (terms.mass_matrix, terms.bias)
+        factor = factorize(mass, terms.parent)
+        checks = positivity(mass, factor, terms.coordinate_scales)
+        solution = solve(factor, [-h for h in bias])
+        return (terms.turned.accelerations(solution) if terms.turned else solution), [*self._turned, *checks]
 
     def _symbols(self, names: Sequence[str]) -> list[Expr]:
         return [self.terms.graph.symbol(name) for name in names]

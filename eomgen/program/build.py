@@ -1,8 +1,8 @@
 """Stage program: SystemTerms -> Program: what functions to generate, hoisted, counted.
 
 Public kernels that can be are straight-line blocks; the rest are drivers that the target's own code computes from
-blocks (Newton iterations, factorisations of the embedded system).  Trees up to :attr:`Limits.unrolled` velocities have
-their right-hand side wholly on the graph.
+blocks (Newton iterations, factorisations of the embedded system).  Trees that do not exceed
+:attr:`Limits.unrolled` have their right-hand side wholly on the graph.
 """
 
 from __future__ import annotations

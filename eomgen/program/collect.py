@@ -70,6 +70,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
         system=equations.system,
+        turned=equations.turned,
         projects=c.stabilised is None,
         canonical=equations.canonical,
     )

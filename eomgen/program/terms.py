@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..equations.equations import LinearSystem
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
+from ..kinematics.turned import Turned
 from ..kinematics.wrenches import JointWrenches
 
 Row = tuple[Expr, ...]
@@ -69,6 +70,7 @@ class SystemTerms:
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+    turned: Turned | None = None  #: the tree's system in other velocities, in which it is solved; else None
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property
