@@ -116,8 +116,8 @@ def build_layer(
 
 
 def _c_flags(compiler: CompilerInfo) -> list[str]:
-    """Flags of the C files, with the lanes that this processor takes."""
-    return [*stepper_flags(compiler), f"-DEOMGEN_LANES={lane_width()}"]
+    """Flags of the C files, with all lanes that this processor takes: models choose."""
+    return [*stepper_flags(compiler), f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= lane_width())}"]
 
 
 def _objects(entry: CacheEntry) -> list[Path]:
