@@ -69,6 +69,8 @@ class SystemTerms:
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+    events: Row = ()  #: of (q, v): their zeros are the events of the model
+    resets: Row = ()  #: of (q, v): new values of states after events
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property

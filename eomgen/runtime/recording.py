@@ -107,7 +107,14 @@ class Columns:
         return find_change_points(self.module, self.t, self.x, self.u)
 
 
-def record(module: Module, forcing: Forcing, solution: Solution, method: str, options: dict[str, Any]) -> Trajectory:
+def record(
+    module: Module,
+    forcing: Forcing,
+    solution: Solution,
+    method: str,
+    options: dict[str, Any],
+    event_names: Sequence[str] = (),
+) -> Trajectory:
     """Project the solution and put the trajectory together.
 
     Raises
@@ -126,6 +133,7 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
         "message": solution.message,
         **solution.counts,
         "residuals": residuals._asdict(),
+        "event_names": list(event_names),
     }
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
     header["units"] = units_of(module, columns.names)
