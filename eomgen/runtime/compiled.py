@@ -39,7 +39,7 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     return method in getattr(module.core, "methods", ()) and not forcing.foreign
 
 
-def stepper_options(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
+def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
     """Tolerances and step limits as steppers take them.
 
     Parameters
@@ -50,6 +50,8 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any]) -> dict[str
         Length of the run (s), the longest first step.
     options : mapping
         rtol, atol (a number or n of them), max_step, first_step.
+    checked : bool
+        Whether they have been checked and completed already.
 
     Raises
     ------
@@ -57,11 +59,13 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any]) -> dict[str
         An unknown option or a value that cannot be.
     """
     check_names("option of simulate", options, OPTIONS)
-    checked = check_tolerances(n, span, {"rtol": 1e-3, "atol": 1e-6, **options})
-    if not isinstance(checked["rtol"], float):
-        raise UsageError(f"rtol must be one number for a compiled method, not of shape {checked['rtol'].shape}")
-    limits = {"max_step": checked.get("max_step", np.inf), "first_step": checked.get("first_step", 0.0)}
-    return {"rtol": checked["rtol"], "atol": np.broadcast_to(checked["atol"], (n,)).copy(), **limits}
+    given = options if checked else check_tolerances(n, span, {"rtol": 1e-3, "atol": 1e-6, **options})
+    if not isinstance(given["rtol"], float):
+        raise UsageError(f"rtol must be one number for a compiled method, not of shape {given['rtol'].shape}")
+    limits = {"max_step": given.get("max_step", np.inf), "first_step": given.get("first_step", 0.0)}
+    atol = np.empty(n)
+    atol[:] = given["atol"]
+    return {"rtol": given["rtol"], "atol": atol, **limits}
 
 
 def integrate_compiled(
@@ -93,7 +97,7 @@ def integrate_compiled(
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
         "watch": None if watch is None else watch.look,
     }  # fmt: skip
-    settings = stepper_options(len(x0), abs(end - start), options)
+    settings = stepper_options(len(x0), abs(end - start), options, checked=True)
     journey = core.journey(method, module.kernels.context, start, x0, end, signals=forcing.encode(), plan=plan, **settings)
     status = journey.travel()
     while status == WAITING and events is not None:

@@ -221,6 +221,8 @@ class Forcing:
 
     def sample(self, t: Array, x: Array) -> Array:
         """u (n_u, k) at times (k,) and states (n_x, k)."""
+        if not self.base.size:
+            return np.empty((0, len(t)))
         u = np.repeat(self.base[:, None], len(t), axis=1)
         tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Signal)}
         if len(self.varying) > len(tables):

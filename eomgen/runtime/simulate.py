@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cached_property, partial
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -211,9 +212,13 @@ class _Run:
     def __init__(self, module: Module, forcing: Forcing) -> None:
         self.module = module
         self.forcing = forcing
-        self.kernel: Timed = module.kernels.timed("rhs", nan=True)
         self.tangent: Timed | None = None
         self.last: tuple[str, int, float, Array] | None = None
+
+    @cached_property
+    def kernel(self) -> Timed:
+        """The right-hand side."""
+        return self.module.kernels.timed("rhs", nan=True)
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""
@@ -278,8 +283,8 @@ class _Run:
 
 
 def _check(run: _Run, solution: Solution, start: float, end: float, method: str) -> None:
-    finite = np.isfinite(solution.x).all(axis=0)
-    if not finite.all():
+    if not np.isfinite(solution.x).all():
+        finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
     if solution.status < 0:
@@ -292,6 +297,8 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
+    if type(span) is tuple and len(span) == 2 and isfinite(span[0]) and isfinite(span[1]):
+        return float(span[0]), float(span[1])
     if np.ndim(span) == 0:
         return 0.0, number("the end of the span", span)
     pair = np.asarray(span, dtype=float)

@@ -102,15 +102,30 @@ cdef class Interpolant:
     cdef readonly double t_old, t
 
     def __call__(self, t):
-        times = np.asarray(t, dtype=float)
-        cdef cnp.ndarray flat = np.ascontiguousarray(times.reshape(-1))
-        cdef cnp.npy_intp k = cnp.PyArray_DIM(flat, 0), i
-        cdef cnp.ndarray result = rows(k, self.run.n)
-        cdef double *y = <double *>cnp.PyArray_DATA(result)
+        cdef cnp.ndarray flat = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError)), result
+        cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
+        cdef int j
         cdef double *at = <double *>cnp.PyArray_DATA(flat)
+        cdef double *y = <double *>cnp.PyArray_DATA(self.memory) + n * (1 + self.method.rows_F)
+        cdef double *out
+        if cnp.PyArray_NDIM(flat) == 0:
+            self.method.interpolate(&self.run, at[0], y)
+            return copy(y, n)
+        result = rows(n, k)
+        out = <double *>cnp.PyArray_DATA(result)
         for i in range(k):
-            self.method.interpolate(&self.run, at[i], y + i * self.run.n)
-        return result[0] if times.ndim == 0 else np.ascontiguousarray(result.T)
+            self.method.interpolate(&self.run, at[i], y)
+            for j in range(n):
+                out[j * k + i] = y[j]
+        return result
+
+    @property
+    def t_min(self):
+        return min(self.t_old, self.t)
+
+    @property
+    def t_max(self):
+        return max(self.t_old, self.t)
 
 
 cdef class Stepper:
@@ -214,7 +229,7 @@ cdef class Stepper:
         cdef int n = self.run.n
         eomgen_between(self.method, &self.run, self.run.t, self.run.K + n)  # forms the coefficients
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
-        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
+        cdef cnp.npy_intp length = n * (2 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
         memcpy(data, self.run.y_old, n * sizeof(double))
