@@ -182,4 +182,4 @@ static void dop853_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_dop853 = {"DOP853", 16, 7, 7, dop853_attempt, dop853_error, dop853_prepare, dop853_interpolate};
+const eomgen_method eomgen_dop853 = {"DOP853", 16, 7, 7, dop853_attempt, dop853_error, dop853_prepare, dop853_interpolate, 0};

@@ -67,4 +67,4 @@ static void rk23_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk23 = {"RK23", 4, 3, 2, rk23_attempt, rk23_error, rk23_prepare, rk23_interpolate};
+const eomgen_method eomgen_rk23 = {"RK23", 4, 3, 2, rk23_attempt, rk23_error, rk23_prepare, rk23_interpolate, 0};

@@ -90,4 +90,4 @@ static void rk45_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk45 = {"RK45", 7, 4, 4, rk45_attempt, rk45_error, rk45_prepare, rk45_interpolate};
+const eomgen_method eomgen_rk45 = {"RK45", 7, 4, 4, rk45_attempt, rk45_error, rk45_prepare, rk45_interpolate, 0};
