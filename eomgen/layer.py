@@ -6,16 +6,23 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+#: Parts of the steppers' source, in order: a part may use what stands in those before it.
+STEPPERS = (
+    "control", "signals", "tape", "plain", "rk4_step", "rk4", "event_values", "event_zero", "crossings", "loop",
+)  # fmt: skip
+
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
+    "_journeys.pxi": ("cython/_journeys.pxi",),
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
+    "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
     "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
-    "eomgen_steppers.c": ("c/steppers/control.c", "c/steppers/plain.c"),
+    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
     "eomgen_lane_runs.h": ("c/ensembles/lane_runs.c",),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
-UNASSEMBLED = -103  #: status of a run whose initial values could not be assembled
+UNASSEMBLED = -111  #: status of a run whose initial values could not be assembled
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.compiled import TERMINAL
 from ..runtime.names import require, unknown
-from .block import MEANING, Plan
+from .block import MEANING, Plan, find_events
 from .cases import Cases
 from .reductions import names_of, with_outputs
 
@@ -51,6 +52,9 @@ class Ensemble:
     status : (k,) int array
         0 where the end was reached; ``failures`` says more.
     steps, rejected, evaluations : (k,) int arrays
+    event_names : tuple of str
+    event_counts : (k,) int array
+        Events of each run, all kinds together.
     reduced : dict
         What a reduction kept: ``count``, ``mean``, ``variance``, ``least``, ``greatest`` (n_x + n_y, m) of the
         statistics, in the order of ``names``; lists of arrays, one a block, of a function.
@@ -73,14 +77,16 @@ class Ensemble:
         self.t = np.array([plan.span[1]]) if plan.t_eval is None else plan.t_eval
         self.t_end, self.status = runs["t"], runs["status"]
         self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
+        self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
+        self._notes = kept.pop("notes", None)
         self._failure, self._failure_time = runs["failure"], runs["failure_time"]
         self.x, self.samples = kept.pop("x", None), kept.pop("samples", None)
         self.reduced = kept
 
     @property
     def ok(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """(k,) which runs reached the end."""
-        return np.asarray(self.status == 0)
+        """(k,) which runs reached the end, or an event that ends them."""
+        return np.asarray((self.status == 0) | (self.status == TERMINAL))
 
     def failures(self) -> list[Failure]:
         """The runs that did not reach the end, with what stopped them."""
@@ -116,6 +122,18 @@ class Ensemble:
 
     def _outputs(self, x: Array, t: float) -> Array:
         return with_outputs(self._module, self._cases, x, t)
+
+    def events(self, name: str) -> tuple[Array, Array]:
+        """Times (m, k) of an event in each run, and the projected states (n_x, m, k) there; NaN where it was not."""
+        if name not in self.event_names:
+            raise unknown("event", name, self.event_names)
+        if self._notes is None:
+            raise UsageError("this ensemble kept no events; give reduce='states' or 'events'")
+        mine = self._notes[0] == self.event_names.index(name)
+        most = int(mine.sum(axis=0).max(initial=0))
+        order = np.argsort(~mine, axis=0, kind="stable")[:most]
+        found = np.take_along_axis(np.where(mine, self._notes[1:], np.nan), order[None], axis=1)
+        return found[0], found[1:]
 
     def case(self, k: int) -> dict[str, Any]:
         """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs."""

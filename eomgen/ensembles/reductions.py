@@ -31,11 +31,20 @@ class Reduction(Protocol):
 
 
 class States:
-    """The last states, and the samples where times were asked for."""
+    """The last states, the samples where times were asked for, and the events.
+
+    Parameters
+    ----------
+    kept : sequence of str
+        Which of them.
+    """
+
+    def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
+        self.kept = tuple(kept)
 
     def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
-        """x (n_x, k), and samples (n_x, m, k)."""
-        return {"x": block.x} if block.samples is None else {"x": block.x, "samples": block.samples}
+        """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
+        return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
 
     def join(self, parts: Sequence[Arrays]) -> Arrays:
         """Side by side."""
@@ -99,14 +108,16 @@ class Custom:
 
 
 def choose_reduction(reduce: Any) -> Reduction:
-    """The reduction that a user names: None or 'states', 'statistics', or a function of a block."""
+    """The reduction that a user names: None or 'states', 'statistics', 'events', or a function of a block."""
     if callable(reduce):
         return Custom(reduce)
     if reduce in (None, "states"):
         return States()
+    if reduce == "events":
+        return States(["notes"])
     if reduce == "statistics":
         return Statistics()
-    raise UsageError(f"reduce must be 'states', 'statistics' or a function of a block, not {reduce!r}")
+    raise UsageError(f"reduce must be 'states', 'statistics', 'events' or a function of a block, not {reduce!r}")
 
 
 def with_outputs(module: Module, cases: Cases, x: Array, t: float) -> Array:

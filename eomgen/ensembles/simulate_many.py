@@ -16,10 +16,10 @@ from ..errors import UsageError
 from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
-from ..runtime.signals import Forcing
+from ..runtime.signals import Forcing, Signal
 from ..runtime.simulate import DEFAULTS, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
-from .block import LOST, Plan
+from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
 from .cases import Cases, collect_cases
 from .ensemble import Ensemble
@@ -41,6 +41,8 @@ def simulate_many(
     count: int | None = None,
     method: str | None = None,
     t_eval: ArrayLike | None = None,
+    events: Any = None,
+    keep_events: int = 16,
     reduce: Any = None,
     threads: int | None = None,
     cluster: Any = None,
@@ -63,15 +65,20 @@ def simulate_many(
     initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
         Named values, held exactly, or states, a column each, which are projected onto the constraints.
     parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
-        An input may also be a table (times, values), the same for all runs; (k,) inputs are constant over time.
+        An input may also vary over time, the same for all runs: a table (times, values), a Signal, or an expression as
+        text; (k,) inputs are constant.
     count : int, optional
         Number of runs, where no array tells it.
     method : str, optional
         DOP853, RK45 or RK23 run in compiled code; any other method of ``simulate`` runs one after the other.
     t_eval : (m,) array, optional
         Times to store; the end alone by default.
-    reduce : {'states', 'statistics'} or callable, optional
-        What to keep: every run's last state, and its states at t_eval (default); or count, mean, variance, least and
+    events : str, list of str, or mapping of names to expressions, optional
+        As for ``simulate``, without functions; those of the model by default.
+    keep_events : int
+        Keep so many events of each run, the first ones.
+    reduce : {'states', 'statistics', 'events'} or callable, optional
+        What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count, mean, variance, least and
         greatest of states and outputs over the runs; or what ``reduce(block)`` returns for each
         :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
     threads : int, optional
@@ -104,7 +111,7 @@ def simulate_many(
     check_names("option of simulate_many", options, OPTIONS)
     tables, constants = _separate(inputs)
     cases = collect_cases(module, initial, parameters, constants, count)
-    plan = _plan(module, span, method, t_eval, tables, max_steps, options)
+    plan = _plan(module, span, method, t_eval, tables, max_steps, options, (events, keep_events))
     reduction = choose_reduction(reduce)
     threads = _positive("threads", threads, os.cpu_count() or 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
@@ -156,8 +163,9 @@ def _gather(
 
 
 def _plan(
-    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int, options: dict[str, Any]
-) -> Plan:
+    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int, options: dict[str, Any],
+    watched: tuple[Any, int],
+) -> Plan:  # fmt: skip
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     start, end = find_span(span, float(declared["end"]))
     method = declared["method"] if method is None else method
@@ -167,19 +175,25 @@ def _plan(
     chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     times = None if t_eval is None else ordered_times(t_eval, start, end)
-    return Plan((start, end), method, chosen, _positive("max_steps", max_steps, 1), times, tables)
+    most, keep = _positive("max_steps", max_steps, 1), _positive("keep_events", watched[1], 1)
+    plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep)
+    find_events(module, plan)
+    return plan
 
 
 def _separate(inputs: Any) -> tuple[dict[str, Any], Any]:
     """Inputs that are tables over time, and the others."""
     if not isinstance(inputs, Mapping):
         return {}, inputs
-    tables = {name: x for name, x in inputs.items() if isinstance(x, tuple) and len(x) == 2 and np.ndim(x[0]) == 1}
+    tables = {
+        name: x for name, x in inputs.items()
+        if isinstance(x, (Signal, str)) or (isinstance(x, tuple) and len(x) == 2 and np.ndim(x[0]) == 1)
+    }  # fmt: skip
     for name, value in inputs.items():
-        if callable(value):
+        if callable(value) and name not in tables:
             raise UsageError(
                 f"input {name} of simulate_many must be a number, (k,) numbers or a table (times, values), "
-                "not a function; state feedback goes into the model as a force element"
+                "a Signal or an expression as text, not a function"
             )
     return tables, {name: x for name, x in inputs.items() if name not in tables} or None
 
@@ -198,13 +212,18 @@ def _open_store(
     from .handle import digest
     from .store import Store
 
+    def _plain(x: Any) -> Any:
+        if isinstance(x, Signal):
+            return [x.interpolation, x.times.tolist(), x.values.tolist()]
+        return x if isinstance(x, str) else np.asarray(x).tolist()
+
     file = getattr(eager(module.core), "__file__", None)
     code = digest(file) if file else hashlib.sha256(str(module.core.metadata).encode()).hexdigest()
     identity = {
         "model": module.name, "code": code, "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
-        "inputs": {name: np.asarray(x).tolist() for name, x in plan.inputs.items()},
+        "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,
         "reduce": getattr(reduce, "__qualname__", reduce) or "states", "block": parts[0][1],
     }  # fmt: skip
     return Store(folder, identity)

@@ -13,7 +13,6 @@ cdef extern from "eomgen_ensembles.h" nogil:
         const double *p
         const double *u
         long p_stride, u_stride
-        const eomgen_signal *signals
         const double *nodes
         int n_nodes
         double rtol, max_step, first_step
@@ -28,13 +27,22 @@ cdef extern from "eomgen_ensembles.h" nogil:
         long *steps
         long *rejected
         long *evaluations
+        long n_notes
+        double *notes
+        long *noted
         int *failure
         double *failure_time
         long next, done
         int stop
     enum: EOMGEN_NOT_RUN
-    long eomgen_ensemble_memory(const eomgen_ensemble *) noexcept
-    void eomgen_ensemble_work(eomgen_ensemble *, double *) noexcept
+    ctypedef struct eomgen_thread:
+        const eomgen_signal *signals
+        eomgen_events *events
+        double *notes
+        long notes_room
+        double *memory
+    long eomgen_ensemble_memory(const eomgen_ensemble *, const eomgen_thread *) noexcept
+    void eomgen_ensemble_work(eomgen_ensemble *, const eomgen_thread *) noexcept
 
 
 cdef const double *reading(cnp.ndarray array) noexcept:
@@ -62,27 +70,38 @@ cdef class Ensemble:
         A trajectory that takes more is given up.
     t_eval : (m,) array, optional
         Times at which to keep the states.
-    signals : list of (index, order, times, values)
+    signals : list
         Inputs over time, as for a Stepper.
+    events : dict or None
+        As in the plan of a Journey; none may wait for Python.
+    keep : int
+        Events kept of each trajectory.
 
     Attributes
     ----------
     x, t : (k, n_x), (k,) arrays
         The last state of each and its time.
     samples : (k, m, n_x) array or None
+    notes : (k, keep, 2 + n_x) array or None
+        Event, time and state of the first events of each; NaN where there were fewer.
+    noted : (k,) array
+        How many events there were.
     status, failure, failure_time, steps, rejected, evaluations : (k,) arrays
         0 where the end was reached; the status of the last evaluation that failed and its time.
     """
 
     cdef eomgen_ensemble all
     cdef list held
-    cdef readonly cnp.ndarray x, t, status, steps, rejected, evaluations, failure, failure_time
-    cdef readonly object samples
+    cdef object signals, watched
+    cdef Context context
+    cdef readonly cnp.ndarray x, t, status, steps, rejected, evaluations, failure, failure_time, noted
+    cdef readonly object samples, notes
 
     def __cinit__(self, str method, nodes, x0, p, u, double rtol, atol, double max_step, double first_step,
-                  long max_steps, t_eval=None, signals=()):
+                  long max_steps, t_eval=None, signals=(), events=None, long keep=0):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
         cdef eomgen_ensemble *all = &self.all
+        self.signals, self.watched, self.context = tuple(signals), events, Context()
         x0, p, u = (np.ascontiguousarray(value, dtype=float) for value in (x0, p, u))
         count = len(x0)
         for label, value, size in (("x0", x0, n), ("p", p, MODEL.n_p), ("u", u, MODEL.n_u)):
@@ -97,7 +116,6 @@ cdef class Ensemble:
             all.lane_rhs, all.lane_width = LANES.kernels[index], LANES.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
         all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
-        all.signals = make_signals(signals, self.held)
         all.nodes, all.n_nodes = reading(nodes), len(nodes)
         all.rtol, all.atol, all.max_step, all.first_step = rtol, reading(atol), max_step, first_step
         all.max_steps, all.t_eval, all.n_eval = max_steps, reading(asked), len(asked)
@@ -109,16 +127,29 @@ cdef class Ensemble:
         all.x, all.t = <double *>cnp.PyArray_DATA(self.x), <double *>cnp.PyArray_DATA(self.t)
         all.samples = NULL if t_eval is None else <double *>cnp.PyArray_DATA(<cnp.ndarray>self.samples)
         all.status, all.failure = <int *>cnp.PyArray_DATA(self.status), <int *>cnp.PyArray_DATA(self.failure)
+        self.notes = np.full((count, keep, 2 + n), np.nan) if events else None
+        self.noted = np.zeros(count, dtype=np.int_)
+        all.n_notes, all.noted = keep, <long *>cnp.PyArray_DATA(self.noted)
+        all.notes = <double *>cnp.PyArray_DATA(<cnp.ndarray>self.notes) if events else NULL
         all.failure_time = <double *>cnp.PyArray_DATA(self.failure_time)
         all.steps, all.rejected = <long *>cnp.PyArray_DATA(self.steps), <long *>cnp.PyArray_DATA(self.rejected)
         all.evaluations = <long *>cnp.PyArray_DATA(self.evaluations)
 
     def work(self):
         """Run trajectories until none is left, without the GIL; called by every thread."""
-        memory = np.zeros(eomgen_ensemble_memory(&self.all))
-        cdef double *data = <double *>cnp.PyArray_DATA(<cnp.ndarray>memory)
+        cdef eomgen_thread own
+        cdef Journey journey
+        held = []
+        own.signals, own.events, own.notes, own.notes_room = make_signals(self.signals, held), NULL, NULL, 0
+        if self.watched:
+            plan = {"nodes": [0.0], "t_eval": [0.0], "dense": False, "watch": None, "events": self.watched}
+            atol = np.ones(self.all.n)
+            journey = Journey(self.all.method.name.decode(), self.context, 0.0, atol, 0.0, 1.0, atol, 1.0, plan=plan)
+            own.events, own.notes, own.notes_room = &journey.events, journey.journey.notes, journey.journey.notes_room
+        memory = np.zeros(eomgen_ensemble_memory(&self.all, &own))
+        own.memory = <double *>cnp.PyArray_DATA(<cnp.ndarray>memory)
         with nogil:
-            eomgen_ensemble_work(&self.all, data)
+            eomgen_ensemble_work(&self.all, &own)
 
     def stop(self):
         """Begin no further trajectory and end those under way."""

@@ -20,10 +20,10 @@ static const eomgen_lane_worker *const lane_workers[] = {
 };
 
 /* Who runs this ensemble in lanes; NULL: nobody. */
-static const eomgen_lane_worker *find_worker(const eomgen_ensemble *e)
+static const eomgen_lane_worker *find_worker(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     for (int i = 0; e->lane_rhs != NULL && lane_workers[i] != NULL; i++) {
-        if (lane_workers[i]->width == e->lane_width) {
+        if (lane_workers[i]->width == e->lane_width && lane_workers[i]->takes(e, own)) {
             return lane_workers[i];
         }
     }
@@ -39,99 +39,106 @@ long eomgen_ensemble_take(eomgen_ensemble *e)
     return k < e->count ? k : -1;
 }
 
-long eomgen_ensemble_memory(const eomgen_ensemble *e)
+long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
-    const eomgen_lane_worker *const worker = find_worker(e);
+    const eomgen_lane_worker *const worker = find_worker(e, own);
     if (worker != NULL) {
         return worker->memory(e);
     }
     const long rows = 4 + e->method->rows_K + e->method->rows_F;
-    return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n;
+    return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + e->n_eval;
 }
 
-/* Store the states at the times asked for that the run has reached. */
-static void sample(const eomgen_ensemble *e, eomgen_run *run, long k, long *done)
+static long look_at_stop(void *looker, const double *t)
 {
-    while (*done < e->n_eval && run->direction * (e->t_eval[*done] - run->t) <= 0.0) {
-        double *const row = e->samples + (k * e->n_eval + *done) * e->n;
-        if (run->t == e->t_eval[*done]) {
-            memcpy(row, run->y, (size_t)e->n * sizeof(double));
-        } else {
-            eomgen_between(e->method, run, e->t_eval[*done], row);
-        }
-        ++*done;
-    }
+    (void)t;
+    return __atomic_load_n(&((const eomgen_ensemble *)looker)->stop, __ATOMIC_RELAXED) ? 0 : EOMGEN_GLANCE;
 }
 
-/* From one node to the next: 0, or how it ended. */
-static int run_part(eomgen_ensemble *e, eomgen_run *run, long k, long *done)
+/* Keep the events noted by now, as many as there is room for. */
+static void keep_notes(eomgen_ensemble *e, eomgen_journey *journey, long k)
 {
-    while (run->direction * (run->t - run->t_bound) < 0.0) {
-        if (e->steps[k] >= e->max_steps) {
-            return EOMGEN_TOO_MANY_STEPS;
+    const long width = 2 + e->n;
+    for (long i = 0; i < journey->n_notes; i++, e->noted[k]++) {
+        if (e->noted[k] < e->n_notes) {
+            memcpy(e->notes + (k * e->n_notes + e->noted[k]) * width, journey->notes + i * width,
+                   (size_t)width * sizeof(double));
         }
-        if (e->steps[k] % EOMGEN_GLANCE == EOMGEN_GLANCE - 1 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
-            return EOMGEN_NOT_RUN;
-        }
-        const int status = eomgen_step(e->method, run);
-        if (status != 0) {
-            return status;
-        }
-        e->steps[k]++;
-        sample(e, run, k, done);
     }
-    return 0;
+    journey->n_notes = 0;
 }
 
-static void run_one(eomgen_ensemble *e, eomgen_run *run, double *constants, long k)
+static int travel(eomgen_ensemble *e, eomgen_run *run, eomgen_journey *journey, long k)
+{
+    int status = EOMGEN_FULL;
+    while (status == EOMGEN_FULL) {
+        status = eomgen_travel(e->method, run, journey);
+        if (journey->events != NULL) {
+            keep_notes(e, journey, k);
+        }
+    }
+    return status;
+}
+
+static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *own, double *constants, double *times, long k)
 {
     const size_t size = (size_t)e->n * sizeof(double);
-    long done = 0;
-    int status = e->model->precompute(e->p + k * e->p_stride, constants) == 0 ? 0 : EOMGEN_BAD_PARAMETERS;
-    run->evaluations = run->rejected = run->failure = 0;
+    eomgen_journey journey;
+    memset(&journey, 0, sizeof journey);
+    journey.nodes = e->nodes + 1, journey.n_nodes = e->n_nodes - 1;
+    journey.t_eval = e->t_eval, journey.n_eval = e->n_eval;
+    journey.span = fabs(e->nodes[e->n_nodes - 1] - e->nodes[0]);
+    journey.room = e->n_eval, journey.times = times;
+    journey.states = e->n_eval > 0 ? e->samples + k * e->n_eval * e->n : NULL;
+    journey.events = own->events, journey.notes = own->notes, journey.notes_room = own->notes_room;
+    if (own->events != NULL) {
+        memset(own->events->count, 0, (size_t)own->events->n * sizeof(long));
+        own->events->crowded = 0;
+    }
+    run->evaluations = run->rejected = run->steps = run->failure = run->stopped = 0;
+    run->failure_time = 0.0;
+    run->look_in = EOMGEN_GLANCE;
     run->t = run->t_old = e->nodes[0];
+    run->h_abs = e->first_step;
     memcpy(run->y, e->x0 + k * e->n, size);
     memcpy(run->u, e->u + k * e->u_stride, (size_t)e->model->n_u * sizeof(double));
-    run->direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
-    e->steps[k] = 0;
-    sample(e, run, k, &done);
-    for (int i = 1; i < e->n_nodes && status == 0; i++) {
-        run->t_bound = e->nodes[i];
-        run->h_abs = fmin(e->first_step, fabs(e->nodes[i] - e->nodes[i - 1]));
-        eomgen_start(e->method, run);
-        status = run_part(e, run, k, &done);
+    int status = EOMGEN_BAD_PARAMETERS;
+    if (e->model->precompute(e->p + k * e->p_stride, constants) == 0) {
+        status = travel(e, run, &journey, k);
     }
-    for (long j = done * e->n; j < e->n_eval * e->n; j++) {
-        e->samples[k * e->n_eval * e->n + j] = NAN;
+    for (long j = journey.stored * e->n; j < e->n_eval * e->n; j++) {
+        journey.states[j] = NAN;
     }
     memcpy(e->x + k * e->n, run->y, size);
     e->t[k] = run->t;
-    e->status[k] = status;
-    e->rejected[k] = run->rejected, e->evaluations[k] = run->evaluations;
+    e->status[k] = status == EOMGEN_END ? 0 : status == EOMGEN_STOPPED ? EOMGEN_NOT_RUN : status;
+    e->steps[k] = run->steps, e->rejected[k] = run->rejected, e->evaluations[k] = run->evaluations;
     e->failure[k] = run->failure, e->failure_time[k] = run->failure_time;
 }
 
-void eomgen_ensemble_work(eomgen_ensemble *e, double *memory)
+void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
 {
-    const eomgen_lane_worker *const worker = find_worker(e);
+    const eomgen_lane_worker *const worker = find_worker(e, own);
     if (worker != NULL) {
-        worker->work(e, memory);
+        worker->work(e, own);
         return;
     }
     const int n = e->n;
     eomgen_run run;
     memset(&run, 0, sizeof run);
-    double *const constants = memory;
-    run.rhs = e->rhs, run.c = constants, run.signals = e->signals, run.n_u = e->model->n_u, run.n = n;
-    run.rtol = e->rtol, run.atol = e->atol, run.max_step = e->max_step;
+    double *const constants = own->memory;
+    run.rhs = e->rhs, run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
+    run.rtol = e->rtol, run.atol = e->atol, run.max_step = e->max_step, run.most_steps = e->max_steps;
+    run.look = look_at_stop, run.looker = e;
     run.w = constants + e->model->n_const;
     run.u = run.w + e->model->n_work;
     run.y = run.u + e->model->n_u;
     run.y_old = run.y + n, run.f = run.y_old + n, run.failure_state = run.f + n;
     run.K = run.failure_state + n;
     run.F = run.K + e->method->rows_K * n;
+    double *const times = run.F + e->method->rows_F * n;
     for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
-        run_one(e, &run, constants, k);
+        run_one(e, &run, own, constants, times, k);
         __atomic_fetch_add(&e->done, 1, __ATOMIC_RELAXED);
     }
 }

@@ -15,7 +15,7 @@ typedef struct {
     int n_u, n;
     double rtol;
     const double *atol;
-    real t, t_old, step;
+    real t, t_old, step, hold; /* hold: as in eomgen_run */
     real *c, *u, *w, *y, *y_old, *f, *K, *F, *z; /* constants, inputs, work; states as in eomgen_run; a state between */
     long calls;
     int awake[W];                                /* lanes whose evaluations count */
@@ -24,6 +24,7 @@ typedef struct {
 } lane_run;
 
 typedef struct {
+    const char *name;
     int rows_K, rows_F, error_order;
     void (*attempt)(lane_run *run, real h);
     real (*error)(const lane_run *run, real h);
@@ -35,7 +36,7 @@ typedef struct {
 typedef struct {
     long index, done, calls;
     int node, begins, again; /* begins: needs x' and a first step; again: the last step was rejected */
-    double h_abs, t_bound, t_new;
+    double h_abs, t_bound, t_new, h_last; /* h_last: as it was before the last step */
 } lane_task;
 
 static void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
@@ -43,7 +44,7 @@ static void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
     int codes[W];
     for (int i = 0; run->signals != NULL && i < run->n_u; i++) {
         for (int l = 0; run->signals[i].n > 0 && l < W; l++) {
-            run->u[i][l] = eomgen_interpolated(run->signals + i, t[l]);
+            run->u[i][l] = eomgen_table_value(run->signals + i, run->signals[i].order == 0 ? run->hold[l] : t[l]);
         }
     }
     run->calls++;
@@ -75,7 +76,7 @@ EOMGEN_EACH(root, sqrt)
 #define RUN lane_run
 #define EVALUATE evaluate_lanes
 #define METHOD(name, title, ...) \
-    static const lane_method lane_##name = { __VA_ARGS__, name##_attempt, name##_error, name##_prepare, name##_interpolate };
+    static const lane_method lane_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, name##_interpolate };
 #include "eomgen_methods.h"
 
 static double lane_norm(const lane_run *run, const real *x, const real *y, int l)
@@ -203,7 +204,8 @@ static void next_node(eomgen_ensemble *e, lane_run *run, lane_task *task, int l)
         return;
     }
     task->t_bound = e->nodes[task->node];
-    task->h_abs = fmin(e->first_step, fabs(e->nodes[task->node] - e->nodes[task->node - 1]));
+    task->h_abs = task->node == 1 ? e->first_step : fmax(task->h_last, task->h_abs);
+    run->hold[l] = run->t[l] + 0.5 * (task->t_bound - run->t[l]);
     task->begins = 1, task->again = 0;
 }
 
@@ -264,6 +266,7 @@ static real choose_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, do
         }
         const double t = run->t[l], least = 10.0 * fabs(nextafter(t, direction * INFINITY) - t);
         if (!task->again) {
+            task->h_last = task->h_abs;
             task->h_abs = task->h_abs > e->max_step ? e->max_step : task->h_abs < least ? least : task->h_abs;
         }
         const int lost = !(task->h_abs >= least), late = !task->again && e->steps[task->index] >= e->max_steps;
@@ -314,7 +317,24 @@ static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, rea
 
 static const lane_method *find_method(const char *name)
 {
-    return strcmp(name, "RK45") == 0 ? &lane_rk45 : strcmp(name, "RK23") == 0 ? &lane_rk23 : &lane_dop853;
+    static const lane_method *const methods[] = { &lane_dop853, &lane_rk45, &lane_rk23 };
+    for (int i = 0; i < 3; i++) {
+        if (strcmp(methods[i]->name, name) == 0) {
+            return methods[i];
+        }
+    }
+    return NULL;
+}
+
+static int takes(const eomgen_ensemble *e, const eomgen_thread *own)
+{
+    const eomgen_signal *const signals = own->signals;
+    for (int i = 0; signals != NULL && i < e->model->n_u; i++) {
+        if (signals[i].n > 0 && signals[i].tape != NULL) {
+            return 0; /* an expression is played for one state */
+        }
+    }
+    return own->events == NULL && find_method(e->method->name) != NULL;
 }
 
 static long lane_memory(const eomgen_ensemble *e)
@@ -324,8 +344,9 @@ static long lane_memory(const eomgen_ensemble *e)
     return e->model->n_const + W * (1 + e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n);
 }
 
-static void work_in_lanes(eomgen_ensemble *e, double *memory)
+static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
 {
+    double *memory = own->memory;
     const lane_method *const method = find_method(e->method->name);
     const int n = e->n;
     const double direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
@@ -336,7 +357,7 @@ static void work_in_lanes(eomgen_ensemble *e, double *memory)
     double *const constants = memory;
     memory += e->model->n_const;
     memory += (W - ((uintptr_t)memory / sizeof(double)) % W) % W; /* vectors lie at multiples of their size */
-    run.rhs = e->lane_rhs, run.signals = e->signals, run.n_u = e->model->n_u, run.n = n;
+    run.rhs = e->lane_rhs, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
     run.rtol = e->rtol, run.atol = e->atol;
     run.c = (real *)memory;
     run.u = run.c + e->model->n_const;
@@ -354,7 +375,7 @@ static void work_in_lanes(eomgen_ensemble *e, double *memory)
     for (long round = 0; busy; round++) {
         int begins = 0, moved[W];
         for (int l = 0; l < W; l++) {
-            if (round % EOMGEN_GLANCE == 0 && tasks[l].index >= 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
+            if (round % (EOMGEN_GLANCE / 8) == 0 && tasks[l].index >= 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
                 end_lane(e, &run, tasks + l, l, EOMGEN_NOT_RUN);
             }
             moved[l] = tasks[l].index >= 0 && tasks[l].begins && tasks[l].node == 1;

@@ -10,7 +10,7 @@
 #include "eomgen_lane_runs.h"
 
 EOMGEN_PIECE extern const eomgen_lane_worker eomgen_lane_worker2;
-const eomgen_lane_worker eomgen_lane_worker2 = { 2, lane_memory, work_in_lanes };
+const eomgen_lane_worker eomgen_lane_worker2 = { 2, lane_memory, takes, work_in_lanes };
 #else
 typedef int no_lanes_of_2;
 #endif

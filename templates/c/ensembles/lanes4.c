@@ -15,7 +15,7 @@
 #include "eomgen_lane_runs.h"
 
 EOMGEN_PIECE extern const eomgen_lane_worker eomgen_lane_worker4;
-const eomgen_lane_worker eomgen_lane_worker4 = { 4, lane_memory, work_in_lanes };
+const eomgen_lane_worker eomgen_lane_worker4 = { 4, lane_memory, takes, work_in_lanes };
 #if defined(__clang__)
 #pragma clang attribute pop
 #endif

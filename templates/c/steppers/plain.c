@@ -8,5 +8,5 @@
 #define larger_of(a, b) fmax(a, b)
 #define METHOD(name, title, ...) \
     const eomgen_method eomgen_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, \
-                                          name##_interpolate };
+                                          name##_interpolate, 0 };
 #include "eomgen_methods.h"
