@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
-from ..runtime.compiled import MESSAGES, RESET_FAILED, TERMINAL, TOO_SMALL, ZENO, stepper_options
+from ..runtime.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
 from ..runtime.events import WAIT, Events
 from ..runtime.late import eager
 from ..runtime.signals import Forcing
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 
 Integers = np.ndarray[Any, np.dtype[Any]]
 
-NOT_RUN, TOO_SMALL_STEP, TOO_MANY_STEPS, BAD_PARAMETERS, FAILED, LOST = 1, -100, -104, -110, -112, -113
+TOO_SMALL_STEP, TOO_MANY_STEPS, BAD_PARAMETERS, FAILED, LOST = -100, -104, -110, -112, -113
+EVENT = 1  #: SciPy's
 #: What a status means; 0 is the end of the span.
 MEANING = {
     0: "the end was reached",
-    TERMINAL: MESSAGES[TERMINAL],
-    NOT_RUN: "not run: the ensemble was interrupted",
+    EVENT: MESSAGES[TERMINAL],
+    STOPPED: "not run: the ensemble was interrupted",
     TOO_SMALL_STEP: TOO_SMALL,
     TOO_MANY_STEPS: "more than max_steps steps",
     BAD_PARAMETERS: "the constants that follow from the parameters cannot be computed",
@@ -146,8 +147,8 @@ def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Pl
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
     settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
     ensemble = core.ensemble(
-        plan.method, nodes, x0, rows["p"], rows["u"], max_steps=plan.max_steps, t_eval=plan.t_eval, signals=forcing.encode(),
-        events=find_events(module, plan).encode(), keep=plan.keep_events, **settings,
+        plan.method, nodes, x0, rows["p"], rows["u"], max_steps=plan.max_steps, t_eval=plan.t_eval,
+        signals=forcing.encode(), events=find_events(module, plan).encode(), keep=plan.keep_events, **settings,
     )  # fmt: skip
     work(ensemble, min(threads, max(len(x0), 1)), watch)
     samples, notes = (None if x is None else x.transpose(2, 1, 0) for x in (ensemble.samples, ensemble.notes))

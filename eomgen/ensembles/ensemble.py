@@ -9,9 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.compiled import TERMINAL
 from ..runtime.names import require, unknown
-from .block import MEANING, Plan, find_events
+from .block import EVENT, MEANING, Plan, find_events
 from .cases import Cases
 from .reductions import names_of, with_outputs
 
@@ -86,7 +85,7 @@ class Ensemble:
     @property
     def ok(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """(k,) which runs reached the end, or an event that ends them."""
-        return np.asarray((self.status == 0) | (self.status == TERMINAL))
+        return np.asarray((self.status == 0) | (self.status == EVENT))
 
     def failures(self) -> list[Failure]:
         """The runs that did not reach the end, with what stopped them."""
@@ -95,7 +94,7 @@ class Ensemble:
     def _describe(self, k: int) -> Failure:
         status, code = int(self.status[k]), int(self._failure[k])
         message = self._words.get(k) or MEANING.get(status, f"status {status}")
-        if status not in (1,) and code and k not in self._words:
+        if code and k not in self._words:
             from ..runtime.failure import WORDS
 
             reason = WORDS.get(code, (f"status {code}",))[0]

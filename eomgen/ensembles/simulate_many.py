@@ -78,9 +78,9 @@ def simulate_many(
     keep_events : int
         Keep so many events of each run, the first ones.
     reduce : {'states', 'statistics', 'events'} or callable, optional
-        What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count, mean, variance, least and
-        greatest of states and outputs over the runs; or what ``reduce(block)`` returns for each
-        :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
+        What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count,
+        mean, variance, least and greatest of states and outputs over the runs; or what ``reduce(block)`` returns for
+        each :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
     threads : int, optional
         Runs at a time; all processors by default.
     cluster : True, int, str or dask Client, optional
@@ -163,8 +163,8 @@ def _gather(
 
 
 def _plan(
-    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int, options: dict[str, Any],
-    watched: tuple[Any, int],
+    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int,
+    options: dict[str, Any], watched: tuple[Any, int],
 ) -> Plan:  # fmt: skip
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     start, end = find_span(span, float(declared["end"]))

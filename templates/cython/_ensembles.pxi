@@ -34,7 +34,6 @@ cdef extern from "eomgen_ensembles.h" nogil:
         double *failure_time
         long next, done
         int stop
-    enum: EOMGEN_NOT_RUN
     ctypedef struct eomgen_thread:
         const eomgen_signal *signals
         eomgen_events *events
@@ -87,7 +86,7 @@ cdef class Ensemble:
     noted : (k,) array
         How many events there were.
     status, failure, failure_time, steps, rejected, evaluations : (k,) arrays
-        0 where the end was reached; the status of the last evaluation that failed and its time.
+        0 where the end was reached, 1 at an event that ended the run; the status of the last evaluation that failed and its time.
     """
 
     cdef eomgen_ensemble all
@@ -120,7 +119,7 @@ cdef class Ensemble:
         all.rtol, all.atol, all.max_step, all.first_step = rtol, reading(atol), max_step, first_step
         all.max_steps, all.t_eval, all.n_eval = max_steps, reading(asked), len(asked)
         self.x, self.t = np.full((count, n), np.nan), np.full(count, nodes[0])
-        self.status = np.full(count, EOMGEN_NOT_RUN, dtype=np.intc)
+        self.status = np.full(count, -101, dtype=np.intc)  # stopped
         self.failure, self.failure_time = np.zeros(count, dtype=np.intc), np.zeros(count)
         self.steps, self.rejected, self.evaluations = (np.zeros(count, dtype=np.int_) for _ in range(3))
         self.samples = None if t_eval is None else np.full((count, len(asked), n), np.nan)

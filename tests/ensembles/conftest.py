@@ -14,8 +14,9 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @cache
-def compiled(name: str, target: str) -> Any:
-    return eg.load(EXAMPLES / f"{name}.yaml").compile(target=target)
+def compiled(name: str, target: str, lanes: int | None = None) -> Any:
+    options = {} if lanes is None else {"lanes": lanes}
+    return eg.load(EXAMPLES / f"{name}.yaml").compile(target=target, **options)
 
 
 @pytest.fixture

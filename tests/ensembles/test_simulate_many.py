@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,6 +14,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
+
+from .conftest import compiled
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -65,20 +66,12 @@ def test_results_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any, tmp_pat
     ]
     for name, value in statistics[0].items():
         np.testing.assert_array_equal(value, statistics[1][name])
-    # one state at a time, in a process without lanes
-    np.save(tmp_path / "x.npy", whole.x)
-    code = (
-        "import sys, numpy as np; sys.path.insert(0, sys.argv[2])\n"
-        "from ensembles.conftest import compiled; from ensembles.test_simulate_many import TIGHT, angles\n"
-        "mod = compiled('double_pendulum', 'cython'); assert mod.core.core.lane_width == 1\n"
-        "x = mod.simulate_many(2, angles(600), **TIGHT).x\n"
-        "assert (x == np.load(sys.argv[1])).all(), abs(x - np.load(sys.argv[1])).max()"
-    )
-    subprocess.run(
-        [sys.executable, "-c", code, tmp_path / "x.npy", Path(__file__).parents[1]],
-        env={**os.environ, "EOMGEN_LANES": "1"},
-        check=True,
-    )
+    for lanes in (0, 2):  # one state at a time, and two
+        module = compiled("double_pendulum", "cython", lanes)
+        assert module.core.core.lane_width == max(lanes, 1)
+        np.testing.assert_array_equal(
+            module.simulate_many(2, angles(600), t_eval=times, **TIGHT).samples, whole.samples
+        )
 
 
 def test_statistics_are_those_of_numpy(pendulum: Any) -> None:
@@ -149,6 +142,67 @@ def test_tables_as_inputs(crank: Any) -> None:
     each = crank.simulate_many(1, {"theta": 0.3, "theta_dot": 5.0}, inputs={"tau": [0.0, 1.0]}, **TIGHT)
     run = crank.simulate(1, {"theta": 0.3, "theta_dot": 5.0}, inputs={"tau": 1.0}, **TIGHT)
     np.testing.assert_allclose(each.x[:, 1], run.x[:, -1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("interpolation", ["zero-order", "linear", "cubic"])
+def test_every_run_sees_the_same_signal(pendulum: Any, interpolation: str) -> None:
+    m = eg.Model("pushed")
+    push = m.input("push")
+    m.prismatic("s", m.ground, m.body("a", mass=2.0), axis="x")
+    m.torque("drive", "s", push)
+    module = m.compile()
+    times, values = np.array([0.0, 0.4, 1.0, 1.3, 2.0]), np.array([1.0, -2.0, 3.0, 0.5, 0.0])
+    signal = eg.Signal(times, values, interpolation)
+    starts = np.linspace(-1, 1, 9)
+    ensemble = module.simulate_many(2, {"s_dot": starts}, inputs={"push": signal}, t_eval=[0.5, 2.0], **TIGHT)
+    for j, start in enumerate(starts):
+        run = module.simulate(2, {"s_dot": start}, inputs={"push": signal}, t_eval=[0.5, 2.0], **TIGHT)
+        np.testing.assert_array_equal(ensemble.samples[:, :, j], run.x)
+    if interpolation == "zero-order":  # impulse of the steps
+        impulse = 1.0 * 0.4 - 2.0 * 0.6 + 3.0 * 0.3 + 0.5 * 0.7
+        np.testing.assert_allclose(ensemble["s_dot"][-1] - starts, impulse / 2.0, rtol=0, atol=1e-12)
+    texts = module.simulate_many(2, {"s_dot": starts}, inputs={"push": "3*sin(2*t)"}, **TIGHT)
+    np.testing.assert_allclose(texts["s_dot"] - starts, 1.5 * (1 - np.cos(4.0)) / 2.0, rtol=0, atol=1e-9)
+
+
+def test_events_of_every_run(pendulum: Any) -> None:
+    starts = {"theta1": np.linspace(0.2, 1.2, 7), "bend": 0.1}
+    watched = {"low": "theta1", "fast": {"expression": "theta1_dot - 2", "terminal": 2, "direction": 1}}
+    ensemble = pendulum.simulate_many(4, starts, events=watched, keep_events=40, **TIGHT)
+    t, x = ensemble.events("low")
+    assert ensemble.event_names == ("low", "fast")
+    for j in range(7):
+        run = pendulum.simulate(4, {"theta1": starts["theta1"][j], "bend": 0.1}, events=watched, **TIGHT)
+        k = len(run.t_events["low"])
+        np.testing.assert_array_equal(t[:k, j], run.t_events["low"])
+        np.testing.assert_array_equal(x[:, :k, j], run.x_events["low"])
+        assert np.isnan(t[k:, j]).all()
+        assert ensemble.event_counts[j] == k + len(run.t_events["fast"])
+        assert ensemble.t_end[j] == run.t[-1]
+        assert ensemble.status[j] == run.status
+    assert 1 in ensemble.status
+    assert ensemble.ok.all()
+    alone = pendulum.simulate_many(4, starts, events=watched, keep_events=2, reduce="events", **TIGHT)
+    np.testing.assert_array_equal(alone.event_counts, ensemble.event_counts)
+    assert alone.x is None
+    with pytest.raises(eg.UsageError, match="event falls of simulate_many is a function"):
+        pendulum.simulate_many(4, starts, events={"falls": lambda t, x: x[0]})
+
+
+def test_resets_of_the_model() -> None:
+    m = eg.Model("bouncing", gravity=(0, -10.0, 0))
+    m.parameter("e", 0.5)
+    m.prismatic("y", m.ground, m.body("ball", mass=1.0), axis="y")
+    m.event("floor", "y", direction=-1, reset={"y_dot": "-e*y_dot"})
+    module = m.compile()
+    e = np.array([0.3, 0.5, 0.9])
+    ensemble = module.simulate_many(1.2, {"y": 5.0 / 4.0}, {"e": e}, **TIGHT)
+    first = 0.5  # sqrt(2 h / g), with speed 5 m/s
+    second = first + 2 * e * 5.0 / 10.0
+    t, _ = ensemble.events("floor")
+    np.testing.assert_allclose(t[0], first, rtol=1e-9)
+    np.testing.assert_allclose(t[1, :2], second[:2], rtol=1e-9)
+    np.testing.assert_allclose(ensemble["y_dot"][2], 0.9 * 5.0 - 10.0 * 0.7, rtol=1e-8)
 
 
 def test_without_compiled_code(pendulum: Any, pendulum_in_numpy: Any) -> None:

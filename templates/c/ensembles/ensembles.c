@@ -111,7 +111,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
     }
     memcpy(e->x + k * e->n, run->y, size);
     e->t[k] = run->t;
-    e->status[k] = status == EOMGEN_END ? 0 : status == EOMGEN_STOPPED ? EOMGEN_NOT_RUN : status;
+    e->status[k] = status == EOMGEN_END ? 0 : status == EOMGEN_TERMINAL ? 1 : status;
     e->steps[k] = run->steps, e->rejected[k] = run->rejected, e->evaluations[k] = run->evaluations;
     e->failure[k] = run->failure, e->failure_time[k] = run->failure_time;
 }

@@ -4,11 +4,8 @@
 
 #include "eomgen_loop.h"
 
-/* How a trajectory ended besides the codes of eomgen_loop.h; 0 at the end of its span. */
-enum {
-    EOMGEN_NOT_RUN = 1,
-    EOMGEN_BAD_PARAMETERS = -110
-};
+/* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_travel or this. */
+enum { EOMGEN_BAD_PARAMETERS = -110 };
 
 enum { EOMGEN_GLANCE = 500 }; /* evaluations between looks at `stop` */
 
@@ -42,7 +39,7 @@ typedef struct {
     int *failure;                 /* status of the last evaluation that failed, 0 if none did */
     double *failure_time;
     long next, done;              /* queue; shared between threads */
-    int stop;                     /* set by anyone: no further trajectory is begun, those under way end as not run */
+    int stop;                     /* set by anyone: no further trajectory is begun, those under way end as stopped */
 } eomgen_ensemble;
 
 /* What every thread has of its own. */

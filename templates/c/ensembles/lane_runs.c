@@ -376,7 +376,7 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
         int begins = 0, moved[W];
         for (int l = 0; l < W; l++) {
             if (round % (EOMGEN_GLANCE / 8) == 0 && tasks[l].index >= 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
-                end_lane(e, &run, tasks + l, l, EOMGEN_NOT_RUN);
+                end_lane(e, &run, tasks + l, l, EOMGEN_STOPPED);
             }
             moved[l] = tasks[l].index >= 0 && tasks[l].begins && tasks[l].node == 1;
             begins = begins || (tasks[l].index >= 0 && tasks[l].begins);
