@@ -13,7 +13,7 @@ from rich.console import Console
 from .measure import calibrate, describe_machine
 from .report import Report, show, write
 
-BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "loops", "lanes")
+BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "loops", "lanes", "ensembles")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

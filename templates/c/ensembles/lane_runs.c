@@ -288,14 +288,14 @@ static real choose_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, do
 }
 
 /* Judge the steps tried: which lanes have moved, and the size of each one's next. */
-static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, real error, double exponent, int *moved)
+static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, real error, int order, int *moved)
 {
     flag accepted = { 0 };
     for (int l = 0; l < W; l++) {
         lane_task *const task = tasks + l;
         moved[l] = run->awake[l] && error[l] < 1.0;
         if (moved[l]) {
-            double factor = error[l] == 0.0 ? 10.0 : fmin(10.0, 0.9 * pow(error[l], exponent));
+            double factor = error[l] == 0.0 ? 10.0 : fmin(10.0, 0.9 * eomgen_stretch(error[l], order));
             factor = task->again && factor > 1.0 ? 1.0 : factor;
             task->h_abs *= factor;
             task->again = 0;
@@ -303,7 +303,7 @@ static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, rea
             accepted[l] = -1;
             e->steps[task->index]++;
         } else if (run->awake[l]) {
-            const double factor = 0.9 * pow(error[l], exponent);
+            const double factor = 0.9 * eomgen_stretch(error[l], order);
             task->h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
             task->again = 1;
             e->rejected[task->index]++;
@@ -350,7 +350,6 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
     const lane_method *const method = find_method(e->method->name);
     const int n = e->n;
     const double direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
-    const double exponent = -1.0 / (method->error_order + 1);
     lane_run run;
     lane_task tasks[W];
     memset(&run, 0, sizeof run);
@@ -394,7 +393,7 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
         for (int l = 0; l < W; l++) {
             tasks[l].calls += run.awake[l] ? run.calls - before : 0;
         }
-        judge_steps(e, &run, tasks, method->error(&run, run.step), exponent, moved);
+        judge_steps(e, &run, tasks, method->error(&run, run.step), method->error_order, moved);
         if (e->n_eval > 0) {
             sample_lanes(e, method, &run, tasks, moved, direction);
         }

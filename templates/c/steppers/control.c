@@ -79,7 +79,6 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
     const int n = run->n;
-    const double exponent = -1.0 / (method->error_order + 1);
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
     double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs < least ? least : run->h_abs;
     int rejected = 0;
@@ -104,7 +103,7 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
         method->attempt(run, h);
         const double error = n > 0 ? method->error(run, h) : 0.0;
         if (error < 1.0 && !run->stopped) {
-            double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * pow(error, exponent));
+            double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * eomgen_stretch(error, method->error_order));
             factor = rejected && factor > 1.0 ? 1.0 : factor;
             run->h_abs = h_abs * factor;
             run->t_old = run->t, run->t = t_new, run->step = h;
@@ -112,7 +111,7 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
             run->steps++;
             return 0;
         }
-        const double factor = 0.9 * pow(error, exponent);
+        const double factor = 0.9 * eomgen_stretch(error, method->error_order);
         h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
         rejected = 1;
         run->rejected++;

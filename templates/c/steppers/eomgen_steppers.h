@@ -3,6 +3,8 @@
 #ifndef EOMGEN_STEPPERS_H
 #define EOMGEN_STEPPERS_H
 
+#include <math.h>
+
 #include "eomgen.h"
 
 /* Expressions given at run time: instructions in order, each with a result of its own; see tape.c for the operations. */
@@ -73,6 +75,12 @@ enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEP
 
 /* The value of a table at time t. */
 double eomgen_table_value(const eomgen_signal *s, double t);
+
+/* error to the power of -1 / (order + 1): what the next step is to be multiplied with, but for safety. */
+static inline double eomgen_stretch(double error, int order)
+{
+    return order == 7 ? 1.0 / sqrt(sqrt(sqrt(error))) : pow(error, -1.0 / (order + 1));
+}
 
 /* The inputs at (t, y) into run->u, and the values of a tape into out. */
 void eomgen_force(eomgen_run *run, double t, const double *y);
