@@ -291,11 +291,15 @@ static real choose_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, do
 static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, real error, int order, int *moved)
 {
     flag accepted = { 0 };
+    real stretch = 1.0 / root(root(root(error))); /* as eomgen_stretch has it for order 7 */
+    for (int l = 0; order != 7 && l < W; l++) {
+        stretch[l] = eomgen_stretch(error[l], order);
+    }
     for (int l = 0; l < W; l++) {
         lane_task *const task = tasks + l;
         moved[l] = run->awake[l] && error[l] < 1.0;
         if (moved[l]) {
-            double factor = error[l] == 0.0 ? 10.0 : fmin(10.0, 0.9 * eomgen_stretch(error[l], order));
+            double factor = error[l] == 0.0 ? 10.0 : fmin(10.0, 0.9 * stretch[l]);
             factor = task->again && factor > 1.0 ? 1.0 : factor;
             task->h_abs *= factor;
             task->again = 0;
@@ -303,7 +307,7 @@ static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, rea
             accepted[l] = -1;
             e->steps[task->index]++;
         } else if (run->awake[l]) {
-            const double factor = 0.9 * eomgen_stretch(error[l], order);
+            const double factor = 0.9 * stretch[l];
             task->h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
             task->again = 1;
             e->rejected[task->index]++;
