@@ -119,7 +119,7 @@ def contest(robot: Robot, folder: Path, quick: bool) -> dict[str, Any]:
 
 def _casadi(model: Any) -> list[Any]:
     try:
-        from .casadi_robots import write_robot
+        from .casadi_recursions import write_robot
     except ImportError:
         return []
     return write_robot(model)

@@ -185,8 +185,7 @@ def test_the_table_in_the_documents_is_what_is_counted() -> None:
     for title, counted in bicycle().items():
         assert f"| bicycle, {title} | {counted[0]:,} | {counted[1]:,} |" in text
     for robot in ROBOTS:
-        counted = [build(robot, symbolic=symbolic)[1].counts for symbolic in (False, True)]
-        numeric, symbolic = counted
+        numeric, symbolic = (build(robot, symbolic=symbols)[1].counts for symbols in (False, True))
         ours = f"{numeric['rhs'].total:,} | {symbolic['rhs'].total:,} | {symbolic['precompute'].total:,}"
-        assert f"| {robot.name} | {ours} |" in text
+        assert f"| {robot.name} (URDF) | {ours} |" in text
     assert rows["humanoid"] == f"{humanoid().derive('embedding').operations['mass_matrix and bias'].total:,}"
