@@ -13,7 +13,10 @@ from rich.console import Console
 from .measure import calibrate, describe_machine
 from .report import Report, show, write
 
-BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "loops", "lanes", "ensembles")
+BENCHMARKS = (
+    "derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "integrate", "stiff", "loops", "rhs",
+    "lanes", "ensembles",
+)  # fmt: skip
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from ..errors import UsageError
 from .compiler import CompilerInfo
 
-#: gcc: -O1. Measured with gcc 12 on one call of the right-hand side, against -O2, which vectorises straight-line code to
-#: its harm: Panda, UR5, Talos, ANYmal take 0.97, 0.96, 0.96, 0.90 of the time, linkages with loops 0.97 to 1, and the
-#: compiler 0.6 of its time; -O3 is no faster than -O2 (``python -m benchmarks.run rhs``).
+#: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code
+#: to its harm: Panda, UR5, Talos, ANYmal take 0.97, 0.96, 0.96, 0.91 of the time, linkages with loops 0.97 to 1, and
+#: the compiler 0.6 of its time; -O3 is no faster than -O2 (``python -m benchmarks.run rhs``).
 GCC_LEVEL = 1
 #: Other compilers: -O2, and -O1 for models whose files are longer than this (bytes) together.
 LARGE_SOURCE = 800_000
