@@ -8,6 +8,7 @@ from __future__ import annotations
 from itertools import product
 
 from ..joints import JOINTS
+from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
 from .field import CONSTANT as CONSTANT
 from .field import MOTION as MOTION
@@ -19,7 +20,6 @@ from .force_fields import FORCE as FORCE
 from .force_fields import ONE_OF as ONE_OF
 from .force_fields import force_fields as force_fields
 from .mechanism import Simulation
-from ..numeric.splines import KINDS as TABLES
 
 #: kind -> how a message describes it
 KINDS = {
@@ -90,8 +90,10 @@ OUTPUT_FIELDS: Fields = {
 }
 EVENT: Fields = {
     "expression": Field(
-        "expression", "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity "
-        "of markers", required=True, level=OUTPUT
+        "expression",
+        "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity of markers",
+        required=True,
+        level=OUTPUT,
     ),
     "terminal": Field("times", "whether the run ends there, or at which time it happens", default=False),
     "direction": Field("sign", "1: only where it rises, -1: where it falls, 0: both", default=0),

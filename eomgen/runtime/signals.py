@@ -85,13 +85,13 @@ class Signal:
         return result
 
     def kinks(self) -> Array:
-        """Times where the value or its slope jumps."""
+        """Times where the value or a derivative jumps."""
         if not self.corners:
             return np.empty(0)
-        if self.order == 3:  # constant outside
-            return self.times[[0, -1]] if len(self.times) > 1 else np.empty(0)
+        if self.order == 3:  # its third derivative jumps
+            return np.asarray(self.times if len(self.times) > 1 else np.empty(0))
         if self.order == 0:
-            return self.times[1:][np.diff(self.values) != 0.0]
+            return np.asarray(self.times[1:][np.diff(self.values) != 0.0])
         rates = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
         size = np.abs(rates).max()
         return np.asarray(self.times[np.abs(np.diff(rates)) > 1e-9 * size])

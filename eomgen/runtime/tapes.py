@@ -1,7 +1,7 @@
 """Stage runtime: an expression as text -> a tape that compiled loops play, and a function of (t, x) for all others.
 
-The text is read by the same parser as those of model files; nothing is ever executed.  A generated package, which has no
-parser, refuses texts.
+The text is read by the same parser as those of model files; nothing is ever executed.  A generated package has no
+parser and refuses texts.
 """
 
 from __future__ import annotations
