@@ -77,9 +77,7 @@ class HandWritten:
         self.loop.soda_prepare(*self.given)
         address = ctypes.cast(self.loop.soda_rhs, ctypes.c_void_p).value
         times, data = np.array([0.0, END]), np.zeros(1)
-        return lambda: np.asarray(
-            dop853(address, self.x0, times, data=data, rtol=RTOL, atol=ATOL, mxstep=10**7)[0][-1]
-        )
+        return lambda: np.asarray(dop853(address, self.x0, times, data=data, rtol=RTOL, atol=ATOL, mxstep=10**7)[0][-1])
 
 
 def drivers(module: Any, x0: np.ndarray, hand: HandWritten) -> dict[str, State]:
@@ -97,9 +95,7 @@ def drivers(module: Any, x0: np.ndarray, hand: HandWritten) -> dict[str, State]:
         "solve_ivp, our DOP853": partial(plain, module.DOP853),
         "solve_ivp, our DOP853, 1,001 points": partial(plain, module.DOP853, times),
         "solve_ivp, SciPy's DOP853": partial(plain, "DOP853"),
-        "odeint": lambda: np.asarray(
-            odeint(rhs, x0, [0.0, END], rtol=RTOL, atol=ATOL, mxstep=10**6, tfirst=True)[-1]
-        ),
+        "odeint": lambda: np.asarray(odeint(rhs, x0, [0.0, END], rtol=RTOL, atol=ATOL, mxstep=10**6, tfirst=True)[-1]),
     }
     soda = hand.numbalsoda()
     return found if soda is None else found | {"numbalsoda DOP853": soda}
@@ -164,7 +160,14 @@ def run(quick: bool) -> Report:
             for name, sample in samples.items():
                 over = (sample.best - base) / steps * 1e6
                 difference = float(np.abs(finals[name] - finals["hand-written C loop"]).max())
-                row = [f"{n} links, {name}", sample.median * 1e3, sample.best * 1e3, sample.best / base, over, difference]
+                row = [
+                    f"{n} links, {name}",
+                    sample.median * 1e3,
+                    sample.best * 1e3,
+                    sample.best / base,
+                    over,
+                    difference,
+                ]
                 tables.append(row)
             details[f"{n} links"] = {name: sample.as_dict() for name, sample in samples.items()} | {"steps": steps}
             limits += judge(n, samples, steps)
@@ -177,14 +180,20 @@ def run(quick: bool) -> Report:
     columns = ("driver", "median ms", "best ms", "over hand-written", "us a step above it", "difference at the end")
     both = [Table(f"10 s at rtol {RTOL:g}, atol {ATOL:g}", columns, tables)]
     if races:
-        columns = ("at equal error", "ours ms", "heyoka ms", "ratio", "our error", "heyoka's error", "heyoka compiles s")
+        columns = (
+            "at equal error",
+            "ours ms",
+            "heyoka ms",
+            "ratio",
+            "our error",
+            "heyoka's error",
+            "heyoka compiles s",
+        )
         both.append(Table("heyoka's Taylor method over the same right-hand side", columns, races))
     notes = (
-        "The hand-written loop calls the same compiled right-hand side and stores nothing but the last state; ratios are of "
-        "best times, taken in turns.",
+        "The hand-written loop calls the same compiled right-hand side and stores one state; ratios are of best times.",
         "simulate stores every step, projects the states and puts a trajectory together.",
-        "At equal error both take the loosest tolerance on a grid that reaches it; the reference is "
-        "heyoka's in long doubles.",
+        "At equal error both take the loosest tolerance that reaches it; the reference is heyoka's in long doubles.",
     )
     return Report(tuple(both), tuple(limits), notes, details)
 
@@ -198,5 +207,7 @@ def judge(n: int, samples: dict[str, Sample], steps: int) -> list[Limit]:
         Limit(f"{n} links: simulate over a hand-written C loop", best["simulate"] / base, 1.15),
         Limit(f"{n} links: {name}, above the loop", over[name], 4.0, "us a step"),
         Limit(f"{n} links: {name}, 1,001 points, above the loop", over[f"{name}, 1,001 points"], 10.0, "us a step"),
-        Limit(f"{n} links: SciPy's DOP853 over ours", best["solve_ivp, SciPy's DOP853"] / best[name], 12.0, at_least=True),
+        Limit(
+            f"{n} links: SciPy's DOP853 over ours", best["solve_ivp, SciPy's DOP853"] / best[name], 12.0, at_least=True
+        ),
     ]

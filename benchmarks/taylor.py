@@ -76,6 +76,8 @@ def reference(equations: list[tuple[Any, Any]], x0: np.ndarray, end: float) -> n
     import heyoka as hk
 
     start = [np.longdouble(x) for x in x0]
-    integrator = hk.taylor_adaptive(equations, start, tol=np.longdouble(1e-19), fp_type=np.longdouble)
+    integrator = hk.taylor_adaptive(
+        equations, start, tol=np.longdouble(1e-19), fp_type=np.longdouble, compact_mode=True
+    )
     integrator.propagate_until(np.longdouble(end))
     return np.array(integrator.state, dtype=float)

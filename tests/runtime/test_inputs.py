@@ -117,6 +117,33 @@ def test_every_operation_means_the_same_on_a_tape(cart: Any) -> None:
     np.testing.assert_allclose(np.diff(rates["s_dot"])[smooth], simpson[smooth], rtol=1e-3)
 
 
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_signals_that_the_model_declares(target: str, tmp_path: Path) -> None:
+    m = eg.Model("cart")
+    body = m.body("cart", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.parameter("k", 4.0)
+    m.torque("push", "J", m.input("u", signal="where(t > 100, sqrt(t), -k*s)"))
+    m.initial(s=1.0)
+    file = tmp_path / "cart.yaml"
+    file.write_text(m.to_yaml(), encoding="utf-8")
+    mod = eg.load(file).compile(target=target)
+    method = "DOP853" if target == "cython" else "RK45"
+    run = mod.simulate((0, 3), method=method, **TIGHT)
+    np.testing.assert_allclose(run["s"], np.cos(2 * run.t), atol=1e-8)
+    np.testing.assert_allclose(run["u"], -4.0 * run["s"])
+    stiffer = mod.simulate((0, 3), None, {"k": 9.0}, method="Radau", rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(stiffer["s"], np.cos(3 * stiffer.t), atol=1e-5)
+    free = mod.simulate((0, 3), inputs={"u": 0.0}, method=method)
+    np.testing.assert_allclose(free["s"], 1.0)
+    other = eg.Model("cart")
+    other.prismatic("J", other.ground, other.body("cart", mass=1.0), axis="x", coordinate="s")
+    other.input("w")
+    other.input("u", signal="w + s_ddot")
+    with pytest.raises(eg.ModelError, match="the acceleration 's_ddot' cannot(.|\n)*the input 'w' cannot stand here"):
+        other.compile()
+
+
 @pytest.mark.parametrize(
     ("value", "words"),
     [
