@@ -80,7 +80,14 @@ PARAMETER: Fields = {
     "unit": _UNIT,
     "doc": _DOC,
 }
-INPUT: Fields = {"value": Field("number", "value while none is given", default=0.0), "unit": _UNIT, "doc": _DOC}
+INPUT: Fields = {
+    "value": Field("number", "value while none is given", default=0.0),
+    "signal": Field(
+        "expression", "value over time of runs that give none; t, coordinates, velocities, parameters", level=MOTION
+    ),
+    "unit": _UNIT,
+    "doc": _DOC,
+}
 OUTPUT_FIELDS: Fields = {
     "expression": Field(
         "expression", "t, parameters, inputs, coordinates, their rates, motion of markers", required=True, level=OUTPUT
