@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -109,7 +110,7 @@ def run(
             **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
-    from .energy import balance_energy
+    from .energy import balance_energy, uncounted_functions
 
     values = dict(zip(module.u_names, module.u.tolist(), strict=True)) | inputs
     with after_integration():
@@ -121,7 +122,7 @@ def run(
         return
     click.echo(str(equations.report))
     print_operations(equations)
-    print_trajectory(trajectory, energy)
+    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy.work is None else [])
     for file in files:
         click.echo(f"wrote {file}")
 
@@ -195,8 +196,11 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance)
     }
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
-    """Statistics of a run, its residuals, its energy and its final values."""
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance, uncounted: Sequence[str] = ()) -> None:
+    """Statistics of a run, its residuals, its energy and its final values.
+
+    ``uncounted`` are functions whose work is not known.
+    """
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
     if header["rtol"] is None:
@@ -221,6 +225,9 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance) -> None:
     if energy.work:
         rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
         rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))
+    if uncounted:
+        names = ", ".join(uncounted)
+        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
     print_rows(rows)
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
     print_rows(
