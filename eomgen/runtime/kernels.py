@@ -36,7 +36,7 @@ class Kernels:
         self.core = core
         self.layout = layout
         self.context = core.context(p, u, UsageError)
-        self.fail = Fail(layout, self._culprit)
+        self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
@@ -71,6 +71,9 @@ class Kernels:
         if name not in self.core.names:
             return Missing(name, f"model {self.layout.name!r} was generated without the kernel {name!r}")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
+
+    def _poses(self, q: Array, t: float) -> Array:
+        return self.state("poses", nan=True)(q, t=t)
 
     def _culprit(self, status: int, t: float, x: Array) -> str:
         """Names what a failure at a state is due to, as far as it can be told."""

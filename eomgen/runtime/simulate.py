@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
-from .failure import rotation_trouble
 from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
@@ -242,7 +241,7 @@ class _Run:
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
         cause = self.cause()
-        trouble = None if x is None else rotation_trouble(self.module.layout, x)
+        trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
         if trouble is not None:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
         if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):

@@ -107,7 +107,8 @@ def test_a_run_with_c_code_that_has_no_python_twin_tells_that_its_power_balance_
     (tmp_path / "drag.c").write_text("double drag(double w) { return -0.5*w; }\n", encoding="utf-8")
     model = tmp_path / "model.yaml"
     model.write_text(
-        "name: dragged\nfunctions:\n  drag: {type: native, source: drag.c}\nbodies:\n  bob: {mass: 1, com: [0, -1, 0]}\n"
+        "name: dragged\nfunctions:\n  drag: {type: native, source: drag.c}\n"
+        "bodies:\n  bob: {mass: 1, com: [0, -1, 0]}\n"
         "joints:\n  q: {type: revolute, between: [ground, bob]}\n"
         "forces:\n  law: {type: torque, joint: q, value: drag(q_dot)}\n",
         encoding="utf-8",

@@ -1,0 +1,62 @@
+"""Models that no motion can mend: told at the check, by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import AssemblyError, EvaluationError, ModelError
+
+
+def disc(joint: str, **keys: str) -> eg.Model:
+    m = eg.Model("disc", gravity=(0, 0, -9.81))
+    d = m.body("d", mass=1, inertia=(0.25, 0.25, 0.5))
+    getattr(m, joint)("f", m.ground, d, **keys)
+    m.rolling("r", d, radius=1)
+    return m
+
+
+def test_a_disc_that_lies_flat_at_the_start_is_told_with_the_remedy() -> None:
+    with pytest.raises(AssemblyError, match=r"constraints\.r: .*not finite.*the disc lies flat.*tilt it in initial"):
+        disc("free").check()
+
+
+def test_a_disc_that_can_only_lie_flat_is_refused() -> None:
+    with pytest.raises(ModelError, match=r"constraints\.r: d always lies flat"):
+        disc("revolute").check()
+
+
+def test_a_disc_that_has_fallen_flat_is_named() -> None:
+    m = disc("free", rotation="euler_parameters")
+    m.initial(f_e0=0.8, f_e1=0.6)
+    module = m.compile(target="numpy")
+    x = np.zeros(module.n_x)
+    x[module.x_names.index("f_e0")] = 1.0
+    with pytest.raises(EvaluationError, match=r"constraint 'r': the disc lies flat"):
+        module.rhs(0.0, x)
+
+
+@pytest.mark.parametrize("kind", ["spring", "damper"])
+def test_a_line_between_points_that_always_coincide_is_refused(kind: str) -> None:
+    m = eg.Model("coincident")
+    a = m.body("a", mass=1, com=(0, -1, 0))
+    m.revolute("A", m.ground, a)
+    law = {"stiffness": 1, "length": 0.2} if kind == "spring" else {"damping": 1}
+    getattr(m, kind)("Z", m.ground, a, **law)
+    getattr(m, kind)("Y", a, a, **law)
+    with pytest.raises(ModelError) as caught:
+        m.check()
+    assert [p.path for p in caught.value.problems] == ["forces.Z", "forces.Y"]
+    assert all(p.message == "both ends are always at the same point" for p in caught.value.problems)
+
+
+def test_a_fixed_end_inside_its_cylinder_is_refused() -> None:
+    m = eg.Model("wrapped")
+    m.parameter("r", 0.3)
+    a = m.body("a", mass=1, com=(0, -1, 0))
+    m.revolute("A", m.ground, a)
+    via = [{"around": m.ground, "radius": "r"}]
+    m.spring("Z", m.ground.at(0.2, 0, 0), a.at(0, -1, 0), via=via, stiffness=1, length=0.1)
+    with pytest.raises(ModelError, match=r"forces\.Z\.via\[0\]: ground\.at\(0\.2, 0, 0\) lies inside the cylinder"):
+        m.check()
