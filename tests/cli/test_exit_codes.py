@@ -107,3 +107,13 @@ def test_an_integration_that_fails(call: Call, model_file: Callable[[str], Path]
     text = PENDULUM + "forces:\n  push: {type: torque, joint: pivot, value: 1/(1 - t)**3}\n"
     result = call("run", model_file(text))
     expect(result, 4, "model.yaml")
+
+
+def test_a_locked_joint_without_a_number_is_blamed_on_lock(call: Call, model_file: Callable[[str], Path]) -> None:
+    result = call("check", model_file("name: x\n"), "--lock", "left=abc")
+    assert result.code == 2
+    assert "--lock left=abc" in result.err
+    for words in (("--rotation", "foo"), ("--mimic", "foo"), ("--friction", "-1")):
+        result = call("check", model_file("name: x\n"), *words)
+        assert result.code == 2
+        assert f"'{words[0]}'" in result.err
