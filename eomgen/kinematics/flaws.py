@@ -82,8 +82,7 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     if not functions.m:
         return
     C, J = functions.position(q)
-    finite = np.isfinite(J).all(axis=1)
-    finite[: len(C)] &= np.isfinite(C)
+    finite = np.isfinite(np.column_stack([J, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
     if finite.all():
         return
     k = functions.kinematics

@@ -35,7 +35,10 @@ class Kernels:
     def __init__(self, core: Core, layout: Layout, p: Array | None = None, u: Array | None = None) -> None:
         self.core = core
         self.layout = layout
-        self.context = core.context(p, u, UsageError)
+        try:
+            self.context = core.context(p, u, UsageError)
+        except UsageError as error:
+            raise UsageError(layout.explain_constants(str(error), p)) from None
         self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)

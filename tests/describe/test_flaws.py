@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.errors import AssemblyError, EvaluationError, ModelError
+from eomgen.errors import AssemblyError, EvaluationError, ModelError, UsageError
 
 
 def disc(joint: str, **keys: str) -> eg.Model:
@@ -60,3 +60,31 @@ def test_a_fixed_end_inside_its_cylinder_is_refused() -> None:
     m.spring("Z", m.ground.at(0.2, 0, 0), a.at(0, -1, 0), via=via, stiffness=1, length=0.1)
     with pytest.raises(ModelError, match=r"forces\.Z\.via\[0\]: ground\.at\(0\.2, 0, 0\) lies inside the cylinder"):
         m.check()
+
+
+def test_sizes_that_cannot_be_are_refused() -> None:
+    m = eg.Model("sizes")
+    a, b, c = (m.body(name, mass=1, inertia=(1, 1, 1)) for name in "abc")
+    for name, body in zip("ABC", (a, b, c), strict=True):
+        m.revolute(name, m.ground, body)
+    m.planetary("P", sun="A", ring="B", carrier="C", radii={"sun": 2, "ring": 1})
+    m.distance("D", a.at(1, 0, 0), b.at(0, 3, 0), length=-1)
+    with pytest.raises(ModelError) as caught:
+        m.check()
+    told = str(caught.value)
+    assert "joints.D.length: is -1; give a length greater than 0" in told
+    assert "ring 1 is not larger than sun 2" in told
+
+
+def test_calls_with_the_wrong_shape_of_values_are_told() -> None:
+    m = eg.Model("calls")
+    length = m.parameter("l", 1.0)
+    m.revolute("q", m.ground, m.body("a", mass=1, com=(0, -1, 0)))
+    m.torque("law", "q", 1 / length)
+    with pytest.raises(UsageError, match="by name"):
+        m.initial(5)
+    module = m.compile(target="numpy")
+    with pytest.raises(UsageError, match=r"by name, as in x0\(q=0\.3\)"):
+        module.x0(1)
+    with pytest.raises(UsageError, match=r"not finite with l = 0 \(changed"):
+        module.bind(p={"l": 0.0})
