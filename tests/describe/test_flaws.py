@@ -88,3 +88,13 @@ def test_calls_with_the_wrong_shape_of_values_are_told() -> None:
         module.x0(1)
     with pytest.raises(UsageError, match=r"not finite with l = 0 \(changed"):
         module.bind(p={"l": 0.0})
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_mapping_of_parameters_in_a_call_is_told_of_bind(target: str) -> None:
+    m = eg.Model("calls")
+    m.parameter("l", 1.0)
+    m.revolute("q", m.ground, m.body("a", mass=1, com=(0, "-l", 0)))
+    module = m.compile(target=target)
+    with pytest.raises(UsageError, match=r"array in the order of p_names; by name: bind\(p=\{\.\.\.\}\)"):
+        module.rhs(0, [0.0, 0.0], p={"l": 1})
