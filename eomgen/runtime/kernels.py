@@ -84,7 +84,11 @@ class Kernels:
         if status == 1 and layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
             finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
             bad = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
-            return f"the loads of {bad} are not (ends that meet, or a law outside its domain)" if bad else ""
+            return (
+                f"the loads of {bad} are not (ends that meet or lie inside the cylinder, or a law outside its domain)"
+                if bad
+                else ""
+            )
         if status == 2:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():
