@@ -30,7 +30,7 @@ class Equations:
     Attributes
     ----------
     method : str
-        How they were derived: ``embedding``, ``lagrange`` or ``recursive``.
+        How they were derived, one of ``eomgen.equations.METHODS``.
     choice : Choice or None
         What ``auto`` compared, of a tree.
     report : MechanismReport
@@ -41,7 +41,10 @@ class Equations:
         ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being
         the accelerations of ``independent``.  Large ones are written with ``intermediates``.
     operations : dict of str to Operations
-        Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree.
+        Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree, and of the entries of
+        the linear system where the method solves one.
+    system_size : tuple of int or None
+        Unknowns and entries of that linear system.
     """
 
     kinematics: Kinematics = field(repr=False)
@@ -90,10 +93,18 @@ class Equations:
             "inverse_dynamics": tree.inverse_dynamics,
             "energy": [tree.kinetic_energy, tree.potential_energy],
         }
+        if tree.system is not None:
+            parts["linear system"] = [*tree.system.entries, *tree.system.right]
         if c.labels:
             rows = [x for row in c.jacobian for x in row]
             parts["constraints"] = [*c.values, *rows, *c.gamma]
         return {name: count(list(part)) for name, part in parts.items()}
+
+    @property
+    def system_size(self) -> tuple[int, int] | None:
+        """Unknowns and entries of the linear system of a method that keeps reactions as unknowns; else None."""
+        system = self.tree.system
+        return None if system is None else (len(system.unknowns), len(system.places))
 
     # -- SymPy's side -------------------------------------------------------------------------------------------------
     def _symbols(self, names: Sequence[str]) -> tuple[Any, ...]:
@@ -186,6 +197,9 @@ class Equations:
         lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
         for name, operations in self.operations.items():
             lines.append(f"  {name:<22}{operations.total:>7} operations")
+        if self.system_size is not None:
+            unknowns, entries = self.system_size
+            lines.append(f"  linear system of {unknowns} unknowns, {entries} entries that do not vanish")
         if self.choice is not None:
             lines.append(f"  {self.choice}")
         return "\n".join(lines)

@@ -12,14 +12,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from .derivation import Equations
-from .equations import GIVEN, METHODS, TreeEquations, take_given
-from .errors import AssemblyError, EvaluationError, ModelError, UsageError
-from .graph.evaluate import compile_evaluator
+from .equations import GIVEN, METHODS, take_given
+from .equations.positive import require_inertia
+from .errors import AssemblyError, UsageError
 from .kinematics import Kinematics, analyse
-from .kinematics.mobility import ConstraintFunctions, Mobility, judge
+from .kinematics.loads import drives_cut_joint
+from .kinematics.mobility import Mobility, judge
 from .kinematics.report import MechanismReport, report
 
 if TYPE_CHECKING:
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from .runtime.protocols import Core
 
 TARGETS = ("cython", "numpy", "c")
+OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
 @contextmanager
@@ -63,22 +63,30 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
         return "lagrange"
     if method not in ("auto", *METHODS):
         raise UsageError(f"no method {method!r}; there are: auto, {', '.join(METHODS)}")
-    if bare and method != "lagrange":
-        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, lagrange")
+    if bare and method not in OF_LAGRANGIANS:
+        raise UsageError(f"method {method!r} needs bodies; a bare Lagrangian has: auto, {', '.join(OF_LAGRANGIANS)}")
     return method
 
 
-def derive(model: Model, method: str = "auto", independent: Sequence[str] | None = None) -> Equations:
+def derive(
+    model: Model,
+    method: str = "auto",
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+) -> Equations:
     """Derive the equations of motion of a model.
 
     Parameters
     ----------
     model : Model
-    method : {'auto', 'embedding', 'lagrange', 'recursive'}
-        ``auto`` takes, of a tree, embedding or recursive, whichever has the right-hand side of fewer operations;
-        embedding where there are loops; lagrange of a bare Lagrangian.
+    method : str
+        One of ``equations.METHODS``, or ``auto``: of a tree, embedding or recursive, whichever has the right-hand side
+        of fewer operations; embedding where there are loops; lagrange of a bare Lagrangian.
     independent : names of coordinates, optional
         The independent ones of a mechanism with loops; the model's own by default, else the best conditioned.
+    baumgarte : (alpha, beta), optional
+        Of the augmented form (1/s): C'' + 2 alpha C' + beta^2 C = 0 holds instead of C'' = 0, and the right-hand side
+        does not project its states.
 
     Raises
     ------
@@ -98,17 +106,36 @@ def derive(model: Model, method: str = "auto", independent: Sequence[str] | None
     with _without_collection(), _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
         mobility = _judge(kinematics, independent or ())
+    if baumgarte is not None:
+        kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _without_collection(), _timed(seconds, "equations"):
         choice: Choice | None = None
         if chosen == GIVEN:
             tree = take_given(kinematics)
         elif chosen != "auto":
             tree = METHODS[chosen](kinematics)
-        elif kinematics.constraints.labels:
+        elif kinematics.constraints.labels or drives_cut_joint(kinematics):
             tree = METHODS["embedding"](kinematics)
         else:
             tree, choice = choose(kinematics)
     return Equations(kinematics, mobility, tree, seconds, choice)
+
+
+def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:
+    """Kinematics with Baumgarte's terms, of the method that takes them."""
+    from .equations.augmented import stabilise
+
+    if method != "augmented":
+        raise UsageError(f"baumgarte belongs to method 'augmented', not {method!r}; the others project their states")
+    try:
+        alpha, beta = (float(x) for x in baumgarte)
+    except (TypeError, ValueError):
+        raise UsageError(f"baumgarte must be two numbers (alpha, beta) in 1/s, not {baumgarte!r}") from None
+    if not (0.0 <= alpha < float("inf") and 0.0 <= beta < float("inf")):
+        raise UsageError(f"baumgarte must be two finite numbers that are not negative, not {baumgarte!r}")
+    if not kinematics.constraints.labels:
+        raise UsageError("baumgarte stabilises constraints, and this model has none")
+    return stabilise(kinematics, alpha, beta)
 
 
 def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
@@ -137,59 +164,6 @@ def check(model: Model) -> MechanismReport:
     equations.kinematics.mechanism.require_values()
     require_inertia(equations.kinematics, equations.mobility, equations.tree)
     return report(equations.kinematics, equations.mobility)
-
-
-def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
-    """Refuse a degree of freedom that moves no mass at any configuration tried.
-
-    The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
-    as Euler angles make it, a run that gets there says so.
-
-    Raises
-    ------
-    ModelError
-        Names the coordinates that move nothing.
-    """
-    m, names = kinematics.mechanism, kinematics.freedoms
-    numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
-    functions = ConstraintFunctions(kinematics, numbers)
-    n, r = len(names), mobility.rank
-    if n == r:
-        return
-    if tree.pivots:
-        moved = compile_evaluator(list(tree.pivots), (*kinematics.names, *numbers, "t"))
-        for sample in mobility.samples:
-            sizes = np.array(moved([*sample, *numbers.values(), 0.0]), dtype=float) * functions.scales.q**2
-            if sizes.min() > 1e-12 * sizes.max():
-                return
-    mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
-    scales = functions.scales.q
-    worst: tuple[float, np.ndarray] | None = None
-    for sample in mobility.samples:
-        q = np.array(sample)
-        M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
-        basis = np.linalg.svd(functions.scaled_jacobian(q))[2][r:].T if functions.m else np.eye(n)
-        embedded = basis.T @ M @ basis
-        if not np.isfinite(embedded).all():
-            continue
-        sizes, modes = np.linalg.eigh(embedded)
-        if sizes[0] > 1e-12 * sizes[-1]:
-            return
-        if worst is None:  # the reference is what the message speaks of
-            worst = float(sizes[0] + 1e-12 * abs(sizes[-1])), np.abs(basis @ modes[:, 0])
-    if worst is None:
-        raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
-    size, motion = worst
-    problems = []
-    for j in np.argsort(-motion):
-        if motion[j] > 0.3 * motion.max():
-            spec = next((s for s in m.joints if names[j] in (*s.coordinates, *s.velocities)), None)
-            section = "lagrangian" if m.given is None else "equations"
-            path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
-            what = "negative inertia" if size < 0.0 else "no inertia"
-            message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
-            problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
-    raise ModelError(problems)
 
 
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
@@ -272,6 +246,7 @@ def generate(
     method: str = "auto",
     target: str = "cython",
     independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/`` and return that path.
 
@@ -285,7 +260,7 @@ def generate(
     from .emit import emit_package
     from .emit.write import write_package
 
-    equations = derive(model, method, independent)
+    equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
     sources = emit_package(program, target)
     return write_package(sources, Path(directory) / equations.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -123,6 +124,32 @@ def multipliers(
     module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
     """See :meth:`~..runtime.analyses.Analyses.multipliers`."""
-    states = prepare(module, t, x, p, u)
-    force = states.residual(states.accelerations())
-    return states.shaped(solve_multipliers(states.jacobian(), force, module.layout.scales), out)
+
+    def find(states: States) -> Array:
+        force = states.residual(states.accelerations())
+        return solve_multipliers(states.jacobian(), force, module.layout.scales)
+
+    return evaluate(find, module, t, x, p, u, out)
+
+
+def evaluate(
+    find: Callable[[States], Array],
+    module: Module,
+    t: ArrayLike,
+    x: ArrayLike,
+    p: Any = None,
+    u: Any = None,
+    out: Array | None = None,
+) -> Array:
+    """``find`` of all states; where inputs are given state by state, (n_u, k), of each state with its own."""
+    states = prepare(module, t, x, p, None if np.ndim(u) == 2 else u)
+    if np.ndim(u) != 2:
+        return states.shaped(find(states), out)
+    inputs = np.asarray(u, dtype=float)
+    if states.single or inputs.shape != (module.n_u, len(states.t)):
+        raise UsageError(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
+    parts = [
+        find(prepare(module, states.t[k : k + 1], states.x[:, k : k + 1], p, np.ascontiguousarray(inputs[:, k])))
+        for k in range(len(states.t))
+    ]
+    return states.shaped(np.concatenate(parts, axis=-1), out)

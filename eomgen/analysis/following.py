@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
-from ..numeric.projection import largest
+from ..numeric.projection import largest, within
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -135,17 +135,20 @@ class Follower:
             C = self._C(q, t=t)
             e = np.concatenate([self.scales.residual(C), self._gap(q, y, t)])
             size = largest(e)
-            if size <= EXACT or (step and size <= SETTLED and size > 0.5 * before):
-                return q
-            if not np.isfinite(size) or step == STEPS:
-                break
+            if size <= EXACT or not np.isfinite(size):
+                return q if size <= EXACT else None
             K = self.matrix(q, t)
             K = np.concatenate([K[: len(C)], K[self.layout.n_c :]])
+            rounded = self.scales.rounding(q, K)
+            if step and size > 0.5 * before and within(e, SETTLED, rounded):
+                return q
+            if step == STEPS:
+                break
             dz = np.linalg.lstsq(K, e, rcond=1e-13)[0]
             longest = largest(dz)
             q = self.scales.move(q, -dz * min(1.0, LONGEST / longest) if longest else dz)
             before = size
-        return q if size <= ACCEPTED else None
+        return q if within(e, ACCEPTED, rounded) else None
 
     # motion
 

@@ -7,6 +7,7 @@ its reaction.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .constrained import States, prepare, solve_multipliers
+from .constrained import States, evaluate, prepare, solve_multipliers
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -32,6 +33,7 @@ class Geometry(NamedTuple):
     points: Array  #: (n_joints, 3, k) S of each joint
     free: Array  #: (n_f, 6, k) free directions (linear, angular) at S
     reach: Array  #: (n_r, 6, k) gradients of the equations of joints without coordinates, at S
+    loops: Array  #: (n_k, 6, k) gradients of the coordinates of cut joints, at S
     origins: Array  #: (n_bodies, 3, k)
 
 
@@ -57,15 +59,22 @@ def place(states: States) -> Geometry:
     module, table = states.module, joint_table(states.module)
     k, n_c, n_b = len(states.t), module.n_rows, module.n_bodies
     flat = states.evaluate(module.kernels.state("wrench_geometry"), states.q)
-    sizes = (6 * n_c * n_b, 3 * len(table["ends"]), 6 * len(table["columns"]), 6 * len(table["reach"]))
+    sizes = (
+        6 * n_c * n_b,
+        3 * len(table["ends"]),
+        6 * len(table["columns"]),
+        6 * len(table["reach"]),
+        6 * len(table["loops"]),
+    )
     ends = np.cumsum(sizes)
-    rows, points, free, reach = np.split(flat, ends[:-1])
+    rows, points, free, reach, loops = np.split(flat, ends[:-1])
     poses = states.evaluate(module.poses, states.q)
     return Geometry(
         rows.reshape(n_c, n_b, 6, k),
         points.reshape(-1, 3, k),
         free.reshape(-1, 6, k),
         reach.reshape(-1, 6, k),
+        loops.reshape(-1, 6, k),
         poses[:, :3, 3],
     )
 
@@ -134,27 +143,45 @@ def along_free(free: Array, wrench: Array) -> tuple[Array, Array]:
     return forces.T, np.concatenate([force, torque], axis=1)[:, :, 0].T
 
 
-def find_reactions(states: States, a: Array | None = None, multipliers: Array | None = None) -> tuple[Array, Array]:
-    """Reactions (n_joints, 6, k) and which are undetermined (n_joints, 6, k)."""
-    module = states.module
-    width = max(1, CHUNK // max(1, module.layout.n_w))
-    if len(states.t) > width:
-        parts = []
-        for k in range(0, len(states.t), width):
-            some = slice(k, k + width)
-            cut = states._replace(t=states.t[some], x=np.ascontiguousarray(states.x[:, some]))
-            given = [None if y is None else np.ascontiguousarray(y[:, some]) for y in (a, multipliers)]
-            parts.append(find_reactions(cut, *given))
-        return np.concatenate([r for r, _ in parts], axis=-1), np.concatenate([m for _, m in parts], axis=-1)
-    table, geometry = joint_table(module), place(states)
+def find_reactions(
+    states: States,
+    a: Array | None = None,
+    multipliers: Array | None = None,
+    drives: Mapping[int, Array] | None = None,
+) -> tuple[Array, Array]:
+    """Reactions (n_joints, 6, k) and which are undetermined (n_joints, 6, k).
+
+    ``drives`` are further forces (k,) along coordinates of cut joints, by their number.
+    """
+    module, drives = states.module, drives or {}
     a = states.accelerations() if a is None else a
     if multipliers is None:
         multipliers = solve_multipliers(states.jacobian(), states.residual(a), module.layout.scales)
+    width = max(1, CHUNK // max(1, module.layout.n_w, (6 * len(joint_table(module)["ends"])) ** 2))
+    parts = []
+    for k in range(0, len(states.t), width):
+        some = slice(k, k + width)
+        x, now, own = (np.ascontiguousarray(y[:, some]) for y in (states.x, a, multipliers))
+        loads = {number: force[some] for number, force in drives.items()}
+        parts.append(_reactions(states._replace(t=states.t[some], x=x), now, own, loads))
+    return np.concatenate([r for r, _ in parts], axis=-1), np.concatenate([m for _, m in parts], axis=-1)
+
+
+def _reactions(states: States, a: Array, multipliers: Array, drives: Mapping[int, Array]) -> tuple[Array, Array]:
+    module = states.module
+    table, geometry = joint_table(module), place(states)
     flat = states.evaluate(module.kernels.motion("needed_wrenches"), states.q, states.v, a)
     every = flat.reshape(-1, 6, len(states.t))
     needed = every[: module.n_bodies] + np.einsum("ck,cbik->bik", multipliers, geometry.rows)
+    loads = dict(zip(table["cut"], every[module.n_bodies :], strict=True))
+    for number, force in drives.items():
+        joint, load = table["loops"][number], force * geometry.loops[number]
+        loads[joint] = loads[joint] + load
+        for body, sign in zip(table["ends"][joint], (1.0, -1.0), strict=True):
+            if body != GROUND:
+                needed[body] += sign * shift(load, geometry.points[joint], geometry.origins[body])
     result = transmitted(table, geometry, needed)
-    for joint, load in zip(table["cut"], every[module.n_bodies :], strict=True):
+    for joint, load in loads.items():
         result[joint] += load
     for row, joint in enumerate(table["rows"]):
         if joint != GROUND:
@@ -175,15 +202,13 @@ def reactions(
 ) -> Array:
     """See :meth:`~..runtime.analyses.Analyses.reactions`."""
     joint_table(module)
-    states = prepare(module, t, x, p, u)
-    return states.shaped(find_reactions(states)[0], out)
+    return evaluate(lambda states: find_reactions(states)[0], module, t, x, p, u, out)
 
 
 def undetermined_reactions(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
     """See :meth:`~..runtime.analyses.Analyses.undetermined_reactions`."""
     joint_table(module)
-    states = prepare(module, t, x, p, u)
-    return states.shaped(find_reactions(states)[1])
+    return evaluate(lambda states: find_reactions(states)[1], module, t, x, p, u)
 
 
 def driving_forces(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:

@@ -18,21 +18,26 @@ from .constrained import States
 from .reactions import GROUND, RANK, SEEN, Geometry, along_free, free_of, shift, transmitted
 
 
-def bases(table: dict[str, Any], geometry: Geometry, length: float, state: int) -> list[Array]:
-    """Orthonormal bases (6, r) of the wrenches that each joint can exert at S, moments in units of the length."""
+def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:
+    """Orthonormal columns (k, 6, r) of the wrenches that each joint can exert at S, moments in units of the length.
+
+    A state in which there are fewer than in others has columns of zeros.
+    """
     found = []
     for joint in range(len(table["ends"])):
-        own = free_of(table, joint)
         reach = [i for i, owner in enumerate(table["reach"]) if owner == joint]
         if reach:
-            G = geometry.reach[reach, :, state] * _per(length)
-            U, sizes, _ = np.linalg.svd(G.T, full_matrices=False)
-            found.append(U[:, sizes > RANK * sizes.max(initial=0.0)])
-            continue
-        F = geometry.free[own, :, state] / _per(length)
-        size = np.sqrt((F**2).sum(axis=1))
-        _, sizes, Vt = np.linalg.svd(F / np.where(size > 0.0, size, 1.0)[:, None])
-        found.append(Vt[int((sizes > RANK).sum()) :].T)
+            G = np.moveaxis(geometry.reach[reach], -1, 0) * _per(length)
+            _, sizes, Vt = np.linalg.svd(G, full_matrices=False)
+            kept = sizes > RANK * sizes[:, :1]
+        else:
+            F = np.moveaxis(geometry.free[free_of(table, joint)], -1, 0) / _per(length)
+            size = np.sqrt((F**2).sum(axis=2, keepdims=True))
+            _, sizes, Vt = np.linalg.svd(F / np.where(size > 0.0, size, 1.0))
+            kept = np.ones(Vt.shape[:2], dtype=bool)
+            kept[:, : sizes.shape[1]] = sizes <= RANK
+        columns = Vt[:, kept.any(axis=0)] * kept[:, kept.any(axis=0), None]
+        found.append(np.swapaxes(columns, 1, 2))
     return found
 
 
@@ -84,37 +89,40 @@ def remove_self_stress(
     multipliers of constraint elements.
     """
     length, scales = states.module.layout.length, states.module.layout.scales
-    elements = element_wrenches(states, table, geometry)
     element_rows = [i for i, joint in enumerate(table["rows"]) if joint == GROUND]
-    per, n_b = _per(length), len(geometry.origins)
+    sizes = scales.c[element_rows] / length
+    per, n_b, count = _per(length), len(geometry.origins), reactions.shape[-1]
+    joints = bases(table, geometry, length)
+    ends = np.cumsum([0, *(B.shape[2] for B in joints), len(element_rows)])
+    A = np.zeros((count, n_b, 6, ends[-1]))
+    for j, B in enumerate(joints):
+        for body, sign in zip(table["ends"][j], (-1.0, 1.0), strict=True):
+            if body != GROUND:
+                arm = (geometry.points[j] - geometry.origins[body]) / length
+                A[:, body, :, ends[j] : ends[j + 1]] += sign * (_shifts(arm) @ B)
+    elements = element_wrenches(states, table, geometry) * per[:, None] / sizes[:, None, None, None]
+    A[..., ends[-2] :] = -np.moveaxis(elements, (0, 3), (3, 0))
+    _, found, Vt = np.linalg.svd(A.reshape(count, 6 * n_b, ends[-1]))
+    null = np.ones(Vt.shape[:2], dtype=bool)
+    null[:, : found.shape[1]] = found <= RANK * found.max(axis=1, initial=0.0)[:, None]
+    N = Vt * null[:, :, None]  # its rows span the self-stresses
+    scaled = np.moveaxis(reactions * per[:, None], -1, 0)
+    forces = [np.einsum("kij,ki->kj", B, scaled[:, j]) for j, B in enumerate(joints)]
+    forces.append((multipliers[element_rows] * sizes[:, None]).T)
+    stress = np.einsum("kni,kn->ki", N, np.einsum("kni,ki->kn", N, np.concatenate(forces, axis=1)))
     result, flags = np.array(reactions), np.zeros(reactions.shape, dtype=bool)
-    for s in range(reactions.shape[-1]):
-        joints = bases(table, geometry, length, s)
-        columns = [_balance(table, geometry, joint, B / per[:, None], s) * per for joint, B in enumerate(joints)]
-        sizes = scales.c[element_rows] / length
-        columns.append(-elements[..., s] * per / sizes[:, None, None])
-        A = np.concatenate([c.reshape(len(c), 6 * n_b) for c in columns]).T
-        _, found, Vt = np.linalg.svd(A)
-        N = Vt[int((found > RANK * found.max(initial=0.0)).sum()) :].T
-        if not N.shape[1]:
-            continue
-        forces = [B.T @ (reactions[j, :, s] * per) for j, B in enumerate(joints)]
-        forces.append(multipliers[element_rows, s] * sizes)
-        ends = np.cumsum([0, *(len(f) for f in forces)])
-        stress = N @ (N.T @ np.concatenate(forces))
-        for j, B in enumerate(joints):
-            part = slice(ends[j], ends[j + 1])
-            result[j, :, s] -= (B @ stress[part]) / per
-            flags[j, :, s] = np.sqrt(((B @ N[part]) ** 2).sum(axis=1)) > SEEN
+    for j, B in enumerate(joints):
+        part = slice(ends[j], ends[j + 1])
+        result[j] -= (np.einsum("kij,kj->ki", B, stress[:, part]) / per).T
+        flags[j] = (np.sqrt(((B @ np.swapaxes(N[:, :, part], 1, 2)) ** 2).sum(axis=2)) > SEEN).T
     return result, flags
 
 
-def _balance(table: dict[str, Any], geometry: Geometry, joint: int, wrenches: Array, state: int) -> Array:
-    """Wrenches (6, r) of a joint on S about S -> on all bodies about their origins, (r, n_bodies, 6)."""
-    result = np.zeros((wrenches.shape[1], len(geometry.origins), 6))
-    point = np.repeat(geometry.points[joint, :, state, None], wrenches.shape[1], axis=1)
-    for body, sign in zip(table["ends"][joint], (-1.0, 1.0), strict=True):
-        if body != GROUND:
-            origin = np.repeat(geometry.origins[body, :, state, None], wrenches.shape[1], axis=1)
-            result[:, body] += sign * shift(wrenches, point, origin).T
+def _shifts(arm: Array) -> Array:
+    """Matrices (k, 6, 6) that take wrenches to a point from which they act at ``arm`` (3, k)."""
+    x, y, z = arm
+    result = np.zeros((arm.shape[1], 6, 6))
+    result[:, range(6), range(6)] = 1.0
+    for row, column, value in ((3, 1, -z), (3, 2, y), (4, 0, z), (4, 2, -x), (5, 0, -y), (5, 1, x)):
+        result[:, row, column] = value
     return result

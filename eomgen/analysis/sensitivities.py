@@ -20,7 +20,7 @@ from ..runtime.integrate import choose_solver, integrate
 from ..runtime.names import unknown
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
-from ..runtime.simulate import DEFAULTS, span_of, times_of
+from ..runtime.simulate import DEFAULTS, find_span, ordered_times
 from .linear import output_derivatives
 from .start import Columns, held_names, keep_consistent, split_columns, start_sensitivity
 
@@ -139,7 +139,7 @@ def differentiate_run(
     forcing.base = bound.u
     layout = bound.layout
     declared: Any = bound.metadata.get("simulation", {}).get("end") or DEFAULTS["end"]
-    start, stop = span_of(span, float(declared))
+    start, stop = find_span(span, float(declared))
     given = initial if isinstance(initial, Mapping) else None
     if initial is None or given is not None:
         x0 = bound.x0(given, t=start)
@@ -155,7 +155,7 @@ def differentiate_run(
     run = _Coupled(bound, forcing, columns, weights)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     solver = choose_solver(method)
-    times = None if t_eval is None else times_of(t_eval, start, stop)
+    times = None if t_eval is None else ordered_times(t_eval, start, stop)
     z0 = np.concatenate([x0, (S0 * weights).ravel()])
     settings = {"rtol": rtol, "atol": atol, **options}
     nodes = [start, *forcing.corners(start, stop), stop]

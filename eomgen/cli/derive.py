@@ -9,6 +9,7 @@ import click
 
 from .failures import reports_failures
 from .options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @model_argument
 @native_option
 @method_option
+@baumgarte_option
 @independent_option
 @click.option("--equations", is_flag=True, help="Also write out mass matrix and force (this loads SymPy).")
 @json_option
@@ -40,6 +42,7 @@ def derive(
     independent: tuple[str, ...],
     equations: bool,
     as_json: bool,
+    baumgarte: tuple[float, float] | None,
     robot: dict[str, Any],
 ) -> None:
     """Derive the equations of motion; parameters need no values.
@@ -49,7 +52,7 @@ def derive(
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        derived = pipeline.derive(load_model(model, allow_native, robot), method, independent or None)
+        derived = pipeline.derive(load_model(model, allow_native, robot), method, independent or None, baumgarte)
         parts |= derived.seconds
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))
@@ -68,6 +71,7 @@ def summary(derived: Equations) -> dict[str, Any]:
         "choice": dict(derived.choice.operations) if derived.choice else None,
         "report": derived.report.to_dict(),
         "operations": {name: count.as_dict() | {"total": count.total} for name, count in derived.operations.items()},
+        "system": derived.system_size and dict(zip(("unknowns", "entries"), derived.system_size, strict=True)),
         "seconds": dict(derived.seconds),
     }
 
@@ -81,6 +85,9 @@ def print_operations(derived: Equations) -> None:
     ]
     if derived.choice:
         click.echo(str(derived.choice))
+    if derived.system_size:
+        unknowns, entries = derived.system_size
+        click.echo(f"a linear system of {unknowns} unknowns with {entries} entries that do not vanish")
     header = ["", "multiply", "add", "divide", "total", "functions"]
     print_table(header, rows, right=range(1, len(header)))
 

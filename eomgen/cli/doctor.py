@@ -23,6 +23,7 @@ CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.
 EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),
     "mesh": ("mass and inertia from a mesh", ("trimesh",)),
+    "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
     "plot": ("plots", ("matplotlib",)),
     "results": ("tables of results", ("pandas",)),
     "compiler": ("a C compiler from pip", ("ziglang",)),

@@ -32,7 +32,7 @@ class EnergyBalance(NamedTuple):
     power_balance: float | None  #: max |E - E(0) - work so far| / max T
 
 
-def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping[str, float]) -> EnergyBalance:
+def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping[str, float]) -> EnergyBalance | None:
     """Hold the energy of a run against the work done on it.
 
     Parameters
@@ -46,7 +46,10 @@ def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping
     Returns
     -------
     EnergyBalance
+        None where the model does not know its energy.
     """
+    if not trajectory.has_energies:
+        return None
     T, _, energy = trajectory.energies
     largest = float(np.abs(T).max())
     work = _work(equations.kinematics, trajectory, inputs)

@@ -9,6 +9,7 @@ import click
 
 from .failures import reports_failures
 from .options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -29,6 +30,7 @@ from .screen import print_json, stage
     "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
 )
 @method_option
+@baumgarte_option
 @independent_option
 @target_option("c", "cython", "numpy")
 @json_option
@@ -39,6 +41,7 @@ def generate(
     allow_native: bool,
     out: Path,
     method: str,
+    baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
     as_json: bool,
@@ -48,7 +51,8 @@ def generate(
     from .. import pipeline
 
     with blaming_option(independent), stage("generate"):
-        folder = pipeline.generate(load_model(model, allow_native, robot), out, method, target, independent or None)
+        described = load_model(model, allow_native, robot)
+        folder = pipeline.generate(described, out, method, target, independent or None, baumgarte)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})

@@ -24,7 +24,26 @@ method_option = click.option(
     default="auto",
     show_default=True,
     metavar="M",
-    help="Method of derivation: auto, embedding, lagrange, recursive (for the integrator see --solver of run).",
+    help="Method of derivation: auto, embedding, lagrange, recursive, augmented, newton_euler, amalgamated, "
+    "gibbs_appell, hamilton (for the integrator see --solver of run).",
+)
+
+
+def _pair(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    try:
+        alpha, beta = (float(word) for word in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not two numbers ALPHA,BETA") from None
+    return alpha, beta
+
+
+baumgarte_option = click.option(
+    "--baumgarte",
+    metavar="ALPHA,BETA",
+    callback=_pair,
+    help="With --method augmented: hold constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s), without projection.",
 )
 
 

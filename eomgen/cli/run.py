@@ -13,6 +13,7 @@ from ..errors import UsageError
 from .derive import print_operations, summary
 from .failures import after_integration, reports_failures
 from .options import (
+    baumgarte_option,
     blaming_option,
     independent_option,
     json_option,
@@ -44,6 +45,7 @@ POINTS = 5  #: change points listed
 @model_argument
 @native_option
 @method_option
+@baumgarte_option
 @independent_option
 @target_option("cython", "numpy")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
@@ -64,6 +66,7 @@ def run(
     model: Path,
     allow_native: bool,
     method: str,
+    baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
     end: float | None,
@@ -92,7 +95,7 @@ def run(
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
         complete_parameters(described, chosen)
-        equations = pipeline.derive(described, method, independent or None)
+        equations = pipeline.derive(described, method, independent or None, baumgarte)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)
@@ -122,7 +125,7 @@ def run(
         return
     click.echo(str(equations.report))
     print_operations(equations)
-    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy.work is None else [])
+    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy and energy.work is None else ())
     for file in files:
         click.echo(f"wrote {file}")
 
@@ -168,7 +171,7 @@ def final_names(trajectory: Trajectory) -> list[str]:
     return list(dict.fromkeys([*header["x_names"], *loops, *header["y_names"]]))
 
 
-def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance) -> dict[str, Any]:
+def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance | None) -> dict[str, Any]:
     """A run as plain values."""
     header, residuals = trajectory.metadata, trajectory.residuals
     final = {name: finite(trajectory[name][-1]) for name in final_names(trajectory)}
@@ -191,12 +194,29 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance)
             "correction_velocity": residuals.correction_velocity,
         },
         "change_points": [point._asdict() for point in trajectory.change_points],
-        "energy": {key: None if value is None else finite(value) for key, value in energy._asdict().items()},
+        "energy": energy and {k: None if value is None else finite(value) for k, value in energy._asdict().items()},
         "final": {"t": float(trajectory.t[-1]), **final},
     }
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance, uncounted: Sequence[str] = ()) -> None:
+def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list[tuple[str, str]]:
+    if energy is None:
+        return [("energy", "not known: the equations have no kinetic_energy")]
+    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
+    if energy.work:
+        return [
+            ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
+            ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
+        ]
+    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
+    rows = [("energy", f"{change}{kept}")]
+    if uncounted:
+        names = ", ".join(uncounted)
+        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
+    return rows
+
+
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncounted: Sequence[str] = ()) -> None:
     """Statistics of a run, its residuals, its energy and its final values.
 
     ``uncounted`` are functions whose work is not known.
@@ -219,16 +239,7 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance, uncounted: S
     if points:
         rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
         rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
-    change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
-    rows.append(("energy", f"{change}{kept}"))
-    if energy.work:
-        rows[-1] = ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J")
-        rows.append(("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"))
-    if uncounted:
-        names = ", ".join(uncounted)
-        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
-    print_rows(rows)
+    print_rows(rows + _energy_rows(energy, uncounted))
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
     print_rows(
         [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]

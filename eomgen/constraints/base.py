@@ -54,6 +54,7 @@ class Constraint(ABC):
     """A constraint element.  ``name`` is the user's; a subclass adds its coordinates, markers and dimensions."""
 
     type_name: ClassVar[str]
+    written: ClassVar[bool] = False  #: whether factors in the equations are the user's, and may have any size
     name: str
 
     @abstractmethod

@@ -23,6 +23,7 @@ class CamLift(Constraint):
     """The follower's coordinate is a given function of the cam's: s = lift(theta - phase)."""
 
     type_name: ClassVar[str] = "cam"
+    written: ClassVar[bool] = True
     cam: Expr
     follower: Expr
     lift: Profile

@@ -14,6 +14,7 @@ class Linear(Constraint):
     """A linear relation: sum of factor times coordinate = offset (Shabana, Computational Dynamics, sec. 3.2)."""
 
     type_name: ClassVar[str] = "linear"
+    written: ClassVar[bool] = True
     terms: tuple[tuple[Expr, Expr], ...]  #: (coordinate, factor)
     offset: Expr
     kind: str
@@ -30,6 +31,7 @@ class Equation(Constraint):
     """Any expression held at zero; nonholonomic (``level`` 'velocity') if it is linear in velocities."""
 
     type_name: ClassVar[str] = "equation"
+    written: ClassVar[bool] = True
     expression: Expr
     kind: str
     level: str

@@ -18,6 +18,7 @@ class Gear(Constraint):
     """
 
     type_name: ClassVar[str] = "gear"
+    written: ClassVar[bool] = True
     a: Expr
     b: Expr
     ratio: Expr
@@ -35,6 +36,7 @@ class Belt(Constraint):
     """
 
     type_name: ClassVar[str] = "belt"
+    written: ClassVar[bool] = True
     a: Expr
     b: Expr
     ratio: Expr
@@ -49,6 +51,7 @@ class Rack(Constraint):
     """A pinion that rolls on a rack: s = r a + offset (Norton, Design of Machinery, sec. 9.3)."""
 
     type_name: ClassVar[str] = "rack"
+    written: ClassVar[bool] = True
     pinion: Expr
     rack: Expr
     radius: Expr
@@ -71,6 +74,7 @@ class Planetary(Constraint):
     """
 
     type_name: ClassVar[str] = "planetary"
+    written: ClassVar[bool] = True
     sun: Expr
     ring: Expr
     carrier: Expr

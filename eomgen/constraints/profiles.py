@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from ..graph.substitute import substitute, symbols_of
 
 TRIALS = 5
 CLOSE = 1e-9
+EDGE = 1e-10  #: how near to the ends of a turn they are looked at, inside it (rad)
+ROUNDING = 1e-12
+CLOSING = 1e-6  #: part of its range by which a law, or its slope, may miss its own beginning after a turn
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,28 @@ class Profile:
 
     def _insert(self, expression: Expr, angle: Expr) -> Expr:
         return substitute([expression], {self.local: angle})[0]
+
+    def gap(self, values: Mapping[str, float]) -> tuple[str, float, float] | None:
+        """What a turn does not close: "value" or "slope", at its beginning and at its end; None where both agree.
+
+        Parameters
+        ----------
+        values : mapping
+            Numbers of all parameters.
+        """
+        (name,) = symbols_of([self.local])
+        theta = np.concatenate([[EDGE, math.tau - EDGE], np.linspace(EDGE, math.tau - EDGE, 100)])
+        laws = [self.expression, *jvp([self.expression], {self.local: self.local.graph.one})]
+        with np.errstate(all="ignore"):
+            found = [np.broadcast_to(f, theta.shape) for f in evaluate(laws, {**values, name: theta})]
+        if not np.isfinite(found).all():
+            return None  # what it is elsewhere is judged elsewhere
+        rounding = ROUNDING * float(np.abs(found[0]).max())
+        for what, f, size in (("value", found[0], np.ptp(found[0])), ("slope", found[1], np.abs(found[1]).max())):
+            first, last = (0.0 if abs(x) < CLOSE * size else float(x) for x in f[:2])
+            if abs(last - first) > CLOSING * float(size) + rounding:
+                return what, first, last
+        return None
 
     def repeats(self) -> bool:
         """Whether the expression repeats every turn of itself, tried at random values of all symbols."""

@@ -11,11 +11,12 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
-from .build_equations import build_equations, declare_equations
+from .build_equations import build_equations, check_energies, declare_equations
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
+from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
@@ -86,7 +87,10 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    check_bodies(bodies, {p.name: p.value for p in parameters if p.value is not None}, faults)
+    numbers = {p.name: p.value for p in parameters if p.value is not None}
+    check_bodies(bodies, numbers, faults)
+    check_turns(constraints, numbers, faults)
+    check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
         check_connected(bodies, joints, faults)
     if faults:

@@ -11,11 +11,12 @@ from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
 from .checks import check_keys
-from .description import items
+from .description import Faults, items
 from .fields import EQUATIONS, MOTION
-from .mechanism import GivenEquations
+from .mechanism import GivenEquations, Output
 from .names import fault_of_name, nearest
 from .reading import Reader
+from .scope import ENERGIES
 from .sympy_face import name_of
 
 PATH = "equations"
@@ -131,6 +132,16 @@ def build_equations(reader: Reader, values: dict[str, Any] | None) -> GivenEquat
     return GivenEquations(
         tuple(q), tuple(v), rates, tuple(rows), forcing, constraints, tuple(named), kinetic, potential
     )
+
+
+def check_energies(given: GivenEquations | None, outputs: Sequence[Output], faults: Faults) -> None:
+    """Note outputs of an energy that given equations do not know."""
+    if given is None or not given.kinetic_energy.is_zero:
+        return
+    for output in outputs:
+        for name in sorted(symbols_of([output.expression]) & {f"{energy}()" for energy in ENERGIES}):
+            message = f"{name.removesuffix('()')} is not known: the equations are given without kinetic_energy"
+            faults.add(f"outputs.{output.name}", message, f"give {PATH}.kinetic_energy")
 
 
 def _rates(

@@ -105,9 +105,11 @@ def build_muscle(e: ForceEntry) -> Force | None:
     """A Hill-type muscle along a path."""
     path, activation = e.line(), e.law("activation")
     e.judge("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
-    positive: dict[str, Expr] = {
-        k: e.positive(k) for k in ("force_max", "fiber_length", "slack_length", "velocity_max")
-    }
+    positive: dict[str, Expr] = {k: e.positive(k) for k in ("force_max", "fiber_length", "slack_length")}
+    if "velocity_max" in e.values:
+        positive["velocity_max"] = e.positive("velocity_max")
+    else:  # De Groote and others (2016): ten optimal lengths of the fibres a second
+        positive["velocity_max"] = 10.0 * positive["fiber_length"]
     pennation, damping = e.law("pennation"), e.law("damping")
     e.judge("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
     if path is None:

@@ -117,7 +117,7 @@ FORCE: dict[str, Fields] = {
         "force_max": Field("expression", "largest active force (N)", required=True),
         "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True),
         "slack_length": Field("expression", "length of the tendon (m)", required=True),
-        "velocity_max": Field("expression", "velocity of the fibres that scales theirs (m/s)", default=10),
+        "velocity_max": Field("expression", "fastest shortening of fibres (m/s), 10 lengths a second by default"),
         "pennation": Field("expression", "angle of the fibres to the tendon at their optimal length (rad)", default=0),
         "damping": Field("expression", "force at velocity_max over force_max", default=0.1),
     },

@@ -278,21 +278,31 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
 
         return pipeline.check(self)
 
-    def derive(self, method: str = "auto", independent: Sequence[Any] | None = None) -> Any:
+    def derive(
+        self,
+        method: str = "auto",
+        independent: Sequence[Any] | None = None,
+        baumgarte: tuple[float, float] | None = None,
+    ) -> Any:
         """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
         from .. import pipeline
 
         if independent is not None:
             independent = [name_of(q) for q in ([independent] if isinstance(independent, str) else independent)]
-        return pipeline.derive(self, method, independent)
+        return pipeline.derive(self, method, independent, baumgarte)
 
     def compile(
-        self, method: str = "auto", target: str = "cython", independent: Sequence[Any] | None = None, **options: Any
+        self,
+        method: str = "auto",
+        target: str = "cython",
+        independent: Sequence[Any] | None = None,
+        baumgarte: tuple[float, float] | None = None,
+        **options: Any,
     ) -> Any:
         """Derive, generate and compile a module; see ``eomgen.pipeline.compile_equations``."""
         from .. import pipeline
 
-        return pipeline.compile_equations(self.derive(method, independent), target=target, **options)
+        return pipeline.compile_equations(self.derive(method, independent, baumgarte), target=target, **options)
 
     def to_yaml(self) -> str:
         """The model as the text of a model file."""

@@ -143,7 +143,7 @@ class ConstraintMethods:
         phase : scalar, optional
             The cam's angle where theta is 0 (rad).
         periodic : bool, optional
-            Whether the law repeats every turn (it does).
+            Whether the law repeats every turn (it does); then value and slope at 2 pi must be those at 0.
         """
         keys = {"cam": self._joint_of(cam), "follower": self._joint_of(follower)}
         self._constrain("cam", name, **keys, lift=lift, phase=phase, periodic=periodic)
@@ -181,7 +181,7 @@ class ConstraintMethods:
         coordinate : str, optional
             Name of the polar angle of the contact point, ``<name>_contact`` unless given.
         periodic : bool, optional
-            Whether the profile repeats every turn (it does).
+            Whether the profile repeats every turn (it does); then value and slope at 2 pi must be those at 0.
         """
         self._constrain(
             "cam_contact",

@@ -113,7 +113,7 @@ class LawMethods(ForceParts):
         force_max: Value,
         fiber_length: Value,
         slack_length: Value,
-        velocity_max: Value = 10,
+        velocity_max: Value | None = None,
         pennation: Value = 0,
         damping: Value = 0.1,
         via: Sequence[Any] = (),
@@ -133,7 +133,8 @@ class LawMethods(ForceParts):
         fiber_length, slack_length : scalar
             Optimal length of the fibres, length of the tendon (m).
         velocity_max : scalar, optional
-            Velocity by which that of the fibres is normalised (m/s).
+            Fastest shortening of the fibres, by which their velocity is normalised (m/s); 10 ``fiber_length`` a second
+            if not given, as De Groote and others have it.
         pennation : scalar, optional
             Angle of the fibres to the tendon at their optimal length (rad).
         damping : scalar, optional

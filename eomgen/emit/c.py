@@ -81,6 +81,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "balls": program.balls,
         "coordinate_of": program.coordinate_of,
         "by_columns": program.by_columns,
+        "system": program.system if "system" in program.block_names else None,
         "kernels": [
             {
                 "name": k.name,

@@ -58,8 +58,12 @@ def driver_files(program: Program) -> list[str]:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
         files.update(dict.fromkeys(space if program.balls or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
-        if driver.name in SHIFTS:
+        if driver.name == "dae_jacobian":
+            needed: tuple[str, ...] = ("dae_jacobian",)
+        elif driver.name in SHIFTS:
             needed = shift_files(program, driver.name, direct)
+        elif "system" in driver.blocks:
+            needed = _system_files(program, driver.name, direct)
         elif program.by_columns:
             needed = COLUMNS[driver.name]
         elif not program.has_loops:
@@ -74,6 +78,16 @@ def driver_files(program: Program) -> list[str]:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
     return list(files)
+
+
+def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """Files of a driver that solves the linear system of a method."""
+    solve = ("system_balance", "system_factor", "system_solve")
+    if name == "jacobian":
+        return (*solve, direct, "system_jacobian")
+    if program.has_loops and (program.projects or name == "outputs"):
+        return (*LOOPS["project"][:-1], *solve, f"system_{name}_closed")
+    return (*solve, f"system_{name}_given")
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
@@ -130,6 +144,19 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("CLOSING", n + 3 if "closing" in names else 0),
             ("DYNAMICS", 2 * n + 1 if "dynamics" in names else 0),
         ]
+    if "system" in names and program.system is not None:
+        size, places = len(program.system.unknowns), len(program.system.places)
+        relaxed = len(program.system.relaxed)
+        lengths += [
+            ("SYSTEM", places + size + relaxed),  # entries of K, r, sizes of constraints
+            ("LU", size * size),
+            ("ROW", size),  # scales
+            ("COLUMN", size),
+            ("DEFECT", size),
+            ("MOTION", n_q + n + size),  # q, v, z
+        ]
+    if "dae_tangent" in names:
+        lengths += [("DAE", 4 * program.sizes.n_dae), ("SLOPE", program.sizes.n_dae)]  # y, y', dy, dy'; dF
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))

@@ -20,6 +20,7 @@ def describe_calls(program: Program) -> list[Call]:
     s = program.sizes
     rows = len(program.metadata.get("independent_rows", range(s.n_c)))
     holonomic = len([i for i in program.metadata.get("independent_rows", range(s.n_c)) if i < s.n_h])
+    unknowns = s.n_x + rows + holonomic
     independent = "q_i, v_i, a_i"
     calls = [
         Call("rhs(t, x)", _shape(s.n_x), "x' = [q'; v'], after projecting x onto the constraints"),
@@ -55,18 +56,32 @@ def describe_calls(program: Program) -> list[Call]:
         Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),
         Call("minimal.x0(**values)", _shape(2 * s.n_dof), "x_min assembled from named values"),
         Call("minimal.expand(x_min)", _shape(s.n_x), "x of the whole tree"),
+        Call("dae.residual(t, y, yp)", _shape(unknowns), "F(t, y, y') of y = [q; v; multipliers; corrections]"),
+        Call("dae.jacobian(t, y, yp, cj)", _shape(unknowns, unknowns), "dF/dy + cj dF/dy'"),
+        Call("dae.initial(x)", f"{_shape(unknowns)}, {_shape(unknowns)}", "consistent y and y' of a state"),
+        Call("canonical.rhs(t, z)", _shape(s.n_x), "z' of z = [q; p] by Hamilton's equations"),
+        Call("canonical.of(x)", _shape(s.n_x), "z of a state x"),
+        Call("canonical.expand(z)", _shape(s.n_x), "x with these momenta"),
+        Call("canonical.hamiltonian(z)", "number", "H = p v - T + V (J)"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
         Call("linearise(x=None, t=0.0)", "Linearisation", "A, B, C, D along the constraints, eigenvalues"),
         Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
         Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
+        Call("multipliers(t, x)", _shape(s.n_c), "l of all constraint rows in M v' + h + C_q^T l = 0"),
+        Call("reactions(t, x)", _shape(len(program.metadata.get("joint_names", ())), 6), "force and moment in joints"),
+        Call("actuator_forces(t, x, a, actuated=None)", "ActuatorForces", "forces of drives that make a motion"),
+        Call("impact(t, x, {gap: restitution})", "Impact", "the state after an impact, impulses"),
+        Call("consistent(x, t=0.0)", _shape(s.n_x), "the nearest state on the constraints, in any metric"),
         Call("sensitivities(names, span)", "Sensitivities", "a run with its derivatives; needs SciPy"),
     ]
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
     calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]
+    calls = [call for call in calls if s.n_m or not call.text.startswith("canonical")]
     sums = ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
     kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
-    return [call for call in kept if s.n_c or "constraint" not in call.text]
+    kept = [call for call in kept if s.n_s or not call.text.startswith("reactions")]
+    return [call for call in kept if s.n_c or not ("constraint" in call.text or call.text.startswith("multipliers"))]
 
 
 def _shape(*sizes: int) -> str:

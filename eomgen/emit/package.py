@@ -25,11 +25,15 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
     ("inverse_dynamics", "Motion"),
     *((name, "Rows") for name in ("constraints", "constraint_jacobian", "velocity_constraints")),
     *((name, "tuple[str, ...]") for name in
-      ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names")),
+      ("q_names", "v_names", "x_names", "u_names", "p_names", "y_names", "body_names", "loop_names",
+       "joint_names", "constraint_labels")),
     *((name, "int") for name in ("n_q", "n_v", "n_x", "n_u", "n_p", "n_y", "n_c", "n_dof", "n_bodies")),
     ("metadata", "dict[str, object]"),
 )  # fmt: skip
-ANALYSES = ("kinematic_analysis", "motion_range", "linearise", "modes", "equilibrium", "sensitivities")
+FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
+          "simulate_impacts", "consistent")  # fmt: skip
+MOTIONS = ("kinematic_analysis", "motion_range")
+ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", *ANALYSES)
 
 

@@ -1,6 +1,6 @@
 """Stage equations: Kinematics -> TreeEquations; :data:`METHODS` is the literal table of derivations."""
 
-from . import embedding, lagrange, recursive
+from . import amalgamated, augmented, embedding, gibbs_appell, hamilton, lagrange, newton_euler, recursive
 from .armature import with_armature
 from .equations import Method, TreeEquations
 from .given import GIVEN, take_given
@@ -9,6 +9,11 @@ METHODS: dict[str, Method] = {
     "embedding": with_armature(embedding.derive),
     "lagrange": with_armature(lagrange.derive),
     "recursive": with_armature(recursive.derive),
+    "augmented": augmented.derive,
+    "newton_euler": with_armature(newton_euler.derive),
+    "amalgamated": with_armature(amalgamated.derive),
+    "gibbs_appell": with_armature(gibbs_appell.derive),
+    "hamilton": hamilton.derive,
 }
 
 __all__ = ["GIVEN", "METHODS", "Method", "TreeEquations", "take_given"]

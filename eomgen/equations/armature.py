@@ -68,4 +68,6 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
         potential_energy=tree.potential_energy,
         accelerations=tree.accelerations,
         pivots=tree.pivots,
+        system=tree.system,
+        canonical=tree.canonical,
     )

@@ -2,12 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 
 Rows = tuple[tuple[Expr, ...], ...]
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """K z = r, whose solution holds the accelerations: what the forms solve that keep reactions as unknowns.
+
+    Attributes
+    ----------
+    unknowns : names of the symbols z
+    places : (row, column) of the entries of K that do not vanish identically
+    entries : those entries, of (t, q, v, u)
+    right : r
+    relaxed : (row, column) of constraint equations and their reactions.  Where constraints are redundant, K is
+        singular; solvers subtract a small number there and refine the result until K z = r holds.
+    sizes : per place in ``relaxed`` the typical size of the constraint, of parameters only.  Entries of a redundant
+        equation may be nothing but rounding, so that these equations are not scaled by the size of their entries.
+    accelerations : (n_v,) a in terms of z and the state
+    """
+
+    unknowns: tuple[str, ...]
+    places: tuple[tuple[int, int], ...]
+    entries: tuple[Expr, ...]
+    right: tuple[Expr, ...]
+    relaxed: tuple[tuple[int, int], ...]
+    sizes: tuple[Expr, ...]
+    accelerations: tuple[Expr, ...]
+
+
+def linear_system(
+    residuals: Sequence[Expr],
+    unknowns: Sequence[Expr],
+    relaxed: Sequence[tuple[int, int]],
+    sizes: Sequence[Expr],
+    accelerations: Sequence[Expr],
+) -> LinearSystem:
+    """The system whose residuals K z - r are given, linear in the symbols z."""
+    entries = jacobian(list(residuals), list(unknowns))
+    places = tuple(sorted(place for place, entry in entries.items() if not entry.is_zero))
+    still = dict.fromkeys(unknowns, unknowns[0].graph.zero)
+    return LinearSystem(
+        unknowns=tuple(str(z.node[1]) for z in unknowns),
+        places=places,
+        entries=tuple(entries[place] for place in places),
+        right=tuple(-r for r in substitute(list(residuals), still)),
+        relaxed=tuple(relaxed),
+        sizes=tuple(sizes),
+        accelerations=tuple(accelerations),
+    )
 
 
 class TreeEquations:
@@ -24,6 +75,8 @@ class TreeEquations:
     kinetic_energy, potential_energy : J; gravity and springs
     accelerations : (n_v,) a with M a + h = 0, of a method that has them without M; else None
     pivots : (n_v,) with ``accelerations``: all positive exactly where M is positive definite
+    system : the linear system that the method solves for its accelerations; None where M and h are enough
+    canonical : (2 n_v,) of a method in canonical variables: p = dT/dv, then -dH/dq + Q; else empty
     """
 
     def __init__(
@@ -36,6 +89,8 @@ class TreeEquations:
         potential_energy: Expr,
         accelerations: tuple[Expr, ...] | None = None,
         pivots: tuple[Expr, ...] = (),
+        system: LinearSystem | None = None,
+        canonical: tuple[Expr, ...] = (),
     ) -> None:
         self.method = method
         self._mass_matrix = mass_matrix
@@ -45,6 +100,8 @@ class TreeEquations:
         self.potential_energy = potential_energy
         self.accelerations = accelerations
         self.pivots = pivots
+        self.system = system
+        self.canonical = canonical
 
     @property
     def mass_matrix(self) -> Rows:

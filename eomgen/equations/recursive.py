@@ -19,7 +19,7 @@ from ..graph.vectors import Mat3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
-from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
+from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
 from .equations import TreeEquations
@@ -109,7 +109,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     if count(shorter).total <= count(inverse).total:  # grouping symbols is work too
         inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
-    tree = not kinematics.constraints.labels
+    tree = not kinematics.constraints.labels and not drives_cut_joint(kinematics)
     accelerations, pivots = _articulated(kinematics, inertias, products, loads) if tree else (None, ())
     return TreeEquations(
         method="recursive",

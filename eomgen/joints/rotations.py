@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, cos, sin
+from ..graph.core import Expr, Graph, atan2, cos, sin, sqrt
 from ..graph.vectors import Mat3, Vec3
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -48,25 +48,26 @@ def euler_rates(graph: Graph, sequence: str, angles: Sequence[Expr]) -> list[Vec
 
 
 def euler_angles(graph: Graph, sequence: str, rotation: Mat3) -> list[Expr]:
-    """The angles of a rotation matrix; the middle one in [-pi/2, pi/2] (three different axes) or [0, pi]."""
+    """The angles of a rotation matrix; the middle one in [-pi/2, pi/2] (three different axes) or [0, pi].
+
+    Sine and cosine of the middle angle give it, so that value and rate stay right near the singular angles, where one
+    of the two alone loses half the digits.
+    """
     i, j, k = (AXES[letter] for letter in sequence)
-    atan2 = graph.apply
     if i != k:
         sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
-        first = atan2("atan2", -sign * rotation[j][k], rotation[k][k])
-        second = atan2("asin", _clamp(graph, sign * rotation[i][k]))
-        third = atan2("atan2", -sign * rotation[i][j], rotation[i][i])
+        upper, lower = rotation[j][k], rotation[k][k]
+        first = atan2(-sign * upper, lower)
+        second = atan2(sign * rotation[i][k], sqrt(upper * upper + lower * lower))
+        third = atan2(-sign * rotation[i][j], rotation[i][i])
         return [first, second, third]
     other = 3 - i - j
     sign = 1.0 if (i, j, other) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
-    first = atan2("atan2", rotation[j][i], -sign * rotation[other][i])
-    second = atan2("acos", _clamp(graph, rotation[i][i]))
-    third = atan2("atan2", rotation[i][j], sign * rotation[i][other])
+    upper, lower = rotation[j][i], rotation[other][i]
+    first = atan2(upper, -sign * lower)
+    second = atan2(sqrt(upper * upper + lower * lower), rotation[i][i])
+    third = atan2(rotation[i][j], sign * rotation[i][other])
     return [first, second, third]
-
-
-def _clamp(graph: Graph, x: Expr) -> Expr:
-    return graph.apply("max", graph.apply("min", x, 1.0), -1.0)
 
 
 def parameter_rotation(graph: Graph, e: Sequence[Expr]) -> Mat3:

@@ -35,7 +35,8 @@ def couple(mechanism: Mechanism, motion: Motion) -> Coupled:
         flat = [*(c.expression for c in conditions), *positive, *(value for _, value in near)]
         mapping = motion.derived_symbols(mechanism, symbols_of(flat))
         values = iter(substitute(flat, mapping) if mapping else flat)
-        rows += [Row(f"{constraint.name}.{c.label}", next(values), c.kind, c.level) for c in conditions]
+        written = constraint.written
+        rows += [Row(f"{constraint.name}.{c.label}", next(values), c.kind, c.level, written) for c in conditions]
         aligned += [(constraint.name, next(values)) for _ in positive]
         hints += [(str(symbol.node[1]), next(values)) for symbol, _ in near]
     return Coupled(rows, aligned, hints)

@@ -15,6 +15,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
+from ..joints.rods import Distance, RevoluteSpherical
 from .couplings import couple
 from .flaws import find_flaws
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
@@ -318,7 +319,7 @@ def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
 
 
 def _length_scale(mechanism: Mechanism) -> Expr:
-    """Root mean square distance of joint markers from their bodies' origins: the mechanism's size, 1 if it has none.
+    """Root mean square length of rods, and distance of joint markers from their bodies' origins; 1 if there is none.
 
     Minimum-norm corrections compare lengths with angles; measured in this length, units do not matter.
     """
@@ -329,6 +330,8 @@ def _length_scale(mechanism: Mechanism) -> Expr:
             square = vec.dot(marker.frame.position, marker.frame.position)
             if not square.is_zero:
                 squares.append(square)
+        if isinstance(spec.joint, Distance | RevoluteSpherical):
+            squares.append(spec.joint.length * spec.joint.length)
     if not squares:
         return graph.one
     total = graph.zero

@@ -49,3 +49,12 @@ def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
         if spec.armature is not None and spec.coordinates[0] in kinematics.freedoms:
             found[kinematics.freedoms.index(spec.coordinates[0])] = spec.armature
     return found
+
+
+def drives_cut_joint(kinematics: Kinematics) -> bool:
+    """Whether a drive's inertia is on a cut joint, where it couples the coordinates of the tree through y_q.
+
+    A loop can close without any row (two hinges on one axis), and its cut joint still turn a drive.
+    """
+    loop = kinematics.loop_coordinates.names
+    return any(spec.armature is not None and spec.coordinates[0] in loop for spec in kinematics.mechanism.joints)

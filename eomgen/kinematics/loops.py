@@ -27,6 +27,7 @@ class Constraints:
 
     labels: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()  #: 'length' or 'angle' per row
+    written: tuple[bool, ...] = ()  #: whether a user wrote the row's factors, so that it may have any size
     values: tuple[Expr, ...] = ()  #: of the holonomic rows
     jacobian: tuple[tuple[Expr, ...], ...] = ()  #: dense rows, mostly the zero node
     time_derivative: tuple[Expr, ...] = ()  #: C_t
@@ -37,6 +38,7 @@ class Constraints:
     aligned_joints: tuple[str, ...] = ()
     vanishing: tuple[str, ...] = ()
     declared: int = 0  #: rows before the vanishing ones were left out
+    stabilised: tuple[float, float] | None = None  #: alpha and beta, where gamma holds 2 alpha C' + beta^2 C
 
     @property
     def nonholonomic(self) -> int:
@@ -49,12 +51,14 @@ class Row:
     """One equation ``expression = 0`` before its derivatives are formed.
 
     ``level`` is 'position' for C(q, t), 'velocity' for a nonholonomic A(q, t) v + b(q, t), linear in v.
+    ``written``: its factors are a user's, and may have any size.
     """
 
     label: str
     expression: Expr
     kind: str
     level: str = "position"
+    written: bool = False
 
 
 class ClosedLoop(NamedTuple):
@@ -121,6 +125,7 @@ def differentiate_constraints(
     return Constraints(
         labels=tuple(r.label for r in kept),
         kinds=tuple(r.kind for r in kept),
+        written=tuple(r.written for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
         time_derivative=(*jvp(values, {state.t: graph.one, **dict(still)}), *substitute(nonholonomic, at_rest)),
@@ -141,6 +146,6 @@ def own_rows(mechanism: Mechanism) -> list[Row]:
         return []
     rates = {n + "_dot" for n in bare.coordinates} | set(getattr(bare, "velocities", ()))
     return [
-        Row(f"constraint_{k + 1}", e, "angle", "position" if symbols_of([e]).isdisjoint(rates) else "velocity")
+        Row(f"constraint_{k + 1}", e, "angle", "position" if symbols_of([e]).isdisjoint(rates) else "velocity", True)
         for k, e in enumerate(bare.constraints)
     ]

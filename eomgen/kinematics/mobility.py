@@ -30,6 +30,7 @@ from .candidates import rate_candidates
 from .driving import close_driven, follow_drivers
 from .flaws import require_finite
 from .kinematics import Kinematics
+from .row_scales import row_scales
 
 Array = NDArray[np.float64]
 PROBES = 4  #: further assembled configurations at which the rank is judged
@@ -68,6 +69,7 @@ class Mobility:
     redundant: tuple[str, ...]
     conditioning: float
     length_scale: float
+    row_scales: tuple[float, ...] = ()  #: typical size of each constraint row
     configurations: int = 1
     ranks: tuple[int, ...] = ()
     assumed: bool = False
@@ -100,12 +102,12 @@ class ConstraintFunctions:
         self._loop = self._compile([*loop.values, *_flat(loop.jacobian)])
         self._aligned = self._compile(list(c.aligned))
         self._hints = self._compile([value for _, value in kinematics.hints])
-        (length,) = self._compile([kinematics.length_scale])(self.neutral)
+        length, *sizes = self._compile([kinematics.length_scale, *row_scales(kinematics)])(self.neutral)
         self.length_scale = float(length)
-        self.scales = Scales.of_kinds(kinematics.velocity_kinds, c.kinds, self.length_scale, space)
+        self.scales = Scales.of_kinds(kinematics.velocity_kinds, sizes, self.length_scale, space)
         self.place, self._slopes = self.scales, None  # positions move with velocities, unless q' is given
         if kinematics.given_rates:
-            self.place = Scales.of_kinds(kinematics.kinds, c.kinds[: self.h], self.length_scale)
+            self.place = Scales.of_kinds(kinematics.kinds, sizes[: self.h], self.length_scale)
             self._slopes = self._compile([*c.values, *_flat(c.slopes)])
 
     def _compile(self, outputs: list[Expr]):  # type: ignore[no-untyped-def]
@@ -369,6 +371,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         redundant=tuple(label for i, label in enumerate(labels) if i not in kept),
         conditioning=quality,
         length_scale=functions.length_scale,
+        row_scales=tuple(float(x) for x in functions.scales.c),
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),

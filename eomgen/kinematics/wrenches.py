@@ -98,7 +98,8 @@ class JointWrenches:
     def size(self) -> int:
         """Length of :attr:`geometry`."""
         rows = len(self.kinematics.constraints.labels)
-        return 6 * (rows * len(self.mechanism.bodies) + len(self.columns) + len(self.reach)) + 3 * len(self.specs)
+        directions = len(self.columns) + len(self.reach) + len(self.kinematics.loop_coordinates.names)
+        return 6 * (rows * len(self.mechanism.bodies) + directions) + 3 * len(self.specs)
 
     @property
     def needed_size(self) -> int:
@@ -126,6 +127,7 @@ class JointWrenches:
             "rows": [
                 number[o] if o in cut and label not in coupled else -1 for o, label in zip(owner, labels, strict=True)
             ],
+            "loops": [k for k in self.kinematics.topology.cut for _ in self.specs[k].coordinates],
             "cut": list(self.kinematics.topology.cut),
         }
 
@@ -208,7 +210,8 @@ class JointWrenches:
     @cached_property
     def geometry(self) -> Row6:
         """D of the constraint rows (n_c, n_bodies, 6); S of the joints (n_j, 3); their free directions as (linear,
-        angular) at S (n_f, 6); gradients of the equations of joints without coordinates (n_r, 6)."""
+        angular) at S (n_f, 6); gradients of the equations of joints without coordinates (n_r, 6), and of the
+        coordinates of cut joints (n_k, 6), for displacements of S."""
         graph, n = self.kinematics.graph, len(self.mechanism.bodies)
         empty = (graph.zero,) * 6
         flat: list[Expr] = []
@@ -228,6 +231,9 @@ class JointWrenches:
             if joint.spec.joint.role == "loop":
                 for _, gradient in joint.rows:
                     flat += gradient
+        for joint in self.cut:
+            for _, gradient in joint.coordinates:
+                flat += gradient
         return tuple(flat)
 
     def _free_directions(self, spec: JointSpec) -> list[Expr]:

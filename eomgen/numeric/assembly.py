@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
-from .closure import Equations, System, close, closed
+from .closure import FAR, Equations, System, close, closed, remoteness
 from .projection import largest
 from .ranks import rank
 from .scales import Array, Indices, Position, Scales
@@ -135,10 +135,8 @@ class _Failure(NamedTuple):
         if contradiction:
             return contradiction
         if not given:
-            return (
-                f"the loops do not close from the given guess ({self.restarts + 1} starts tried): {gaps}; "
-                "check the dimensions, or give a better guess"
-            )
+            tried = f"({self.restarts + 1} starts tried)"
+            return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
         free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
         for start in starts(self.best, free.free, free.scales, self.restarts // 2):
             with np.errstate(all="ignore"):
@@ -148,7 +146,7 @@ class _Failure(NamedTuple):
         else:
             return (
                 f"the loops do not close{self._with(given)}, nor with these values left free "
-                f"({self.restarts + 1} starts tried): {gaps}; check the dimensions, or give a better guess"
+                f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
             )
         near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
         dof = len(free.free) - rank(free.evaluate(q)[1]).rank
@@ -185,6 +183,14 @@ class _Failure(NamedTuple):
             f"the constraints {names} contradict each other: they restrict the same motion and cannot hold together; "
             "take one away, or make their values agree"
         )
+
+    def _advice(self) -> str:
+        e, J = self.system.evaluate(self.guess)
+        far = remoteness(e, np.sqrt((J * J).sum(axis=1)))
+        if far > FAR:
+            away = f"the guess is far away (about {far:.2g} times the mechanism's size)"
+            return f"{away}: give a better one, or check the dimensions"
+        return "check the dimensions, or give a better guess"
 
     def _with(self, given: list[str]) -> str:
         return f" with {', '.join(given)}" if given else ""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .projection import ACCEPTED, SETTLED, largest
+from .projection import ACCEPTED, SETTLED, largest, within
 from .scales import Array, Position, Scales
 
 TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
@@ -18,6 +18,7 @@ EXACT = 1e-14  #: scaled residual at which to stop at once
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
 LONGEST = 0.5  #: largest scaled step
+FAR = 10.0  #: scaled distance above which steps grow with it
 STEEP = 10.0  #: length of a row's scaled gradient above which the row counts less, lest it drown the others
 
 
@@ -66,16 +67,20 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
     q : (n,) array
         The last point.
     residual : float
-        Largest scaled residual there; closed when it is not above 1e-10.
+        Largest scaled residual there; closed when it is not above 1e-10, which rows at their rounding count as.
     """
     e, J = system.evaluate(q)
+    long = system.scales.long
     for _ in range(steps):
         size = largest(e)
         if size <= EXACT or not np.isfinite(size):
             break
         steepness = np.sqrt((J * J).sum(axis=1))
         weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
-        K, f = J * weights[:, None], e * weights
+        # far from closed, lengths are measured by the distance: angles would turn in circles over it
+        far = remoteness(e, steepness)
+        unit = np.where(long, 4.0 * far, 1.0) if long is not None and far > FAR else np.ones_like(system.scales.q)
+        K, f = J * weights[:, None] * unit, e * weights
         G = K @ K.T
         top = float(G.diagonal().max())
         if top == 0.0 or largest(K.T @ f) <= 1e-15 * top:
@@ -85,7 +90,7 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest
-        trial = system.scales.move(q, dz)
+        trial = system.scales.move(q, dz * unit)
         e_trial, J_trial = system.evaluate(trial)
         f_trial = e_trial * weights
         gained = float(f @ f - f_trial @ f_trial)
@@ -104,7 +109,13 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         damping = min(0.1 * damping, size)
         if damping < TIKHONOV:
             damping = 0.0
-    return q, largest(e)
+    rounded = system.scales.rounding(q, J)
+    return q, min(largest(e), ACCEPTED) if within(e, ACCEPTED, rounded) else largest(e)
+
+
+def remoteness(e: Array, steepness: Array) -> float:
+    """About how far q is from where all equations hold, in scaled steps."""
+    return largest(e / np.maximum(steepness, 1.0))
 
 
 def closed(residual: float) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
 from .partitions import Partition, partition
-from .projection import ACCEPTED, DAMPING, EXACT, SETTLED, largest
+from .projection import ACCEPTED, DAMPING, EXACT, SETTLED, largest, within
 from .scales import Array, Indices, Position, Rate, Scales
 
 STEPS = 50  #: Newton steps at most
@@ -51,8 +51,10 @@ def solve_dependent(
         size = largest(e)
         if not np.isfinite(size):
             raise NonFiniteError("the constraints are not finite")
-        split = partition(scales.jacobian(C_q), rank, independent, strict=True)
-        if size <= EXACT or (step and size <= SETTLED and size > 0.5 * before):
+        J = scales.jacobian(C_q)
+        split = partition(J, rank, independent, strict=True)
+        rounded = scales.rounding(q, J[: len(e)])
+        if size <= EXACT or (step and size > 0.5 * before and within(e, SETTLED, rounded)):
             return q, C_q, split
         if step == STEPS:
             break
@@ -62,7 +64,7 @@ def solve_dependent(
             dz *= DAMPING / longest
         q = scales.move(q, -dz)
         before = size
-    if size <= ACCEPTED:
+    if within(e, ACCEPTED, rounded):
         return q, C_q, split
     raise ProjectionError(
         f"the dependent coordinates were not found: scaled residual {size:.1e} after {STEPS} steps; "

@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
+from .definite import safely_positive
 from .partitions import Partition, partition
 from .projection import minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
-
-SINGULAR = 1e-13  #: smallest pivot of the embedded mass matrix, relative to its largest diagonal entry
 
 
 class Terms(NamedTuple):
@@ -59,7 +58,7 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     Raises
     ------
     SingularMassMatrixError
-        A pivot is not above 1e-13 of the terms that its diagonal entry is the sum of.
+        A pivot is not above 1e-13 of the terms that its own diagonal entry is the sum of; see :mod:`.definite`.
     PartitionError
         As :func:`~.partitions.partition`.
     """
@@ -73,8 +72,8 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     except np.linalg.LinAlgError:
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is not positive definite") from None
     # the squares of its diagonal are the pivots of L D L^T
-    size = (split.B**2 * scaled.diagonal()[:, None]).sum(axis=0).max(initial=0.0)
-    if matrix.size and factor.diagonal().min() ** 2 <= SINGULAR * size:
+    size = (split.B**2 * scaled.diagonal()[:, None]).sum(axis=0)
+    if not safely_positive(factor.diagonal() ** 2, size):
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
     return Embedded(scaled, matrix, factor, split)
 

@@ -31,6 +31,11 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max()) if values.size else 0.0
 
 
+def within(e: Array, limit: float, rounded: Array) -> bool:
+    """Whether each scaled residual (m,) is at most the limit, or what rounding leaves of it (m,)."""
+    return bool((np.abs(e) <= np.maximum(limit, rounded)).all())
+
+
 def gram_solver(J: Array, relative: float = TIKHONOV) -> Callable[[Array], Array]:
     """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k)."""
     G = J @ J.T
@@ -66,7 +71,7 @@ def correct_position(
     Raises
     ------
     ProjectionError
-        No convergence to a scaled residual of 1e-10 in 25 steps.
+        No convergence to a scaled residual of 1e-10, or of the rounding of q, in 25 steps.
     NonFiniteError
         The constraints are not finite.
     """
@@ -75,13 +80,16 @@ def correct_position(
         C, C_q = position(q)
         e = scales.residual(C)
         size = largest(e)
-        if last or size == 0.0 or (step and (size <= EXACT or (size <= SETTLED and size > 0.5 * before))):
+        if last or size == 0.0 or (step and size <= EXACT):
             return q, C_q
         if not np.isfinite(size):
             raise NonFiniteError("the constraints are not finite")
+        J = scales.jacobian(C_q[: len(e)])
+        rounded = scales.rounding(q, J) if given is None else np.zeros(len(e))
+        if step and size > 0.5 * before and within(e, SETTLED, rounded):
+            return q, C_q
         if step == STEPS:
             break
-        J = scales.jacobian(C_q[: len(e)])
         dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).mean())))(e)
         longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
@@ -90,7 +98,7 @@ def correct_position(
             dz *= DAMPING / longest
         q = scales.move(q, -dz) if given is None else given.move(q, -scales.q * dz)
         before = size
-    if size <= ACCEPTED:
+    if within(e, ACCEPTED, rounded):
         return q, C_q
     raise ProjectionError(f"the projection onto the constraints stopped at a scaled residual of {size:.1e}")
 
@@ -128,6 +136,11 @@ def project(
         As :func:`correct_position`.
     """
     if not scales.c.size:
+        return q, v
+    C, C_q = position(q)  # a state that is on the constraints already stays as it is, to the last bit
+    if largest(scales.residual(C)) <= EXACT and largest(scales.residual(C_q @ v + rate(q))) <= EXACT * max(
+        1.0, largest(v / scales.q)
+    ):
         return q, v
     q, C_q = correct_position(position, q, scales, given)
     return q, correct_velocity(C_q, rate(q), v, scales)

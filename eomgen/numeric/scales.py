@@ -18,8 +18,12 @@ Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 Rate: TypeAlias = Callable[[Array], Array]
 
 
+ROUNDED = 64.0 * float(np.finfo(float).eps)  #: of a coordinate, and of what it goes into
+
+
 class Scales(NamedTuple):
-    """Typical sizes: the length scale L of the mechanism for lengths, 1 for angles.
+    """Typical sizes: the length scale L of the mechanism for lengths, 1 for angles; of rows that a user wrote the
+    length of their scaled gradient.
 
     A scaled velocity is ``v / scales.q``, a scaled residual ``C / scales.c``, the scaled Jacobian
     ``C_q * scales.q / scales.c[:, None]``.  Steps and distances of coordinates are measured by the velocities that
@@ -29,25 +33,46 @@ class Scales(NamedTuple):
     q: Array  #: (n,) of the velocities, times a second
     c: Array  #: (m,) of the constraint rows, holonomic ones first
     space: Space | None = None  #: where q' = N(q) v, how coordinates move with velocities
+    long: Array | None = None  #: (n,) 1.0 for velocities of lengths, 0.0 for those of angles
 
     @classmethod
     def of_kinds(
-        cls, velocities: Sequence[str], rows: Sequence[str], length: float, space: Space | None = None
+        cls, velocities: Sequence[str], rows: Sequence[str | float], length: float, space: Space | None = None
     ) -> Scales:
-        """Scales from kinds, each ``"angle"`` or ``"length"``, and the length scale in metres."""
+        """Scales from kinds, each ``"angle"`` or ``"length"``, or numbers for rows, and the length scale in metres."""
+        unit: dict[str | float, float] = {"length": length}
         return cls(
-            np.array([length if kind == "length" else 1.0 for kind in velocities]),
-            np.array([length if kind == "length" else 1.0 for kind in rows]),
+            np.array([unit.get(kind, 1.0) for kind in velocities]),
+            np.array([unit.get(row, 1.0) if isinstance(row, str) else float(row) for row in rows]),
             space,
+            np.array([float(kind == "length") for kind in velocities]),
         )
 
+    def resized(self, C_q: Array, rows: Indices) -> Scales:
+        """The same with the lengths of the scaled gradients C_q (m, n) for the sizes of some rows."""
+        sizes, new = np.array(self.c), np.linalg.norm(C_q[rows] * self.q, axis=1)
+        sizes[rows] = np.where(np.isfinite(new) & (new > 0.0), new, sizes[rows])
+        return self._replace(c=sizes)
+
     def jacobian(self, C_q: Array) -> Array:
-        """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first."""
-        return C_q * self.q / self.c[: len(C_q), None]
+        """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first; or (..., m, n)."""
+        return C_q * self.q / self.c[: C_q.shape[-2], None]
 
     def residual(self, C: Array) -> Array:
         """The scaled residual e = C / s_c, (m,), of all rows or the first."""
         return C / self.c[: len(C)]
+
+    def rounding(self, q: Array, J: Array) -> Array:
+        """What is left of the scaled residual (m,) by rounding of q alone, as between bodies on an orbit.
+
+        64 eps |J| |q / s|; Euler parameters do not count.
+        """
+        if self.space is None:
+            sizes = np.abs(q) if len(q) == len(self.q) else np.zeros(len(self.q))
+        else:
+            sizes = np.zeros(len(self.q))
+            sizes[self.space.plain_v] = np.abs(q[self.space.plain_q])
+        return np.asarray(ROUNDED * np.abs(J) @ (sizes / self.q))
 
     def move(self, q: Array, dz: Array) -> Array:
         """The coordinates (n_q,) a scaled step (n,) away."""

@@ -10,8 +10,8 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import exceeding, factorize, positivity, solve
-from .kernels import KERNELS, Sizes
+from .factor import exceeding, factorize, outward, positivity, solve
+from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
 from .terms import Row, SystemTerms
@@ -45,14 +45,17 @@ class BlockMaker:
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
         small = self.sizes.n_v <= self.limits.unrolled
-        return not self.has_loops and (small or self.terms.accelerations is not None)
+        return not self.has_loops and self.terms.system is None and (small or self.terms.accelerations is not None)
 
     @cached_property
     def _loops(self) -> LoopBlocks | None:
         """The straight-line form of a right-hand side with loops, if it is not too long."""
-        if not self.has_loops or not self.sizes.n_dof or not self.terms.mass_matrix or self.terms.given_rates:
+        terms = self.terms
+        if not self.has_loops or not self.sizes.n_dof or not terms.mass_matrix:
             return None
-        loops = LoopBlocks(self.terms)
+        if terms.given_rates or terms.system is not None or not terms.projects:
+            return None
+        loops = LoopBlocks(terms)
         return loops if loops.determined and loops.estimate() <= self.limits.unrolled_loops else None
 
     @cached_property
@@ -76,7 +79,7 @@ class BlockMaker:
             pivots = [d * s * s for d, s in zip(terms.pivots, terms.coordinate_scales, strict=True)]
             zero = terms.graph.zero
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
-            checks = one if len(pivots) == 1 else exceeding(pivots, pivots)
+            checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
             return list(terms.accelerations), [*self._turned, *checks]
         factor = factorize(terms.mass_matrix, terms.parent)
         checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
@@ -118,6 +121,27 @@ class BlockMaker:
         graph = self.terms.graph
         return [graph.apply("lt", graph.zero, square) for square in self._squares]
 
+    @cached_property
+    def _dae_residual(self) -> list[Expr]:
+        """F: kinematics with corrections (C. W. Gear, B. Leimkuhler, G. K. Gupta, 1985), forces, positions, rates."""
+        terms = self.terms
+        v = self._symbols(terms.v)
+        moved = list(v)
+        for row, mu in zip(terms.constraint_jacobian, self._symbols(self.port("corrections").symbols), strict=False):
+            moved = [x - s * s * c * mu for x, s, c in zip(moved, terms.coordinate_scales, row, strict=True)]
+        flow = substitute(terms.rates or v, dict(zip(v, moved, strict=True)))
+        rates = self._symbols(self.port("q_rate").symbols)
+        kinematic = [r - f for r, f in zip(rates, flow, strict=True)]
+        return [*kinematic, *self._force_residual, *terms.constraints, *terms.velocity_constraints]
+
+    def _dae_tangent(self) -> Block:
+        given = [self.port(name) for name in DAE]
+        y = [symbol for port in given for symbol in port.symbols]
+        along = Port("directions", tuple(f"d({symbol})" for symbol in y))
+        seeds = dict(zip(self._symbols(y), self._symbols(along.symbols), strict=True))
+        outputs = tuple(jvp(self._dae_residual, seeds))
+        return Block("dae_tangent", (*given, along), outputs, (len(outputs),), public=False)
+
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
         q = self._symbols(self.terms.q)
@@ -140,6 +164,12 @@ class BlockMaker:
             "a_i": tuple(terms.a[i] for i in independent),
             "q_guess": tuple(f"guess({q})" for q in terms.q),
             "multipliers": terms.multipliers,
+            "z": terms.system.unknowns if terms.system else (),
+            "corrections": tuple(f"correction[{i}]" for i in range(self.sizes.n_h)),
+            "q_rate": tuple(f"rate({q})" for q in terms.q),
+            "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
+            "correction_rates": tuple(f"rate(correction[{i}])" for i in range(self.sizes.n_h)),
+            "cj": ("cj",),
             "dq": tuple(f"d({q})" for q in terms.q),
             "dv": tuple(f"d({v})" for v in terms.v),
             "du": tuple(f"d({u})" for u in terms.u),
@@ -170,6 +200,8 @@ class BlockMaker:
             "loop_coordinate_jacobian": lambda: flat(terms.loop_coordinate_jacobian),
             "alignment": lambda: terms.alignment,
             "motion_outputs": lambda: terms.outputs,
+            "canonical": lambda: terms.canonical,
+            "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,
@@ -208,6 +240,8 @@ class BlockMaker:
         return (*self._behind(name), *(RATES if self.terms.given_rates else ()))
 
     def _behind(self, name: str) -> tuple[str, ...]:
+        if name == "dae_jacobian":
+            return ("dae_tangent",)
         residual = "residual_tangent" if self.by_direction else "residual_jacobian"
         shift = SHIFTS.get(name)
         if shift and self.terms.by_columns:
@@ -218,6 +252,8 @@ class BlockMaker:
             return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
         if self.terms.by_columns:
             return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
+        if self.terms.system and (name in ("rhs", "outputs") or (name == "jacobian" and not self.terms.projects)):
+            return self._system_needs(name, residual)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
             terms = ("mass_matrix", "bias", "scales")
             return {
@@ -237,6 +273,15 @@ class BlockMaker:
             "kinematics": (*project, "terms"),
         }[name]
 
+    def _system_needs(self, name: str, residual: str) -> tuple[str, ...]:
+        """What drivers need that solve the linear system of a method."""
+        closing = self.has_loops and (self.terms.projects or name == "outputs")
+        project = ("scales", "position", "rate") if closing else ()
+        if name == "outputs":
+            accelerate = ("system", "joint_accelerations") if self.outputs_need_accelerations else ()
+            return (*project, *accelerate, "accelerated_outputs")
+        return (*project, "system", "joint_accelerations", *((residual,) if name == "jacobian" else ()))
+
     def internal(self, name: str) -> Block:
         """A block that only drivers call; layouts in INTERFACES of the program stage (see the generated source)."""
         terms, n = self.terms, self.sizes.n_v
@@ -252,13 +297,23 @@ class BlockMaker:
                 return self._internal(name, "q", self._loops.closing())
             case "dynamics":  # v, a, whether the preferred partition is sound
                 assert self._loops is not None
-                return self._internal(name, "q v", *self._loops.dynamics())
+                outputs, checks = self._loops.dynamics()
+                return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
+            case "system":  # entries of K, then r, then sizes of the constraints
+                assert terms.system is not None
+                system = terms.system
+                return self._internal(name, "q v", [*system.entries, *system.right, *system.sizes])
+            case "joint_accelerations":
+                assert terms.system is not None
+                return self._internal(name, "q v z", terms.system.accelerations)
             case "accelerated_outputs":
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
                 return self._internal(name, "q v a multipliers", self._residual_jacobian())
+            case "dae_tangent":  # dF along (dy, dy')
+                return self._dae_tangent()
             case "mass_times":  # M a
                 along = {a: a for a in self._symbols(terms.a)}
                 return self._internal(name, "q a", jvp(terms.inverse_dynamics, along))

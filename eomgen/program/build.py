@@ -61,8 +61,11 @@ def build_program(
     sizes = _measure(terms)
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
-    if terms.given_rates:  # their derivatives by inputs and parameters are not derived
+    has["energy"] = bool(metadata.get("energy_known", True))
+    if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
+    if terms.given_rates:
+        has |= {"dae_residual": False, "dae_jacobian": False}
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
     drivers: list[Driver] = []
@@ -117,6 +120,8 @@ def build_program(
         coordinate_of=terms.coordinate_of,
         counts=counts,
         limits=limits,
+        system=terms.system,
+        projects=terms.projects,
     )
 
 
@@ -139,6 +144,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_g=len(terms.coordinate_slopes),
         n_s=terms.wrenches.needed_size if terms.wrenches else 0,
         n_w=terms.wrenches.size if terms.wrenches else 0,
+        n_m=len(terms.canonical) // 2,
+        n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 
 

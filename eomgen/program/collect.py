@@ -12,7 +12,9 @@ from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
+from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
+from ..kinematics.row_scales import coefficient_rows, row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .discs import describe_discs
@@ -54,10 +56,10 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         loop_coordinate_jacobian=loop.jacobian,
         alignment=c.aligned,
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
-        constraint_scales=tuple(scale[kind] for kind in c.kinds),
+        constraint_scales=row_scales(kinematics),
         n_dof=mobility.n_dof,
         preferred=tuple(kinematics.freedoms.index(n) for n in mobility.independent),
-        parent=kinematics.parent,
+        parent=_pattern(kinematics),
         centroidal=tuple(_centroidal(kinematics)),
         balls=kinematics.balls,
         rates=kinematics.rates if kinematics.balls or kinematics.given_rates else (),
@@ -68,7 +70,17 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         accelerations=equations.accelerations,
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
+        system=equations.system,
+        projects=c.stabilised is None,
+        canonical=equations.canonical,
     )
+
+
+def _pattern(kinematics: Kinematics) -> tuple[int, ...]:
+    """The tree that says where M is zero: one chain, hence nowhere, if a drive on a cut joint ties its branches."""
+    if drives_cut_joint(kinematics):
+        return tuple(range(-1, len(kinematics.v) - 1))
+    return kinematics.parent
 
 
 def _centroidal(kinematics: Kinematics) -> list[Expr]:
@@ -159,8 +171,11 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "velocity_kinds": list(kinematics.velocity_kinds),
         "balls": [list(ball) for ball in kinematics.balls],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
+        **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
+        "constraint_scales": list(mobility.row_scales),
+        "coefficient_rows": list(coefficient_rows(kinematics)),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "p_values": [p.value for p in m.parameters],
@@ -180,6 +195,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             for name, limits in zip(j.coordinates, j.limits, strict=False)
             if limits
         },
+        "system": _system(equations),
+        "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
         "simulation": {
             "end": m.simulation.end,
@@ -187,6 +204,19 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "rtol": m.simulation.rtol,
             "atol": m.simulation.atol,
         },
+    }
+
+
+def _system(equations: TreeEquations) -> dict[str, Any] | None:
+    """Where the entries of the linear system of a method stand, if it solves one."""
+    system = equations.system
+    if system is None:
+        return None
+    return {
+        "size": len(system.unknowns),
+        "rows": [i for i, _ in system.places],
+        "columns": [j for _, j in system.places],
+        "relaxed": [list(place) for place in system.relaxed],
     }
 
 

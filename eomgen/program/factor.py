@@ -12,8 +12,10 @@ from dataclasses import dataclass
 
 from ..graph.core import Expr
 
-#: A pivot at most this part of the largest diagonal entry means that no inertia is behind some motion.
+#: A pivot at most this part of its own diagonal entry means that no inertia is behind some motion.
 SINGULAR = 1e-13
+#: The same of the largest diagonal entry: the square of what rounding leaves of a zero.
+NOTHING = 1e-22
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,8 @@ def solve(factor: Factor, right: Sequence[Expr]) -> list[Expr]:
 def positivity(matrix: Sequence[Sequence[Expr]], factor: Factor, scales: Sequence[Expr]) -> list[Expr]:
     """Conditions (each 1.0 or 0.0) that all hold exactly where the matrix is safely positive definite.
 
-    Each pivot, made dimensionless by the scales of the coordinates, must exceed 1e-13 of the largest diagonal entry.
+    Each pivot, made dimensionless by the scales of the coordinates, must exceed 1e-13 of its own diagonal entry, and
+    1e-22 of the largest, so that sizes of independent motions do not matter.
     """
     if not matrix:
         return []
@@ -89,10 +92,31 @@ def positivity(matrix: Sequence[Sequence[Expr]], factor: Factor, scales: Sequenc
 
 
 def exceeding(pivots: Sequence[Expr], sizes: Sequence[Expr]) -> list[Expr]:
-    """Conditions (each 1.0 or 0.0): each pivot exceeds 1e-13 of the largest size."""
+    """Conditions (each 1.0 or 0.0): each pivot exceeds 1e-13 of its size and 1e-22 of the largest size."""
     graph = pivots[0].graph
     largest, *rest = sizes
-    for entry in rest:  # plain comparison, not "max": NaN is caught with the result, and this is one instruction
-        largest = graph.apply("select", graph.apply("lt", largest, entry), entry, largest)
-    limit = largest * SINGULAR
-    return [graph.apply("lt", limit, d) for d in pivots]
+    for entry in rest:
+        largest = _larger(largest, entry)
+    nothing = largest * NOTHING
+    conditions = []
+    for size, d in zip(sizes, pivots, strict=True):
+        reduced = not (size - d).is_zero
+        if reduced:
+            conditions.append(graph.apply("lt", size * SINGULAR, d))
+        if len(sizes) > 1 or not reduced:
+            conditions.append(graph.apply("lt", nothing, d))
+    return conditions
+
+
+def outward(pivots: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
+    """For each articulated inertia the largest of those from there to the leaves, which it is left over from."""
+    sizes = list(pivots)
+    for k in reversed(range(len(sizes))):
+        if parent[k] >= 0:
+            sizes[parent[k]] = _larger(sizes[parent[k]], sizes[k])
+    return sizes
+
+
+def _larger(a: Expr, b: Expr) -> Expr:
+    """Plain comparison, not "max": NaN is caught with the result, and this is one instruction."""
+    return a.graph.apply("select", a.graph.apply("lt", a, b), b, a)

@@ -27,6 +27,8 @@ class Sizes:
     n_g: int = 0  #: holonomic rows where q' is given, else 0
     n_s: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
     n_w: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
+    n_m: int = 0  #: momenta: n_v by method hamilton, else 0
+    n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,9 @@ class Kernel:
 
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
 CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), inertia (9), both about the com"
+
+#: y, then y', of which only the rates of q and v are there
+DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
 
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
@@ -112,5 +117,8 @@ KERNELS: tuple[Kernel, ...] = (
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
         late=True,
     ),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_m), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
+    Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
+    Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )

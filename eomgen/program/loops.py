@@ -13,7 +13,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from .factor import SINGULAR
+from .factor import exceeding
 from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
@@ -153,8 +153,8 @@ class LoopBlocks:
         diagonal = {i: row.get(i, graph.zero) for i, row in enumerate(M)}
         squares = [dot({i: x * x for i, x in column.items()}, diagonal) for column in columns]
         units = [self.s[k] * self.s[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
-        size = largest([graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]) * SINGULAR
-        checks = [graph.apply("lt", size, factor.pivots[i] * units[i]) for i in f]
+        sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
+        checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
         return [*moved, *a, sound], checks
 
     # -- partition ------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
+from ..equations.equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from .kernels import Sizes
@@ -132,6 +133,8 @@ class Program:
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)
+    system: LinearSystem | None = None
+    projects: bool = True
 
     @property
     def has_loops(self) -> bool:
@@ -163,7 +166,7 @@ class Program:
     @property
     def composes_terms(self) -> bool:
         """Whether drivers put ``terms`` together from ``mass_matrix`` and ``bias``."""
-        return not self.has_loops and bool(self.drivers) and not self.by_columns
+        return not self.has_loops and not self.by_columns and any("bias" in d.blocks for d in self.drivers)
 
     @property
     def by_columns(self) -> bool:

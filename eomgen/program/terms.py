@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..equations.equations import LinearSystem
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
 from ..kinematics.wrenches import JointWrenches
@@ -66,6 +67,9 @@ class SystemTerms:
     accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
     wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
+    system: LinearSystem | None = None  #: of a method that solves it for the accelerations
+    canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+    projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property
     def n_v(self) -> int:

@@ -14,7 +14,7 @@ from .names import Names, clean_model_name
 from .placement import Inertia, Placement, numbers
 from .robot import Joint, Options, Robot
 from .ties import Sum, Tie, describe_tie
-from .tree import GROUND, Bodies, Body, build_bodies
+from .tree import GROUND, Bodies, Body, build_bodies, find_tied
 
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
@@ -44,6 +44,7 @@ class _Writer:
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
+        self.tied = find_tied(robot, found)
 
     def describe(self) -> Description:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
@@ -151,7 +152,8 @@ class _Writer:
         if joint.initial or joint.start:
             start = [joint.initial] if joint.start is None else self._start(joint.start)
             reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
-            known = self.out.values.setdefault("initial", {})
+            # what an equality moves only starts its assembly: the file's pose may not satisfy it
+            known = self.out.values.setdefault("guess" if joint.name in self.tied else "initial", {})
             known.update({n: x for n, x, rest in zip(names, start, reference, strict=True) if x != rest})
         chosen = self.options.actuate
         if len(kind.coordinates) == 1 and (chosen is True or (chosen and joint.name in chosen)):
@@ -170,7 +172,7 @@ class _Writer:
 
     def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
         name = self.joints[joint.name]
-        self._add("forces", self.names.link(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
+        self._add("forces", self.names.made(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
 
     def _spring(self, joint: Joint) -> None:
         if joint.type == "revolute":
@@ -197,12 +199,12 @@ class _Writer:
         loose = []
         for joint in self.robot.joints.values():
             law = joint.mimic
-            if law is None or joint.type == "weld":
+            if law is None:
                 continue
             if self.options.mimic == "coupling":
                 sums = Sum(((joint.name, 1.0),)), Sum(((law.joint, 1.0),))
                 ties.append(Tie(f"{joint.name}_mimic", *sums, (law.offset, law.factor), joint.place))
-            else:
+            elif joint.type != "weld":
                 loose.append(f"{joint.name} = {law.factor:g} {law.joint} + {law.offset:g}")
         if loose:
             remedy = "mimic='coupling' ties them"
@@ -229,7 +231,7 @@ class _Writer:
                 terms.insert(0, (drive.gain, name))
             law = " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
             for q, c in parts if law else ():
-                force = self.names.link(f"{name}_drive")
+                force = self.names.made(f"{name}_drive")
                 self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import MissingDependencyError, ModelError, UsageError
 from .mjcf_actuators import read_actuators
 from .mjcf_equalities import read_equalities
+from .mjcf_fields import NOTED
 from .mjcf_files import Lines, scan_files
 from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
 from .robot import Joint, Link, Options, Place, Robot
@@ -71,6 +72,13 @@ class _Reader:
         access = getattr(self.m, kind)
         return [access(k).name or f"{kind}{k}" for k in range(count)]
 
+    def off(self, *flags: str) -> bool:
+        """Whether the file disables one of these parts of the physics, by the words of mjtDisableBit."""
+        import mujoco
+
+        bits = [int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0)) for flag in flags]
+        return any(self.m.opt.disableflags & bit for bit in bits)
+
     def place(self, name: str, *tags: str) -> Place:
         """Where an element of a name is; the model's first line if it has none."""
         for tag in tags:
@@ -80,10 +88,7 @@ class _Reader:
 
     def read(self) -> Robot:
         m, robot = self.m, self.robot
-        import mujoco
-
-        off = bool(m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
-        gravity = np.zeros(3) if off else m.opt.gravity
+        gravity = np.zeros(3) if self.off("GRAVITY") else m.opt.gravity
         robot.gravity = tuple(numbers(gravity))  # type: ignore[assignment]
         world = self.names["body"][0]
         robot.links[world] = Link(world, (self.root.file, self.root.line))
@@ -128,7 +133,8 @@ class _Reader:
             if m.dof_armature[dof : dof + size].any():
                 message = f"armature on a {kind} joint, which adds inertia that is not a body's"
                 self.robot.problem(f"joint.{name}.armature", message, 'set armature="0" there', place)
-            if m.dof_damping[dof : dof + size].any() or m.jnt_stiffness[j]:
+            damped = m.dof_damping[dof : dof + size].any() and not self.off("DAMPER")
+            if damped or (m.jnt_stiffness[j] and not self.off("SPRING")):
                 self.robot.notes.append(f"left out: damping and stiffness of the {kind} joint {name}")
             if kind == "spherical":
                 return joint
@@ -138,7 +144,7 @@ class _Reader:
         q0 = float(m.qpos0[start])
         back = Placement(about(axis, -q0), np.zeros(3)) if kind == "revolute" else moved(-q0 * np.array(axis))
         limits: dict[str, float] = {}
-        if m.jnt_limited[j]:
+        if m.jnt_limited[j] and not self.off("LIMIT", "CONSTRAINT"):
             limits |= dict(zip(("lower", "upper"), numbers(m.jnt_range[j]), strict=True))
         if m.jnt_actfrclimited[j]:
             limits["effort"] = float(np.abs(m.jnt_actfrcrange[j]).max())
@@ -147,10 +153,10 @@ class _Reader:
             outer=joint.outer @ back,
             axis=(axis[0], axis[1], axis[2]),
             limits=limits,
-            damping=float(m.dof_damping[dof]),
-            dry_friction=float(m.dof_frictionloss[dof]),
+            damping=0.0 if self.off("DAMPER") else float(m.dof_damping[dof]),
+            dry_friction=0.0 if self.off("FRICTIONLOSS", "CONSTRAINT") else float(m.dof_frictionloss[dof]),
             armature=float(m.dof_armature[dof]),
-            stiffness=float(m.jnt_stiffness[j]),
+            stiffness=0.0 if self.off("SPRING") else float(m.jnt_stiffness[j]),
             rest=float(m.qpos_spring[start]),
             initial=q0,
         )
@@ -166,7 +172,6 @@ class _Reader:
             notes.append(f"left out: {m.nflex} deformable bodies (flex)")
         if (m.body_mocapid >= 0).any():
             notes.append("bodies moved by motion capture (mocap) stand still")
-        for key in ("jnt_stiffnesspoly", "dof_dampingpoly", "jnt_springyield"):
-            values = getattr(m, key, None)
-            if values is not None and np.any(values):
-                notes.append(f"left out: {key}, the parts of springs and dampers that are not linear")
+        for key, (flag, what) in NOTED.items():
+            if np.any(getattr(m, key, 0)) and not self.off(flag):
+                notes.append(f"left out: {what} ({key})")

@@ -5,9 +5,10 @@ A drive of length L = sum c_j q_j has the force f = gain u + b0 + b1 L + b2 L', 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from .robot import Drive
+from .robot import Drive, Place
 
 if TYPE_CHECKING:
     from .mjcf import _Reader
@@ -20,33 +21,66 @@ Parts = tuple[tuple[str, float], ...]
 
 
 def read_actuators(reader: _Reader) -> None:
-    """Take in actuators, and springs and dampers along tendons."""
+    """Take in actuators, and what else springs, dampers and inertias along joints and fixed tendons add."""
     m, robot = reader.m, reader.robot
-    left = []
-    for k in range(m.nu):
+    left, idle, nothing = [], [], [0.0] * m.nu
+    for k in range(getattr(m, "nactuator", m.nu)):  # of several controls or forces each, since MuJoCo 4
         name = m.actuator(k).name or f"actuator{k}"
         parts = _actuated(reader, k)
-        plain = m.actuator_dyntype[k] == 0 and m.actuator_gaintype[k] == _FIXED_GAIN
+        place = reader.place(name, "motor", "position", "velocity", "general", "damper", "intvelocity")
+        damping, armature = (float(getattr(m, f"actuator_{key}", nothing)[k]) for key in ("damping", "armature"))
+        _resist(reader, f"actuator {name}", parts, place, damping, armature)
+        if reader.off("ACTUATION") or (
+            0 <= m.actuator_group[k] < 31 and m.opt.disableactuator >> m.actuator_group[k] & 1
+        ):
+            idle.append(name)
+            continue
+        plain = m.actuator_dyntype[k] == 0 and m.actuator_gaintype[k] == _FIXED_GAIN and m.actuator_plugin[k] < 0
         if not parts or not plain or m.actuator_biastype[k] not in (_NO_BIAS, _AFFINE_BIAS):
             left.append(name)
             continue
         affine = m.actuator_biastype[k] == _AFFINE_BIAS
         b0, b1, b2 = (float(b) if affine else 0.0 for b in m.actuator_biasprm[k][:3])
-        place = reader.place(name, "motor", "position", "velocity", "general", "damper", "intvelocity")
         robot.drives.append(Drive(name, parts, float(m.actuator_gainprm[k][0]), (b0, b1, b2), place))
     if left:
         robot.notes.append(f"left out: actuators that do not push along joints by a linear law ({', '.join(left)})")
+    if idle:
+        robot.notes.append(f"left out: actuators that the file disables ({', '.join(idle)})")
     _tendons(reader)
 
 
 def _actuated(reader: _Reader, k: int) -> Parts:
     m = reader.m
-    target, gear = m.actuator_trnid[k][0], float(m.actuator_gear[k][0])
+    counts = [getattr(m, key, None) for key in ("actuator_ctrlnum", "actuator_outnum")]
+    if any(count is not None and count[k] != 1 for count in counts):
+        return ()
+    first = getattr(m, "actuator_outadr", range(m.nu))[k]  # gears are those of forces
+    target, gear = m.actuator_trnid[k][0], float(m.actuator_gear[first][0])
     if m.actuator_trntype[k] in (_JOINT, _JOINT_IN_PARENT) and m.jnt_type[target] >= 2:
         return ((reader.names["joint"][target], gear),)
     if m.actuator_trntype[k] == _TENDON:
         return tuple((joint, gear * c) for joint, c in fixed_tendon(reader, target))
     return ()
+
+
+def _resist(reader: _Reader, what: str, parts: Parts, place: Place, damping: float, armature: float) -> None:
+    """Add a damper and a rotor along L = sum c_j q_j: of one joint c^2 of each is the joint's own."""
+    robot = reader.robot
+    damping = 0.0 if reader.off("DAMPER") else damping
+    if len(parts) == 1:
+        name, c = parts[0]
+        joint = robot.joints[name]
+        square = c * c
+        robot.joints[name] = replace(
+            joint, damping=joint.damping + square * damping, armature=joint.armature + square * armature
+        )
+        return
+    if damping and parts:
+        robot.drives.append(Drive("", parts, 0.0, (0.0, 0.0, -damping), place))
+    elif damping:
+        robot.notes.append(f"left out: the damping of the {what}")
+    if armature:
+        robot.notes.append(f"left out: the armature of the {what}")
 
 
 def fixed_tendon(reader: _Reader, k: int) -> Parts:
@@ -64,15 +98,13 @@ def _tendons(reader: _Reader) -> None:
     for k in range(m.ntendon):
         name = m.tendon(k).name or f"tendon{k}"
         parts = fixed_tendon(reader, k)
-        stiffness, damping = float(m.tendon_stiffness[k]), float(m.tendon_damping[k])
+        place = reader.place(name, "fixed", "spatial")
+        _resist(reader, f"tendon {name}", parts, place, float(m.tendon_damping[k]), float(m.tendon_armature[k]))
+        stiffness = 0.0 if reader.off("SPRING") else float(m.tendon_stiffness[k])
         low, high = (float(x) for x in m.tendon_lengthspring[k])
-        if stiffness or damping:
-            if parts and (low == high or not stiffness):
-                law = (stiffness * low, -stiffness, -damping)
-                robot.drives.append(Drive("", parts, 0.0, law, reader.place(name, "fixed")))
-            else:
-                left.append(name)
-        if m.tendon_armature[k]:
-            robot.notes.append(f"left out: the armature of the tendon {name}")
+        if stiffness and parts and low == high:
+            robot.drives.append(Drive("", parts, 0.0, (stiffness * low, -stiffness, 0.0), place))
+        elif stiffness:
+            left.append(name)
     if left:
-        robot.notes.append(f"left out: springs and dampers of the tendons {', '.join(left)}")
+        robot.notes.append(f"left out: springs of the tendons {', '.join(left)}")

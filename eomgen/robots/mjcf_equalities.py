@@ -28,7 +28,7 @@ def read_equalities(reader: _Reader) -> None:
         name = m.eq(k).name or f"equality{k}"
         place = reader.place(name, "connect", "weld", "joint", "tendon")
         kind = m.eq_type[k]
-        if not m.eq_active0[k]:
+        if not m.eq_active0[k] or reader.off("EQUALITY", "CONSTRAINT"):
             robot.notes.append(f"left out: the equality {name}, which is not active")
         elif kind in (CONNECT, WELD) and m.eq_objtype[k] in (_BODY, _SITE):
             robot.loops.append(_loop(reader, k, name, place))

@@ -13,7 +13,7 @@ from ..errors import ModelError, Problem
 from .xml_text import Element, read_xml
 
 FILES = 200  #: XML files that a model may be made of
-COPIES = 10_000  #: bodies that <replicate>, <composite> and <flexcomp> may make
+COPIES = 10_000  #: bodies that <replicate>, <composite> and <flexcomp> may make, themselves counted, over all files
 PIXELS = 16_384  #: width or height of a texture, rows or columns of a height field
 
 _COUNTED = ("replicate", "composite", "flexcomp")
@@ -43,6 +43,7 @@ def scan_files(root: Element, folder: str | None) -> Lines:
     """
     scan = _Scan(root, folder)
     scan.elements(root)
+    scan.attachments()
     scan.assets()
     if scan.problems:
         raise ModelError(scan.problems)
@@ -59,6 +60,9 @@ class _Scan:
         self.lines: Lines = {}
         self.problems: list[Problem] = []
         self.named: list[Element] = []  # elements that name a file
+        self.made = self.bodies = 0  # bodies by copying; all bodies
+        self.attached: list[tuple[Element, int]] = []
+        self.models: dict[str, int] = {}  # model to attach -> its bodies
         self.folders: dict[str, set[str]] = {"mesh": set(), "texture": set()}
         if not self._inside(self.main):
             message = f"{root.file} lies outside the folder {folder} of its assets"
@@ -67,34 +71,56 @@ class _Scan:
     def _inside(self, path: Path) -> bool:
         return path == self.allowed or self.allowed in path.parents
 
-    def elements(self, root: Element) -> None:
-        """Take in the elements of one XML file."""
-        copies = 0
-        for element in root.walk():
-            given = element.attributes
-            if "name" in given:
-                self.lines.setdefault((element.tag, given["name"]), (element.file, element.line))
-            if element.tag == "compiler":
-                for key, kinds in (
-                    ("assetdir", ("mesh", "texture")),
-                    ("meshdir", ("mesh",)),
-                    ("texturedir", ("texture",)),
-                ):
-                    for kind in kinds if key in given else ():
-                        self.folders[kind].add(given[key])
-            if element.tag in _COUNTED:
-                copies = max(copies, 1) * self._count(element)
-                if copies > COPIES:
-                    self.problems.append(element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,}"))
-                    copies = 0
-            for key in _SIZES:
-                if key in given and _whole(given[key]) > PIXELS:
-                    message = f"{given[key][:20]} is too large"
-                    self.problems.append(element.problem(f"{element.tag}.{key}", message, f"at most {PIXELS:,}"))
-            if element.tag == "include" or (element.tag == "model" and "file" in given):
-                self._include(element)
-            elif any(key.startswith("file") for key in given):
-                self.named.append(element)
+    def elements(self, root: Element, copies: int = 1) -> None:
+        """Take in the elements of one XML file, of which MuJoCo makes this many copies."""
+        waiting = [(root, copies)]
+        while waiting:
+            element, above = waiting.pop()
+            made = self._element(element, above)
+            waiting += [(child, made) for child in reversed(element.children)]
+
+    def _element(self, element: Element, copies: int) -> int:
+        """Take in one element; returns the number of copies of what it holds."""
+        given = element.attributes
+        if "name" in given:
+            self.lines.setdefault((element.tag, given["name"]), (element.file, element.line))
+        if element.tag == "compiler":
+            for key, kinds in (("assetdir", ("mesh", "texture")), ("meshdir", ("mesh",)), ("texturedir", ("texture",))):
+                for kind in kinds if key in given else ():
+                    self.folders[kind].add(given[key])
+        counted = element.tag in _COUNTED
+        if counted:
+            copies *= self._count(element)
+        if element.tag == "attach":
+            self.attached.append((element, copies))
+        elif counted or element.tag == "body":
+            self.bodies += copies
+            if counted or copies > 1:
+                self._make(element, copies)
+        for key in _SIZES:
+            if key in given and _whole(given[key]) > PIXELS:
+                message = f"{given[key][:20]} is too large"
+                self.problems.append(element.problem(f"{element.tag}.{key}", message, f"at most {PIXELS:,}"))
+        if element.tag == "include" or (element.tag == "model" and "file" in given):
+            before = self.bodies
+            self._include(element, copies)
+            if element.tag == "model":
+                self.models[given.get("name", Path(given["file"]).stem)] = self.bodies - before
+        elif any(key.startswith("file") for key in given):
+            self.named.append(element)
+        return copies
+
+    def attachments(self) -> None:
+        """Count the bodies of models that copies attach."""
+        for element, copies in self.attached:
+            if copies > 1:
+                self._make(element, copies * max(1, self.models.get(element.attributes.get("model", ""), 1)))
+
+    def _make(self, element: Element, bodies: int) -> None:
+        """Count bodies that copying makes, of siblings and of all files; one problem tells of too many."""
+        if self.made <= COPIES < self.made + bodies:
+            self.problems.append(element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,} in all"))
+        self.made += bodies
 
     def _count(self, element: Element) -> int:
         total = 1
@@ -102,7 +128,7 @@ class _Scan:
             total *= max(1, _whole(part))
         return total
 
-    def _include(self, element: Element) -> None:
+    def _include(self, element: Element, copies: int) -> None:
         name = element.attributes.get("file", "")
         places = [(self.main / name), (Path(element.file).resolve().parent / name)]
         path = next((p.resolve() for p in places if p.is_file()), places[0].resolve())
@@ -114,7 +140,7 @@ class _Scan:
         if len(self.seen) > FILES:
             raise ModelError([element.problem("include", "too many files", f"at most {FILES}")])
         try:
-            self.elements(read_xml(os.fspath(path)))
+            self.elements(read_xml(os.fspath(path)), copies if element.tag == "include" else 1)
         except OSError as error:
             message = f"{name!r} cannot be read: {error.strerror}"
             self.problems.append(element.problem(element.tag, message, "the path starts at the model's folder"))

@@ -35,6 +35,10 @@ class Names:
         """The name of a parameter or an input."""
         return self._note("inputs", name, self._fresh(name, "symbol", ("",)))
 
+    def made(self, name: str) -> str:
+        """The name of an element that the file does not name, told apart from others without a word about it."""
+        return self._fresh(name, "link", ("",))
+
     def _note(self, section: str, name: str, given: str) -> str:
         if given != name:
             self.renamed.setdefault(section, {})[name] = given

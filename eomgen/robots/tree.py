@@ -93,6 +93,22 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
     return found
 
 
+def find_tied(robot: Robot, found: Bodies) -> set[str]:
+    """Joints that a loop or an equality of coordinates ties to others."""
+    tied = {joint for tie in robot.ties for joint, _ in (*tie.left.parts, *tie.right.parts)}
+    for loop in robot.loops:
+        ends = []
+        for link, _ in (loop.first, loop.second):
+            chain: set[str] = set()
+            joint = found.bodies[found.home[link][0]].joint
+            while joint is not None:
+                chain.add(joint.name)
+                joint = found.bodies[found.home[joint.parent][0]].joint if joint.parent else None
+            ends.append(chain)
+        tied |= ends[0] ^ ends[1]  # those towards ground of both turn them alike
+    return tied
+
+
 def _lock(robot: Robot, options: Options) -> None:
     """Turn locked joints into welds at their values."""
     for name, value in options.locked.items():
@@ -108,7 +124,7 @@ def _lock(robot: Robot, options: Options) -> None:
         axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
         motion = moved(value * axis) if joint.type == "prismatic" else Placement(about(axis, value), np.zeros(3))
         if joint.type != "weld":
-            robot.joints[name] = replace(joint, type="weld", outer=joint.outer @ motion, mimic=None)
+            robot.joints[name] = replace(joint, type="weld", outer=joint.outer @ motion)  # what it mimics is held too
 
 
 def _check_ends(robot: Robot) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from .force_analyses import ForceAnalyses
 
 if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
@@ -35,7 +36,40 @@ def require_velocities(layout: Layout) -> None:
         )
 
 
-class Analyses:
+def require_projection(layout: Layout) -> None:
+    """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not layout.projects:
+        raise UsageError(
+            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project, and its "
+            "derivatives by inputs and parameters are not derived; derive without baumgarte for analyses"
+        )
+
+
+class Refusal:
+    """In place of a kernel that a model cannot have: says why when it is called."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Refuse.
+
+        Raises
+        ------
+        UsageError
+        """
+        require_velocities(self.layout)
+        require_projection(self.layout)
+
+
+class Analyses(ForceAnalyses):
     """Part of :class:`~.module.Module`: one call for each analysis."""
 
     kernels: Kernels
@@ -43,8 +77,7 @@ class Analyses:
     @cached_property
     def input_jacobian(self) -> Timed:
         """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
-        require_velocities(self.kernels.layout)
-        return self.kernels.timed("input_jacobian")
+        return self._derivative("input_jacobian")
 
     @cached_property
     def parameter_jacobian(self) -> Timed:
@@ -53,8 +86,12 @@ class Analyses:
         The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
-        require_velocities(self.kernels.layout)
-        return self.kernels.timed("parameter_jacobian")
+        return self._derivative("parameter_jacobian")
+
+    def _derivative(self, name: str) -> Timed:
+        layout = self.kernels.layout
+        refused = layout.given_rates or not layout.projects
+        return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
 
     def linearise(
         self,
@@ -224,94 +261,3 @@ class Analyses:
         from ..analysis.sensitivities import differentiate_run
 
         return differentiate_run(self, names, span, initial, parameters, inputs, hold=hold, **options)  # type: ignore[arg-type]
-
-    # -- forces in joints and constraints -------------------------------------------------------------------------
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, in the order of :meth:`reactions`."""
-        return tuple(self.kernels.layout.metadata.get("joint_names", ()))
-
-    @property
-    def constraint_labels(self) -> tuple[str, ...]:
-        """Names of all constraint rows, in the order of :meth:`multipliers`."""
-        return self.kernels.layout.constraint_labels
-
-    def multipliers(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
-        """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
-
-        Parameters
-        ----------
-        t : float or (k,) array
-        x : (n_x,) or (n_x, k) array
-            States; projected onto the constraints first.
-        p, u, out : optional
-            As for every kernel.
-
-        Returns
-        -------
-        (n_rows,) or (n_rows, k) array
-            In the order of ``constraint_labels``; N where a row is in m, N m where it is in rad.  Where rows depend on
-            each other, the smallest multipliers, each times the scale of its row.
-        """
-        from ..analysis.constrained import multipliers
-
-        return multipliers(self, t, x, p, u, out)  # type: ignore[arg-type]
-
-    def reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
-        """Reaction forces and moments of all joints.
-
-        Parameters
-        ----------
-        t : float or (k,) array
-        x : (n_x,) or (n_x, k) array
-            States; projected onto the constraints first.
-        p, u, out : optional
-            As for every kernel.
-
-        Returns
-        -------
-        (n_joints, 6) or (n_joints, 6, k) array
-            Per joint of ``joint_names`` the force (N) and moment (N m) ``[Fx Fy Fz Mx My Mz]`` that the predecessor
-            exerts on the successor at the successor's marker, in ground axes.  Reactions do no work in the motion the
-            joint allows: forces of drives, friction, springs and couplings along its coordinates are not in them
-            (they act as torques where a coordinate turns, as forces where it slides).
-
-        Raises
-        ------
-        UsageError
-            A wrong shape, or a model without bodies.
-
-        Notes
-        -----
-        Where constraints are redundant, rigid bodies do not determine all of it: see :meth:`undetermined_reactions`.
-        Returned are then the reactions with the smallest sum of squares of all joints' forces and of their moments
-        divided by the model's length, wherever loops are cut.
-        """
-        from ..analysis.reactions import reactions
-
-        return reactions(self, t, x, p, u, out)  # type: ignore[arg-type]
-
-    def undetermined_reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
-        """Which components of :meth:`reactions` redundant constraints leave undetermined.
-
-        Returns
-        -------
-        (n_joints, 6) or (n_joints, 6, k) array of bool
-        """
-        from ..analysis.reactions import undetermined_reactions
-
-        return undetermined_reactions(self, t, x, p, u)  # type: ignore[arg-type]
-
-    def driving_forces(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Any]:
-        """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
-
-        Returns
-        -------
-        dict
-            Name of the element, or ``<name>.<row>`` where it has several rows, -> force or (k,) forces: the power they
-            bring in is the force times the rate of the row's left side, so that a driver that holds ``theta - f(t)``
-            at 0 exerts this torque along ``theta``.
-        """
-        from ..analysis.reactions import driving_forces
-
-        return driving_forces(self, t, x, p, u)  # type: ignore[arg-type]

@@ -13,12 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
+
+
+ENERGY = (
+    "the energy of the model {!r} is not known: its equations of motion are given without kinetic_energy; "
+    "give equations.kinetic_energy, and potential_energy where forces have one"
+)
 
 
 class Kernels:
@@ -72,7 +79,10 @@ class Kernels:
 
     def _make(self, maker: Callable[..., Any], name: str, nan: bool) -> Any:
         if name not in self.core.names:
-            return Missing(name, f"model {self.layout.name!r} was generated without the kernel {name!r}")
+            if name == "energy" and not self.layout.energy_known:
+                return Missing(name, ENERGY.format(self.layout.name))
+            message = f"model {self.layout.name!r} was generated without the kernel {name!r}"
+            return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
     def _poses(self, q: Array, t: float) -> Array:
@@ -93,7 +103,7 @@ class Kernels:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():
                 return ""
-            values, vectors = np.linalg.eigh(M)
+            values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
@@ -126,7 +136,7 @@ class Missing:
         ------
         UsageError
         """
-        raise UsageError(f"{self.message}; compile again with kernels=None for all, or name it in kernels")
+        raise UsageError(self.message)
 
 
 class Rows:

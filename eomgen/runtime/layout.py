@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,7 @@ class Layout:
             self.freedoms = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
+        self.energy_known: bool = data.get("energy_known", True)
         self.n_g: int = data.get("n_g", 0)
         self.n_s: int = data.get("n_s", 0)
         self.n_w: int = data.get("n_w", 0)
@@ -65,23 +66,26 @@ class Layout:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_com: int = data.get("n_com", 0)
+        self.n_m: int = data.get("n_m", 0)
+        self.n_dae: int = data.get("n_dae", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.n_e = len(self.fragile_forces)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
+        self.projects = data.get("baumgarte") is None  #: whether rhs takes the projected state
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
         self.length: float = float(data.get("length_scale") or 1.0)
-        self.scales = Scales.of_kinds(kinds, data.get("constraint_kinds", ()), self.length, self.space)
+        rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
+        self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
+        self.coefficient_rows = np.array(data.get("coefficient_rows", ()), dtype=np.intp)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
         self.place_scales = (
-            Scales.of_kinds(self.coordinate_kinds, data.get("constraint_kinds", ())[: self.n_h], self.length)
-            if self.given_rates
-            else self.scales
+            Scales.of_kinds(self.coordinate_kinds, rows[: self.n_h], self.length) if self.given_rates else self.scales
         )
         self.units: dict[str, str] = data.get("units", {})
         loop_kinds: Sequence[str] = data.get("loop_kinds") or [
@@ -96,6 +100,16 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+
+    def sized(self, C_q: Callable[[], Array]) -> tuple[Scales, Scales]:
+        """The scales, and those of positions, with parameters that may have other values than declared.
+
+        ``C_q`` gives the Jacobian (m, n) with the parameters' own values.
+        """
+        if not self.coefficient_rows.size:
+            return self.scales, self.place_scales
+        scales = self.scales.resized(C_q(), self.coefficient_rows)
+        return scales, self.place_scales._replace(c=scales.c[: len(self.place_scales.c)])
 
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.
@@ -120,9 +134,9 @@ class Layout:
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
-        return {"q": self.n_q, "x": self.n_x, "motion": self.n_q + 2 * self.n_v, "none": 0}.get(
-            KERNELS[kernel][0], 3 * self.n_dof + self.n_q
-        )
+        motion, dae = self.n_q + 2 * self.n_v, 2 * self.n_dae
+        sizes = {"q": self.n_q, "x": self.n_x, "motion": motion, "none": 0, "dae": dae, "dae_cj": dae + 1}
+        return sizes.get(KERNELS[kernel][0], 3 * self.n_dof + self.n_q)
 
     def shape(self, kernel: str) -> tuple[int, ...]:
         """Shape of a kernel's result for one state."""
@@ -237,5 +251,8 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
     "needed_wrenches": ("motion", ("n_s",)),
     "wrench_geometry": ("q", ("n_w",)),
+    "canonical": ("x", (2, "n_m")),
+    "dae_residual": ("dae", ("n_dae",)),
+    "dae_jacobian": ("dae_cj", ("n_dae", "n_dae")),
     "scales": ("none", ("n_v+n_c",)),
 }

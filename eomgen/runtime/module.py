@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..numeric.scales import Array
 from .analyses import Analyses
 from .assembled import Assembled
+from .forms import Forms
 from .kernels import Kernels, Rows
 from .kinematic_analyses import KinematicAnalyses
 from .layout import Layout
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 
-class Module(Assembled, Analyses, KinematicAnalyses, Momenta):
+class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
@@ -255,8 +256,6 @@ class Module(Assembled, Analyses, KinematicAnalyses, Momenta):
         from .simulate import simulate
 
         return simulate(self, span, initial, parameters, inputs, method=method, **options)
-
-    # description
 
     def report(self) -> str:
         """What the model is made of, as text."""

@@ -14,9 +14,11 @@ import numpy as np
 
 from ..errors import SingularMassMatrixError
 from ..numeric import embedded, projection
+from ..numeric.definite import SINGULAR, correlated
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian
+from ..numeric.system import Factored, Pattern
 from .layout import Layout
 
 #: driver -> blocks it is made from; a tree needs neither position nor rate
@@ -64,14 +66,19 @@ class Drivers:
             names = [n for n in names if n != "outputs"]
         if "mass_times" in blocks:
             names += ["mass_matrix", "embedded_mass_matrix"]
-        elif "terms" not in blocks and (loops or "mass_matrix" not in blocks):
+        elif "terms" not in blocks and ("mass_matrix" not in blocks or (loops and "position" not in blocks)):
             names = [n for n in names if n != "embedded_mass_matrix"]
         if "acceleration_tangent" in blocks:
             names.append("jacobian")
         names += [name for name, what in SHIFTS.items() if not blocks.keys().isdisjoint((what, SHIFTED[name]))]
         if loops and "terms" not in blocks:
             names = [n for n in names if n != "kinematics"]
-        self.names = tuple(names)
+        if "system" in blocks:
+            self.pattern = Pattern(layout.metadata["system"])
+            names += ["rhs", *(["outputs"] if "accelerated_outputs" in blocks else [])]
+            if not layout.projects and ("residual_jacobian" in blocks or "residual_tangent" in blocks):
+                names.append("jacobian")
+        self.names = (*names, *(["dae_jacobian"] if "dae_tangent" in blocks else []))
         self._scales: tuple[Array, Scales] | None = None
 
     def make(self, name: str) -> Callable[..., Array]:
@@ -84,7 +91,7 @@ class Drivers:
         known = "mass_matrix" in self.blocks or "mass_times" in self.blocks
         if name in ("rhs", "jacobian", "outputs", *SHIFTS) and known and not self.layout.n_c:
             M = self._matrix(t, x[: self.layout.n_q], u, c)
-            if np.isfinite(M).all() and np.linalg.eigvalsh(M)[0] <= embedded.SINGULAR * M.diagonal().max():
+            if np.isfinite(M).all() and np.linalg.eigvalsh(correlated(M))[0] <= SINGULAR:
                 return 2
         return 1
 
@@ -160,6 +167,9 @@ class Drivers:
 
     def _rhs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, layout = self.layout.n_q, self.layout
+        if "system" in self.blocks:
+            x = self._project(t, x, u, c) if layout.n_c and layout.projects else x
+            return np.concatenate([layout.scales.rates(x[:n], x[n:]), self._solve(t, x, u, c)[0]])
         terms, position, rate = self._bound(t, u, c)
         given = self.given(t, u, c)
         return embedded.rhs(terms, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent, given)
@@ -172,6 +182,8 @@ class Drivers:
             changes = np.asarray(self.blocks["acceleration_tangent"](t, along, u, c), dtype=float)
             dq, dv = unit[:n], unit[n:]
             return np.vstack([dv if space is None else space.change(x[:n], dq, x[n:, None], dv), changes])
+        if not layout.projects:
+            return self._jacobian_given(t, x, u, c)
         terms, position, rate = self._bound(t, u, c)
         residuals = partial(self.residuals, t, u, c)
         given, scales = self.given(t, u, c), self.scales(c)
@@ -206,6 +218,33 @@ class Drivers:
         return shift_jacobian(
             terms, residuals, shifts, position, rate, x[:n_q], x[n_q:], self.scales(c), layout.rank, layout.independent
         )
+
+    def _solve(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, Array, Factored]:
+        """Accelerations (n_v,) at a state by the method's linear system, all its unknowns, and its factors."""
+        flat = np.asarray(self.blocks["system"](t, x, u, c), dtype=float)
+        places = len(self.pattern.places[0])
+        entries, r, sizes = np.split(flat, [places, places + self.pattern.size])
+        system = self.pattern.factor(entries, sizes)
+        z = system.solve(r)
+        a = self.blocks["joint_accelerations"](t, np.concatenate([x, z]), u, c)
+        return np.asarray(a, dtype=float), z, system
+
+    def _dae_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        n = self.layout.n_dae
+        along = np.vstack([np.repeat(x[: 2 * n, None], n, axis=1), np.eye(n), x[2 * n] * np.eye(n)])
+        return np.asarray(self.blocks["dae_tangent"](t, along, u, c), dtype=float)
+
+    def _jacobian_given(self, t: float, x: Array, u: Array, c: Array) -> Array:
+        """The derivative of a right-hand side that does not project: K [da; dl] = -[dr1; dr2]."""
+        layout = self.layout
+        n, n_q, space = layout.n_v, layout.n_q, layout.space
+        q, v = x[:n_q], x[n_q:]
+        a, z, system = self._solve(t, x, u, c)
+        r = self.residuals(t, u, c, q, v, a, z[n:])
+        right = np.vstack([np.hstack([r.r1_q, r.r1_v]), np.hstack([r.r2_q, r.r2_v])])
+        da = np.array([system.solve(-column)[:n] for column in right.T]).T
+        dq, dv = np.eye(n_q, n_q + n), np.eye(n, n_q + n, n_q)
+        return np.vstack([dv if space is None else space.change(q, dq, v[:, None], dv), da])
 
     def _matrix(self, t: float, q: Array, u: Array, c: Array) -> Array:
         """M, written out or column by column."""
@@ -248,8 +287,11 @@ class Drivers:
 
     def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         x = self._project(t, x, u, c)
-        x_dot = self.blocks["rhs"](t, x, u, c) if "rhs" in self.blocks else self._rhs(t, x, u, c)
-        a = np.asarray(x_dot, dtype=float)[self.layout.n_q :]
+        if "system" in self.blocks:
+            a = self._solve(t, x, u, c)[0]
+        else:
+            x_dot = self.blocks["rhs"](t, x, u, c) if "rhs" in self.blocks else self._rhs(t, x, u, c)
+            a = np.asarray(x_dot, dtype=float)[self.layout.n_q :]
         if not np.isfinite(a).all() and self.singular("outputs", t, x, u, c) == 2:
             raise SingularMassMatrixError("the mass matrix is singular")
         return np.asarray(self.blocks["accelerated_outputs"](t, np.concatenate([x, a]), u, c), dtype=float)

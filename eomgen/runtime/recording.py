@@ -43,7 +43,7 @@ class Columns:
             (loops, self._loops),
             (layout.y, self._outputs),
             (layout.u, lambda: self.u),
-            (("T", "V", "energy"), lambda: self.energies),
+            (("T", "V", "energy") if layout.energy_known else (), lambda: self.energies),
         ]
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
@@ -87,6 +87,11 @@ class Columns:
             turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
             y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
         return y.reshape(3 * layout.n_k, -1)
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy."""
+        return self.module.layout.energy_known
 
     @cached_property
     def energies(self) -> Array:

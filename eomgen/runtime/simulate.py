@@ -113,10 +113,10 @@ def simulate(
         solver = choose_solver(method)
         title = solver.__name__
         check_options(solver, options, OPTIONS)
-    start, end = span_of(span, float(declared["end"]))
+    start, end = find_span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
-    x0 = _initial_state(bound, initial, start)
+    x0 = find_state(bound, initial, start)
     u0 = forcing(start, x0)
     forcing.require_finite()
     bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
@@ -133,7 +133,7 @@ def simulate(
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end), end]
-    stored = None if t_eval is None else times_of(t_eval, start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
     try:
         if compiled:
             solution, failure = integrate_compiled(
@@ -174,11 +174,11 @@ def _follow_drivers(
     from ..analysis.driven import simulate_driven
 
     forcing = Forcing(module.layout, inputs)
-    start, end = span_of(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.base = bound.u
     listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
-    stored = None if t_eval is None else times_of(t_eval, start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
     return simulate_driven(bound, (start, end), initial, forcing, stored, [Event(e) for e in listed], given)
 
@@ -266,8 +266,8 @@ def _check(run: _Run, solution: Solution, start: float, end: float, method: str)
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
 
 
-def span_of(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
-    """Start and end (s) of what a user gives as the span."""
+def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
     if np.ndim(span) == 0:
@@ -278,8 +278,8 @@ def span_of(span: float | tuple[float, float] | None, declared: float) -> tuple[
     return float(pair[0]), float(pair[1])
 
 
-def times_of(t_eval: ArrayLike, start: float, end: float) -> Array:
-    """Times to store, checked."""
+def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
+    """The times wanted, in order and within the span, or a UsageError."""
     times = np.array(t_eval, dtype=float)
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)
@@ -289,7 +289,8 @@ def times_of(t_eval: ArrayLike, start: float, end: float) -> Array:
     return times
 
 
-def _initial_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+def find_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected."""
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):

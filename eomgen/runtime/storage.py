@@ -29,8 +29,15 @@ class Stored:
         return np.asarray(self._rows[name])
 
     @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy."""
+        return self._energies is not None or {"T", "V", "energy"} <= self._rows.keys()
+
+    @property
     def energies(self) -> Array:
         """Kinetic, potential and total energy (3, n_t)."""
+        if not self.has_energies:
+            raise UsageError("the model of this trajectory has no energy: it has no kinetic_energy")
         if self._energies is None:  # a file of an earlier version
             return np.array([self["T"], self["V"], self["energy"]])
         return self._energies
@@ -55,9 +62,10 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
         "t": trajectory.t,
         "x": trajectory.x,
         "columns": values,
-        "energies": trajectory.energies,
         "header": np.array(json.dumps(header)),
     }
+    if trajectory.has_energies:
+        arrays["energies"] = trajectory.energies
     for k, (t, x) in enumerate(zip(trajectory.t_events, trajectory.x_events, strict=True)):
         arrays[f"t_events_{k}"], arrays[f"x_events_{k}"] = t, x
     with target.open("wb") as file:

@@ -37,6 +37,8 @@ class Source(Protocol):
 
     @property
     def energies(self) -> Array: ...
+    @property
+    def has_energies(self) -> bool: ...
 
     def __getitem__(self, name: str) -> Array: ...
 
@@ -125,7 +127,7 @@ class Trajectory:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
         from .storage import Stored
 
-        columns = Stored(self.names, self.to_numpy(), self.energies)
+        columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
     def at(self, t: ArrayLike) -> Trajectory:
@@ -172,8 +174,19 @@ class Trajectory:
         return frame
 
     @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy: equations of motion may be given without."""
+        return self._columns.has_energies
+
+    @property
     def energies(self) -> Array:
-        """Kinetic, potential and total energy (J), (3, n_t)."""
+        """Kinetic, potential and total energy (J), (3, n_t).
+
+        Raises
+        ------
+        UsageError
+            The equations of motion were given without kinetic energy.
+        """
         return self._columns.energies
 
     @property

@@ -24,6 +24,7 @@ from eomgen import pipeline
 from eomgen.errors import ModelError
 
 METHODS = ["embedding", "lagrange"]
+FORMS = ["recursive", "augmented", "newton_euler", "amalgamated", "gibbs_appell", "hamilton"]
 MORE = ["offset_slider_crank", "spatial_loop", "powered_slider_crank", "powered_arm", "skewed_four_bar", "three_cranks"]
 DIGITS = 1e-11
 SEED = 2  # a branched tree
@@ -99,7 +100,10 @@ def test_methods_agree_on_compiled_random_mechanisms(planar: bool, loop: bool) -
 # against the judges
 
 
-def judge(mod: Any, rigid: judges.RigidBodies, x: np.ndarray, forces: Callable[..., Any] | None = None) -> None:
+def judge(
+    mod: Any, rigid: judges.RigidBodies, x: np.ndarray, forces: Callable[..., Any] | None = None, others: Any = ()
+) -> None:
+    """Compare the accelerations of a module, and of others of the same model, with those of the judge."""
     n = mod.n_q
     q, v = x[:n], x[n:]
     bodies = judges.Bodies(mod, q, v)
@@ -107,7 +111,10 @@ def judge(mod: Any, rigid: judges.RigidBodies, x: np.ndarray, forces: Callable[.
     if forces is not None:
         h = h - forces(mod, bodies, q, v)
     a = judges.augmented(M, h, *judges.loop_terms(mod, q, v)) if mod.n_c else np.linalg.solve(M, -h)
-    judges.agree(mod.rhs(0.0, x)[n:], a, DIGITS, max(embedded_condition(mod, q), np.linalg.cond(M)))
+    cond = max(embedded_condition(mod, q), np.linalg.cond(M))
+    judges.agree(mod.rhs(0.0, x)[n:], a, DIGITS, cond)
+    for other in others:
+        judges.agree(other.rhs(0.0, x)[n:], a, 10 * DIGITS, cond)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -184,6 +191,35 @@ def test_models_against_newton_euler_with_multipliers(module: Callable[..., Any]
     rigid = judges.rigid_bodies(models.build(name).mechanism())
     for x in judges.random_states(mod, 5, 4):
         judge(mod, rigid, x, FORCES.get(name))
+
+
+@pytest.mark.parametrize(
+    "name", [*models.EXAMPLE_NAMES, "offset_slider_crank", "spatial_loop", "skewed_four_bar", "three_cranks"]
+)
+def test_forms_against_newton_euler_with_multipliers(module: Callable[..., Any], name: str) -> None:
+    """Every other form, redundant and nonholonomic rows included; M, h and M a + h are those of embedding too."""
+    kernels = ["rhs", "mass_matrix", "bias", "inverse_dynamics"]
+    forms = [models.build(name).compile(method, target="numpy", kernels=kernels) for method in FORMS]
+    rigid = judges.rigid_bodies(models.build(name).mechanism())
+    states = judges.random_states(module(name), 5, 3)
+    for form in forms:
+        compare(form, module(name), states, np.random.default_rng(6), t=0.3)
+    for x in states:
+        judge(module(name), rigid, x, FORCES.get(name), forms)
+
+
+@pytest.mark.parametrize("seed", [3, 8, 21, 34, 55])
+def test_forms_on_random_mechanisms_against_newton_euler_with_multipliers(seed: int) -> None:
+    """Trees and loops, planar and spatial, of mixed joints either way round; redundant rows where a loop is planar."""
+    made = random_mechanism(
+        seed, 2 + seed % 3, planar=seed % 5 == 3, reverse=True, forces=False, loop=seed % 2 == 0 or seed == 3
+    )
+    mod = derived(made, "embedding").compile(target="numpy")
+    forms = [derived(made, method).compile(target="numpy", kernels=["rhs"]) for method in FORMS]
+    rigid = judges.RigidBodies(made.masses, made.centers, made.inertias, made.gravity)
+    assert mod.n_dof
+    for x in states_of(mod, seed, 2):
+        judge(mod, rigid, x, others=forms)
 
 
 # MuJoCo

@@ -128,3 +128,10 @@ def test_an_exported_package_stands_alone(tmp_path: Path) -> None:
     module = tied().compile(target="numpy")
     x = module.x0(a=0.3, c=0.2, r=0.5)
     assert [float(word) for word in done.stdout.split()] == pytest.approx(module.rhs(0.0, x), rel=1e-13)
+
+
+def test_derivatives_by_inputs_and_parameters_are_refused() -> None:
+    module = tied().compile(target="numpy")
+    for name in ("input_jacobian", "parameter_jacobian"):
+        with pytest.raises(eg.UsageError, match="given as functions of its velocities"):
+            getattr(module, name)(0.0, np.zeros(module.n_x))

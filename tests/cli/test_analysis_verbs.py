@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -21,13 +23,24 @@ KEYS = {
     "equilibrium": {
         "name", "method", "t", "coordinates", "unknowns", "supports", "forces", "steps", "eigenvalues", "stability",
     },
+    "reactions": {
+        "name", "method", "t", "end", "joints", "components", "reactions", "undetermined", "constraints",
+        "multipliers", "files",
+    },
+    "inverse": {
+        "name", "method", "t", "forces", "accelerations", "constraints", "multipliers", "joints", "reactions",
+    },
+    "impact": {
+        "name", "method", "t", "names", "impulses", "energy_lost", "x", "rates_before", "rates_after", "constraints",
+        "constraint_impulses",
+    },
     "sensitivity": {"name", "method", "t", "names", "held", "steps", "final", "files"},
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("verb", KEYS)
 def test_keys_of_json(call: Call, verb: str) -> None:
-    words = ["--end", "0.05", "--by", "r,theta"] if verb == "sensitivity" else []
+    words = {"sensitivity": ["--end", "0.05", "--by", "r,theta"], "impact": ["--stop", "s"]}.get(verb, [])
     result = call(verb, CRANK, "--target", "numpy", "--json", *words)
     assert result.code == 0, result.err
     assert set(result.json) == KEYS[verb]
@@ -85,3 +98,45 @@ def test_sensitivity(call: Call, tmp_path) -> None:
     assert (tmp_path / "by.csv").read_text().startswith("t,d(")
     assert call(*words, "--by", "l9").code == 2
     assert call(*words, "--out", "by.txt").code == 2
+
+
+def test_reactions(call: Call, tmp_path: Path) -> None:
+    found = call("reactions", CRANK, "--target", "numpy", "--json").json
+    assert found["joints"] == ["A", "B", "C", "D"]
+    assert np.array(found["undetermined"])[:, 2:5].all()
+    text = call("reactions", CRANK, "--target", "numpy").out
+    assert "0*" in text
+    assert "the constraints are redundant" in text
+    out = tmp_path / "r.csv"
+    peaks = call("reactions", CRANK, "--target", "numpy", "--end", "0.1", "--out", out, "--json").json
+    table = np.genfromtxt(out, delimiter=",", names=True, deletechars="")
+    assert peaks["files"] == [str(out)]
+    np.testing.assert_allclose(np.abs(table["A.Fx"]).max(), abs(peaks["reactions"][0][0]), rtol=1e-12)
+    np.testing.assert_allclose(table["A.Fx"][0], found["reactions"][0][0], rtol=1e-9)
+    archive = tmp_path / "r.npz"
+    assert call("reactions", CRANK, "--target", "numpy", "--end", "0.1", "--out", archive).code == 0
+    np.testing.assert_allclose(np.load(archive)["reactions"][0], table["A.Fx"])
+    assert call("reactions", CRANK, "--target", "numpy", "--out", out).code == 2
+
+
+def test_inverse(call: Call) -> None:
+    words = ("inverse", CRANK, "--target", "numpy", "--json", "--accelerate", "theta=3")
+    found = call(*words).json
+    other = call(*words, "--actuated", "tau").json
+    assert abs(found["accelerations"]["theta_ddot"] - 3.0) < 1e-12
+    declared = call("linearise", CRANK, "--target", "numpy", "--json").json["inputs"]
+    assert declared == ["tau"]
+    assert set(other["forces"]) == {"tau"}
+    np.testing.assert_allclose(other["reactions"], found["reactions"], atol=1e-9)
+    assert "N m" in call("inverse", CRANK, "--target", "numpy").out
+    failed = call("inverse", CRANK, "--target", "numpy", "--actuated", "thet")
+    assert failed.code == 2
+    assert "did you mean 'theta'" in failed.err
+
+
+def test_impact(call: Call) -> None:
+    found = call("impact", CRANK, "--target", "numpy", "--json", "--gap", "s=0.5", "--set", "theta=0.3").json
+    np.testing.assert_allclose(found["rates_after"][0], -0.5 * found["rates_before"][0], rtol=1e-9)
+    assert found["energy_lost"] > 0.0
+    assert "energy lost" in call("impact", CRANK, "--target", "numpy", "--stop", "s").out
+    assert call("impact", CRANK, "--target", "numpy").code == 2

@@ -27,8 +27,8 @@ def test_what_is_printed(call: Call) -> None:
 def test_json(call: Call) -> None:
     run = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1", "--json").json
     assert set(run) == {
-        "name", "method", "choice", "report", "operations", "seconds", "integration", "loop_residual", "energy",
-        "change_points", "final", "files",
+        "name", "method", "choice", "system", "report", "operations", "seconds", "integration", "loop_residual",
+        "energy", "change_points", "final", "files",
     }  # fmt: skip
     assert set(run["seconds"]) >= {"describe", "kinematics", "equations", "compile", "simulate"}
     assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls", "jacobians"}
@@ -47,7 +47,7 @@ def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
     trajectory = eomgen.load_trajectory("run.npz")
     travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
     driven = "type: driver" in path.read_text(encoding="utf-8")
-    assert travel > (0.1 if driven else 1.0)
+    assert travel > (0.1 if driven else 0.4)
     assert run["loop_residual"]["projected"] < 1e-10
     balance = run["energy"]["power_balance"]
     assert balance is None if driven else balance < 1e-7

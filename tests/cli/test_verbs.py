@@ -68,7 +68,7 @@ def test_derive_prints_the_size_of_the_equations(call: Call) -> None:
 
 def test_derive_json(call: Call) -> None:
     derived = call("derive", EXAMPLES / "slider_crank.yaml", "--method", "lagrange", "--json").json
-    assert set(derived) == {"name", "method", "choice", "report", "operations", "seconds"}
+    assert set(derived) == {"name", "method", "choice", "system", "report", "operations", "seconds"}
     assert derived["method"] == "lagrange"
     counts = {"multiplications", "additions", "divisions", "negations", "functions", "choices", "total"}
     assert {frozenset(operations) for operations in derived["operations"].values()} == {frozenset(counts)}

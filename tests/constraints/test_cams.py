@@ -320,3 +320,63 @@ def test_a_lift_by_points_through_a_periodic_spline() -> None:
         assert a[at] == pytest.approx(s_ddot, abs=0.01 if 0 < float(degrees) < 120 else 0.3)
     run = mod.simulate((0, 1), initial={"phi": 0.1, "phi_dot": 20.0})
     assert np.ptp(run["s"]) == pytest.approx(h, rel=1e-3)
+
+
+# -- profiles that must close ----------------------------------------------------------------------------------------
+OPEN = [
+    ("lift", "0.01*theta", "value is 0 at theta = 0 and 0.0628319 at 2 pi"),
+    ("lift", "k*theta*(2*pi - theta)", "slope is 0.0628319 at theta = 0 and -0.0628319 at 2 pi at the declared values"),
+    ("lift", "law(theta)", "value is 0.01"),
+    ("contour", "0.05 + 0.01*theta", "value is 0.05 at theta = 0 and 0.112832 at 2 pi"),
+    ("support", "0.05 + k*theta*(2*pi - theta)", "slope"),
+]
+
+
+def lifted(key: str, law: str, **keys: Any) -> eg.Model:
+    m = eg.Model("open", gravity=(0, -9.81, 0))
+    m.parameter("k", 0.01)
+    m.table("law", [0, 2, 4, 6.5], [0.01, 0.02, 0.03, 0.01])  # not of a period of a turn
+    wheel, follower = m.body("wheel", mass=1, inertia={"zz": 0.01}), m.body("follower", mass=0.5)
+    m.revolute("A", m.ground, wheel, coordinate="phi")
+    m.prismatic("D", m.ground, follower, axis="y", coordinate="s")
+    if key == "lift":
+        m.cam("track", "A", "D", lift=law, **keys)
+    else:
+        face = follower.marker("face", at=(0, 0, 0), rpy=(-np.pi / 2, 0, 0))
+        m.cam_contact("track", wheel, face, "flat_face", **{key: law}, **keys)
+    m.independent("phi")
+    return m
+
+
+@pytest.mark.parametrize(("key", "law", "message"), OPEN)
+def test_a_periodic_profile_that_does_not_close_is_refused(key: str, law: str, message: str) -> None:
+    with pytest.raises(eg.ModelError) as caught:
+        lifted(key, law).check()
+    (problem,) = caught.value.problems
+    assert problem.path == f"constraints.track.{key}"
+    assert problem.message.startswith("does not close after a turn: its ")
+    assert message in problem.message
+    assert "periodic: false" in problem.remedy
+
+
+def test_within_one_turn_a_profile_need_not_close() -> None:
+    """The energy of a lift of constant slope stays, beyond 2 pi too: it is a rack then."""
+    mod = lifted("lift", "0.01*theta", periodic=False).compile()
+    run = mod.simulate((0, 0.2), initial={"phi": 6.0, "phi_dot": 5.0}, rtol=1e-10, atol=1e-12)
+    assert run["phi"][-1] > TAU
+    assert run["s"] == pytest.approx(0.01 * run["phi"], abs=1e-12)
+    energy = [sum(mod.energy(x)) for x in run.x.T]
+    assert np.ptp(energy) < 1e-9
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        "0.03",
+        "0.03 + 1e-9*sin(theta)",
+        "where(theta < pi, k*(1 - cos(2*theta)), 0)",  # a rise and return, then a dwell
+        "k*(sin(theta)**2 + cos(theta)**2)",
+    ],
+)
+def test_profiles_that_close_are_taken(law: str) -> None:
+    assert lifted("lift", law).check().degrees_of_freedom == 1

@@ -126,7 +126,7 @@ import crank
 x = crank.x0(theta=0.3, theta_dot=10.0)
 values = {
     "t": 0.0, "x": x, "q": x[:3], "v": x[3:], "a": x[3:], "q_i": x[:1], "v_i": x[3:4], "a_i": x[3:4],
-    "x_min": [0.3, 10.0], "span": 1.0,
+    "x_min": [0.3, 10.0], "span": 1.0, "y": np.ones(crank.dae.n_y), "yp": np.ones(crank.dae.n_y), "cj": 2.0,
 }
 tried = 0
 for call, shape in re.findall(r"^    (\\w.*\\)) -> (\\(.*?\\)|Module|Trajectory): ", crank.__doc__, re.M):

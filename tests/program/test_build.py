@@ -13,7 +13,7 @@ from eomgen.graph.substitute import symbols_of
 from eomgen.program import KERNELS, Limits, build_program
 from eomgen.program.hoist import count_apart, hoist
 
-DERIVATIVES = ["input_jacobian", "parameter_jacobian"]
+DERIVATIVES = ["input_jacobian", "parameter_jacobian", "dae_jacobian"]
 
 
 def names(program):

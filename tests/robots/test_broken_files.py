@@ -7,11 +7,14 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import eomgen as eg
 from eomgen.cli import main
 from eomgen.robots import xml_text
+from eomgen.robots.mjcf_files import COPIES, _Scan
+from eomgen.robots.xml_text import read_xml
 
 ARM = """<robot name="arm">
   <link name="base"/>
@@ -197,6 +200,41 @@ def test_mjcf_faults(line: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(eg.ModelError, match=said):
         eg.load(path)
     assert exit_code("check", path) == 1
+
+
+PART = '<mujocoinclude><replicate count="150"><body><freejoint/><geom size="0.1"/></body></replicate></mujocoinclude>'
+COPIED = {
+    '<worldbody><replicate count="150"><include file="part.xml"/></replicate></worldbody>': 150 + 2 * 150 * 150,
+    "<worldbody>" + 3 * '<replicate count="30"><body/></replicate>' + "</worldbody>": 3 * (30 + 30),
+    '<worldbody><replicate count="150"><include file="part.xml"/></replicate></worldbody>'.replace("150", "1"): 301,
+    '<worldbody><replicate count="40"><body/><replicate count="50"><body/></replicate></replicate></worldbody>': 4080,
+    '<asset><model name="p" file="part.xml"/></asset><worldbody><replicate count="50"><frame>'
+    '<attach model="p" body="b"/></frame></replicate></worldbody>': 50 + 300 + 50 * 300,
+    "<worldbody>" + 400 * "<body/>" + "</worldbody>": 0,
+}
+
+
+@pytest.mark.parametrize(("line", "made"), COPIED.items())
+def test_copies_add_up_over_siblings_and_multiply_by_nesting_also_through_includes(
+    line: str, made: int, tmp_path: Path
+) -> None:
+    """Replications themselves and the bodies in them, counted by hand."""
+    (tmp_path / "part.xml").write_text(PART)
+    path = tmp_path / "model.xml"
+    path.write_text(f"<mujoco>\n{line}\n</mujoco>")
+    scan = _Scan(read_xml(path), None)
+    scan.elements(read_xml(path))
+    scan.attachments()
+    assert scan.made == made
+    assert [p.message for p in scan.problems] == ["makes too many bodies"] * (made > COPIES)
+
+
+def test_sibling_replications_of_moderate_size_load(tmp_path: Path) -> None:
+    path = tmp_path / "model.xml"
+    row = '<replicate count="30" offset="0 0 1"><geom size="0.1"/></replicate>'
+    path.write_text(f'<mujoco><worldbody><body name="b"><joint/>{3 * row}</body></worldbody></mujoco>')
+    mass = eg.load(path).mechanism().bodies[0].mass
+    assert mass.value == pytest.approx(90 * 1000 * 4 / 3 * np.pi * 0.1**3)
 
 
 def test_sizes_are_bounded(arm: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,7 +53,7 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     }
     correct_linear(M, w + AT_G, r, scaled, w); /* of minimum norm: no small pivot makes it large */
     embed_mass(w);
-    status = ldl_factor(embedded_size(w + AT_B, w + AT_MASS), w + AT_EMBEDDED);
+    status = ldl_factor(w + AT_B, w + AT_MASS, w + AT_EMBEDDED);
     if (status != 0) {
         return status;
     }

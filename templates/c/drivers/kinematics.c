@@ -13,11 +13,11 @@ static int close_dependent(double t, double *restrict q, const double *restrict 
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }
-        if (has_settled(count, size, before)) {
+        if (has_settled(count, size, before, C, w + AT_J, q, s)) {
             return 0;
         }
         if (count == 50) {
-            return size <= 1e-10 ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(1e-10, C, w + AT_J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
         form_rows(w + AT_J, C, N + 1, w);
         const int status = split(N + 1, 1, &parts, w);

@@ -1,26 +1,29 @@
-/* The largest sum of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. */
-static double embedded_size(const double *restrict B, const double *restrict mass)
+/* The sums of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. Returns the largest. */
+static double embedded_sizes(const double *restrict B, const double *restrict mass, double *restrict sizes)
 {
     double largest = 0.0;
     for (int k = 0; k < F; k++) {
-        double sum = 0.0;
+        sizes[k] = 0.0;
         for (int i = 0; i < N; i++) {
-            sum += B[i * F + k] * B[i * F + k] * mass[i * N + i];
+            sizes[k] += B[i * F + k] * B[i * F + k] * mass[i * N + i];
         }
-        largest = sum > largest ? sum : largest;
+        largest = sizes[k] > largest ? sizes[k] : largest;
     }
     return largest;
 }
 
-/* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is lost in rounding. */
-static int ldl_factor(double largest, double *restrict a)
+/* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is lost in rounding, of its own entry
+   or of a zero beside the largest. */
+static int ldl_factor(const double *restrict B, const double *restrict mass, double *restrict a)
 {
+    double sizes[F];
+    const double largest = embedded_sizes(B, mass, sizes);
     for (int j = 0; j < F; j++) {
         double d = a[j * F + j];
         for (int k = 0; k < j; k++) {
             d -= a[j * F + k] * a[j * F + k] * a[k * F + k];
         }
-        if (d <= 1e-13 * largest) { /* NaN shows in the result */
+        if (d <= 1e-13 * sizes[j] || d <= 1e-22 * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         a[j * F + j] = d;

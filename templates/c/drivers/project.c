@@ -38,11 +38,11 @@ static int close_position(double t, double *restrict q, const double *restrict u
         form_scaled(C + MH, s, w + AT_J);
         /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
         const int status = factor_gram(MH, J, fmax(GENTLE, mean_residual(C, s)), w + AT_G);
-        if (status != 0 || last || has_settled(step, size, before)) {
+        if (status != 0 || last || has_settled(step, size, before, C, J, q, s)) {
             return status;
         }
         if (step == 25) {
-            return size <= 1e-10 ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(1e-10, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
         for (int i = 0; i < MH; i++) {
             e[i] = C[i] / s[N + i];

@@ -14,6 +14,9 @@ EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v
     }
 }
 
+/* The coordinate whose rate is velocity k; 0 if there is none. */
+#define coordinate_of(q, k) ((q)[k])
+
 /* The change of q' where q and v change by dq and dv. */
 EOMGEN_SHARED void change_rates(const double *restrict x, const double *restrict dq, const double *restrict dv,
                                 double *restrict change)

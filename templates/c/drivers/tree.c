@@ -1,15 +1,17 @@
 /* M = L^T D L in place, packed lower triangle, over the paths to ground: L[i, j] only where j is on i's path
-   (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.5). Status 2 where a pivot is not safely positive. */
+   (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, section 6.5). Status 2 where a pivot is lost in the
+   rounding of its own entry, or is what rounding leaves of a zero. */
 static int tree_factor(double *restrict H, const double *restrict s)
 {
-    double largest = 0.0;
+    double largest = 0.0, own[N];
     for (int k = 0; k < N; k++) {
-        const double entry = H[k * (k + 1) / 2 + k] * s[k] * s[k];
+        own[k] = H[k * (k + 1) / 2 + k];
+        const double entry = own[k] * s[k] * s[k];
         largest = entry > largest ? entry : largest;
     }
     for (int k = N - 1; k >= 0; k--) {
         double *const row = H + k * (k + 1) / 2;
-        if (row[k] * s[k] * s[k] <= 1e-13 * largest) { /* NaN shows in the result */
+        if (row[k] <= 1e-13 * own[k] || row[k] * s[k] * s[k] <= 1e-22 * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         for (int i = PARENT[k]; i >= 0; i = PARENT[i]) {

@@ -1,0 +1,199 @@
+"""Analysis: any state -> the nearest one on the constraints, near in a metric of one's own, with values held.
+
+Least change of positions, d^T W d with C = 0, by steps along the constraints and back onto them; then of velocities, in
+one linear step (Blajer, Elimination of constraint violation and accuracy aspects in numerical simulation of multibody
+systems, Multibody System Dynamics 7 (2002), 265-284, has W = M).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import ProjectionError, UsageError
+from ..numeric.projection import ACCEPTED, EXACT, TIKHONOV, gram_solver, largest
+from ..numeric.scales import Array
+from ..runtime.layout import Layout
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
+CLOSING = 25  #: Newton steps onto the constraints, at most
+STILL = 1e-12  #: scaled step along the constraints at which the nearest position is found
+RANK = 1e-9  #: relative to the largest singular value of the scaled constraint Jacobian
+DAMPING = 0.5  #: largest scaled step
+
+
+def find_consistent(
+    module: Module,
+    x: ArrayLike,
+    t: float = 0.0,
+    *,
+    weights: Mapping[str, float] | str | None = None,
+    hold: Sequence[str] = (),
+    p: Any = None,
+    u: Any = None,
+) -> Array:
+    """See :meth:`~..runtime.force_analyses.ForceAnalyses.consistent`."""
+    module = module if p is None and u is None else module.bind(p, u)
+    layout = module.layout
+    state = np.array(x, dtype=float)
+    if state.shape != (layout.n_x,):
+        raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
+    if layout.given_rates:
+        raise UsageError(
+            "consistent() needs q' = v; project(x) also serves models whose rates of coordinates are given"
+        )
+    held = (hold,) if isinstance(hold, str) else tuple(hold)
+    _check_names(layout, weights, held)
+    if not layout.n_c:
+        return np.asarray(module.project(state, t=t))
+    q = _positions(module, state[: layout.n_q], t, weights, held)
+    return np.concatenate([q, _velocities(module, q, state[layout.n_q :], t, weights, held)])
+
+
+def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
+    if isinstance(weights, str) and weights != "mass":
+        raise UsageError(f"weights must be a mapping of names to weights, or 'mass', not {weights!r}")
+    given = () if weights is None or isinstance(weights, str) else tuple(weights)
+    allowed = tuple(dict.fromkeys((*layout.freedoms, *layout.v)))
+    for what, names in (("weights", given), ("hold", held)):
+        for name in names:
+            if name not in allowed:
+                near = get_close_matches(name, allowed, 1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                raise UsageError(f"{what}: no coordinate or velocity {name!r}{hint}; there are {', '.join(allowed)}")
+    if isinstance(weights, Mapping):
+        for name, weight in weights.items():
+            if not (np.isfinite(weight) and weight > 0.0):
+                raise UsageError(f"weights: that of {name} must be positive, not {weight}; hold= keeps a value exactly")
+
+
+def _metric(
+    module: Module, q: Array, t: float, weights: Mapping[str, float] | str | None, names: Sequence[str]
+) -> Array:
+    """The lower triangle L of W = L L^T; by default 1 over the square of each coordinate's scale."""
+    layout = module.layout
+    if weights == "mass":
+        try:
+            return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
+        except np.linalg.LinAlgError:
+            raise UsageError(
+                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass"
+            ) from None
+    factors = np.ones(layout.n_v)
+    if isinstance(weights, Mapping):
+        for i, (freedom, name) in enumerate(zip(layout.freedoms, names, strict=True)):
+            factors[i] = weights.get(name, weights.get(freedom, 1.0))
+    return np.diag(np.sqrt(factors) / layout.scales.q)
+
+
+def _move(layout: Layout, q: Array, d: Array) -> Array:
+    return q + d if layout.space is None else layout.space.move(q, d)
+
+
+def _difference(layout: Layout, a: Array, b: Array) -> Array:
+    return a - b if layout.space is None else layout.space.difference(a, b)
+
+
+def _positions(
+    module: Module, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+) -> Array:
+    """The q nearest to the start with C(q, t) = 0.
+
+    Raises
+    ------
+    ProjectionError
+    """
+    layout = module.layout
+    start = start if layout.space is None else layout.space.normalised(start)
+    free = np.array([name not in held for name in layout.freedoms])
+    n_h = layout.n_h
+    if not n_h:
+        return start
+    L = _metric(module, start, t, weights, layout.freedoms)[np.ix_(free, free)]
+    scales = layout.scales
+
+    def rows(q: Array) -> tuple[Array, Array]:
+        C_q = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
+        return module.constraints(q, t=t, rows="all") / scales.c[:n_h], np.linalg.solve(L, C_q.T).T
+
+    def moved(q: Array, y: Array) -> Array:
+        step = np.zeros(layout.n_v)
+        step[free] = np.linalg.solve(L.T, y)
+        longest = largest(step / scales.q)
+        return _move(layout, q, step * min(1.0, DAMPING / longest) if longest else step)
+
+    def close(q: Array) -> Array | None:
+        """The nearest closed position to first order, None if there is none near by."""
+        before = np.inf
+        for _ in range(CLOSING):
+            C, J = rows(q)
+            size = largest(C)
+            if size <= EXACT or (size <= ACCEPTED and size > 0.5 * before):
+                return q
+            if not np.isfinite(size) or not J.any():
+                return None
+            q, before = moved(q, -J.T @ gram_solver(J, max(TIKHONOV, size))(C)), size
+        return None
+
+    def change(q: Array) -> Array:
+        return np.asarray(L.T @ _difference(layout, q, start)[free])
+
+    q = close(start)
+    if q is None:
+        kept = f" with {', '.join(held)} held" if held else ""
+        C, _ = rows(start)
+        worst = layout.constraint_labels[int(np.abs(C).argmax())]
+        raise ProjectionError(
+            f"no consistent position was found{kept}: {worst} is open by {largest(C):.2g} (scaled) in the state given"
+        )
+    share = 1.0
+    for _ in range(STEPS if free.any() else 0):
+        _, J = rows(q)
+        _, sizes, Vt = np.linalg.svd(J, full_matrices=False)
+        across = Vt[sizes > RANK * sizes[0]]
+        y = change(q)
+        slope = y - across.T @ (across @ y)
+        if largest(np.linalg.solve(L.T, slope) / scales.q[free]) <= STILL:
+            break
+        trial = close(moved(q, -share * slope))
+        if trial is not None and float(change(trial) @ change(trial)) < float(y @ y):
+            q, share = trial, min(1.0, 2.0 * share)
+        elif share < STILL:
+            break
+        else:
+            share *= 0.5
+    return q
+
+
+def _velocities(
+    module: Module, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+) -> Array:
+    """The v nearest to the given ones that the constraints allow.
+
+    Raises
+    ------
+    ProjectionError
+    """
+    layout, scales = module.layout, module.layout.scales
+    free = np.array([name not in held for name in layout.v])
+    L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
+    J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
+    J = np.linalg.solve(L, J.T).T
+    v = np.array(v)
+    for _ in range(3):  # again, so that the Tikhonov term leaves no trace
+        rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
+        v[free] -= np.linalg.solve(L.T, J.T @ gram_solver(J)(rate))
+    rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
+    if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
+        worst = layout.constraint_labels[int(np.abs(rate).argmax())]
+        raise ProjectionError(
+            f"no consistent velocities with {', '.join(held)} held: the rate of {worst} is left at {largest(rate):.2g}"
+        )
+    return v

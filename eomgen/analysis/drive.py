@@ -1,0 +1,281 @@
+"""Analysis: a motion -> the forces of drives that make it, with loops closed: constrained inverse dynamics.
+
+With C_q a + gamma = 0 and B spanning the velocities that the constraints allow, B^T (M a + h) = B^T S tau, where a unit
+of tau_i does work on coordinate i alone (Shabana, Computational Dynamics, sec. 5.7; Y. Nakamura, M. Ghodoussi, Dynamics
+computation of closed-link robot mechanisms with nonredundant and redundant actuators, IEEE Trans. Robotics and
+Automation 5 (1989), 294-302).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.layout import Layout
+from .constrained import RANK, States, prepare, solve_multipliers
+from .tables import as_text
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+REACHED = 1e-8  #: largest share of the needed forces that may be left over
+AFFINE = 1e-9  #: relative deviation from a straight line at which forces count as linear in an input
+
+
+@dataclass(frozen=True)
+class ActuatorForces:
+    """What drives exert so that the model moves as it should.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Driven coordinates (forces to add to those of the model) and inputs (their whole values).
+    forces : (n,) or (n, k) array
+        N, N m, or the unit of the input.
+    q, v, a : arrays
+        The motion, on the constraints.
+    multipliers : (n_rows,) or (n_rows, k) array
+        Of all constraint rows, with these forces acting.
+    reactions : (n_joints, 6) or (n_joints, 6, k) array or None
+        Of all joints, with these forces acting; None for a model without bodies.
+    """
+
+    names: tuple[str, ...]
+    forces: Array
+    q: Array
+    v: Array
+    a: Array
+    multipliers: Array
+    reactions: Array | None
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.names:
+            raise UsageError(f"no drive {name!r}; there are {', '.join(self.names)}")
+        return self.forces[self.names.index(name)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Name -> force, as ``inputs=`` of ``simulate`` and ``u=`` take them where all drives are inputs."""
+        return dict(zip(self.names, self.forces, strict=True))
+
+    def __repr__(self) -> str:
+        if self.forces.ndim > 1:
+            return f"<ActuatorForces of {', '.join(self.names)} at {self.forces.shape[1]} states>"
+        facts = [(name, f"{value:.6g}") for name, value in self.as_dict().items()]
+        return as_text("Forces of the drives", facts)
+
+
+def find_forces(
+    module: Module,
+    t: ArrayLike,
+    x: ArrayLike,
+    a: Mapping[str, ArrayLike] | ArrayLike | None = None,
+    *,
+    actuated: Sequence[str] | None = None,
+    p: Any = None,
+    u: Any = None,
+) -> ActuatorForces:
+    """See :meth:`~..runtime.analyses.Analyses.actuator_forces`."""
+    module = module if p is None and u is None else module.bind(p, u)
+    layout = module.layout
+    states = prepare(module, t, x)
+    count = len(states.t)
+    names = _drives(layout, actuated)
+    C_q, free = states.jacobian(), states.accelerations()
+    bases = [_basis(J, layout) for J in C_q]
+    accelerations = _complete(states, bases, free, a)
+    needed = states.residual(accelerations)
+    S, base = _effects(states, names)
+    weights = np.array([_size(layout, name) for name in names])
+    forces = np.zeros((len(names), count))
+    for k, B in enumerate(bases):
+        A = B.T @ S[:, :, k]
+        want = B.T @ (needed[:, k] + S[:, :, k] @ base)
+        found = np.linalg.lstsq(A / weights, want, rcond=RANK)[0] / weights
+        left = want - A @ found
+        if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), 1e-300):
+            raise UsageError(_out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None))
+        forces[:, k] = found
+    rest = needed - np.einsum("jik,ik->jk", S, forces - base[:, None])
+    multipliers = solve_multipliers(C_q, rest, layout.scales)
+    reactions = None
+    if module.metadata.get("wrenches"):
+        reactions = _with_drives(states, names, accelerations, multipliers, forces)
+    shaped = states.shaped
+    return ActuatorForces(
+        names,
+        shaped(forces),
+        shaped(states.q),
+        shaped(states.v),
+        shaped(accelerations),
+        shaped(multipliers),
+        None if reactions is None else shaped(reactions),
+    )
+
+
+def _size(layout: Layout, name: str) -> float:
+    """What a force is multiplied by before forces of different kinds are compared: a length of the model for N."""
+    if name in layout.freedoms:
+        return float(layout.scales.q[layout.freedoms.index(name)])
+    return float(layout.loop_scales[layout.loops.index(name)]) if name in layout.loops else 1.0
+
+
+def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
+    """Coordinates or inputs by name.
+
+    Raises
+    ------
+    UsageError
+    """
+    if actuated is None:
+        return tuple(layout.freedoms[i] for i in layout.independent)
+    names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+    allowed = [*layout.freedoms, *layout.loops, *layout.u]
+    for name in names:
+        if name not in allowed:
+            near = get_close_matches(name, allowed, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise UsageError(f"actuated: no coordinate or input {name!r}{hint}; there are {', '.join(allowed)}")
+    if not names or len(set(names)) < len(names):
+        raise UsageError("actuated: at least one coordinate or input, each once")
+    return names
+
+
+def _basis(J: Array, layout: Layout) -> Array:
+    """Velocities that the constraints allow (n_v, n_dof), in scaled coordinates."""
+    s = layout.scales
+    if not len(J):
+        return np.diag(s.q)
+    _, sizes, Vt = np.linalg.svd(J * (s.q / s.c[:, None]))
+    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
+    return np.asarray(s.q[:, None] * Vt[rank:].T)
+
+
+def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Array:
+    """Accelerations that the constraints allow, (n_v, k).
+
+    Raises
+    ------
+    UsageError
+        Unknown names, a wrong shape, or accelerations that break the constraints.
+    """
+    layout = states.module.layout
+    count = free.shape[1]
+    if a is None or isinstance(a, Mapping):
+        given: Mapping[str, Any] = {} if a is None else a
+        rows = {layout.freedoms[i]: int(i) for i in layout.independent}
+        keys = rows | {layout.a[i]: i for i in rows.values()}
+        for name in given:
+            if name not in keys:
+                raise UsageError(
+                    f"a: {name!r} is no independent coordinate or its acceleration; there are {', '.join(keys)}"
+                )
+        values = np.zeros((layout.n_v, count))
+        for name, value in given.items():
+            values[keys[name]] = np.broadcast_to(np.asarray(value, dtype=float), (count,))
+        chosen = list(layout.independent)
+        result = np.array(free)
+        for k, B in enumerate(bases):
+            if not B.shape[1]:
+                continue
+            part = B[chosen]
+            if np.linalg.cond(part) > 1 / RANK:
+                raise UsageError(
+                    f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not tell the others (a dead "
+                    "centre): give a of all velocities"
+                )
+            result[:, k] += B @ np.linalg.solve(part, values[chosen, k] - free[chosen, k])
+        return result
+    array = np.asarray(a, dtype=float)
+    wanted = (layout.n_v,) if states.single else (layout.n_v, count)
+    if array.shape != wanted:
+        raise UsageError(f"a must have shape {wanted} [{', '.join(layout.a)}], not {array.shape}")
+    result = np.array(array.reshape(layout.n_v, count))
+    if layout.n_c:
+        J = states.jacobian()
+        off = np.einsum("kij,jk->ik", J, result - free) / layout.scales.c[:, None]
+        size = np.einsum("kij,jk->ik", np.abs(J), np.abs(result) + np.abs(free)) / layout.scales.c[:, None]
+        worst = np.unravel_index(int((np.abs(off) / (size + 1.0)).argmax()), off.shape)
+        if np.abs(off[worst]) > 1e-6 * (size[worst] + 1.0):
+            raise UsageError(
+                f"a breaks the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
+                f"t = {states.t[int(worst[1])]:g}; name the independent accelerations (a={{...}}) instead"
+            )
+    return result
+
+
+def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
+    """Generalized forces (n_v, n, k) of a unit of each drive, and what each drive has already (n,)."""
+    module, layout = states.module, states.module.layout
+    count = len(states.t)
+    S, base = np.zeros((layout.n_v, len(names), count)), np.zeros(len(names))
+    loops = None
+    for i, name in enumerate(names):
+        if name in layout.freedoms:
+            S[layout.freedoms.index(name), i] = 1.0
+        elif name in layout.loops:
+            if loops is None:
+                loops = states.evaluate(module.kernels.state("loop_coordinate_jacobian"), states.q)
+            S[:, i] = loops[layout.loops.index(name)]
+        else:
+            j = layout.u.index(name)
+            base[i] = module.u[j]
+            S[:, i] = _input_effect(states, j)
+    return S, base
+
+
+def _input_effect(states: States, j: int) -> Array:
+    """Generalized forces (n_v, k) of a unit of an input, in which forces must be linear."""
+    module = states.module
+    h = []
+    for step in (-1.0, 0.0, 1.0):
+        u = module.u
+        u[j] += step
+        h.append(np.asarray(module.bias(states.t, states.x, u=u)))
+    slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
+    if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), 1e-300):
+        raise UsageError(f"forces are not linear in the input {module.u_names[j]!r}; give the coordinate it drives")
+    return np.asarray(slope)
+
+
+def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: float, k: int | None) -> str:
+    """Why drives cannot make a motion, by the freedom they do not move."""
+    U, sizes, _ = np.linalg.svd(A)
+    rank = int((sizes > RANK * max(sizes.max(initial=0.0), 1e-300)).sum())
+    motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
+    moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
+    where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
+    return (
+        f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
+        f"{', '.join(moved[:4])}; {layout.n_dof} degrees of freedom need as many drives, "
+        f"such as {', '.join(layout.freedoms[i] for i in layout.independent)}"
+    )
+
+
+def _with_drives(states: States, names: Sequence[str], a: Array, multipliers: Array, forces: Array) -> Array:
+    """Reactions of all joints while the drives act."""
+    from .reactions import find_reactions
+
+    module, layout = states.module, states.module.layout
+    inputs = [i for i, name in enumerate(names) if name in layout.u and name not in layout.freedoms]
+    loops = [i for i, name in enumerate(names) if name in layout.loops]
+    cut = {layout.loops.index(names[i]): forces[i] for i in loops}
+    if not inputs:
+        return find_reactions(states, a, multipliers, cut)[0]
+    parts = []
+    for k in range(len(states.t)):
+        u = module.u
+        for i in inputs:
+            u[layout.u.index(names[i])] = forces[i, k]
+        some = slice(k, k + 1)
+        one = states._replace(module=module.bind(u=u), t=states.t[some], x=np.ascontiguousarray(states.x[:, some]))
+        own = {j: force[some] for j, force in cut.items()}
+        now, held = (np.ascontiguousarray(y[:, some]) for y in (a, multipliers))
+        parts.append(find_reactions(one, now, held, own)[0])
+    return np.concatenate(parts, axis=-1)

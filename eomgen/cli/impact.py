@@ -1,0 +1,32 @@
+"""Stage cli, impact: model file -> the state after an impact at the initial state, impulses, energy lost."""
+
+from __future__ import annotations
+
+import click
+
+from .analysis import Prepared, analysis_options, time_option
+from .options import parse_settings
+from .screen import print_heading, print_json, print_rows
+
+
+@click.command()
+@analysis_options
+@time_option
+@click.option("--gap", multiple=True, metavar="NAME=E", help="Coordinate or output that closes, with its restitution.")
+@click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked; repeat it for more.")
+def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...], as_json: bool) -> None:
+    """An impact without friction at the initial state, by Newton's law of restitution."""
+    module = work.module
+    found = module.impact(t, module.x0(work.initial or None, t=t), parse_settings(gap), lock=stop)
+    after = dict(zip(module.x_names, found.x.tolist(), strict=True))
+    if as_json:
+        print_json(
+            work.heading(t)
+            | {"names": found.names, "impulses": found.impulses, "energy_lost": found.energy_lost, "x": after}
+            | {"rates_before": found.rates_before, "rates_after": found.rates_after}
+            | {"constraints": module.constraint_labels, "constraint_impulses": found.constraint_impulses}
+        )
+        return
+    click.echo(repr(found))
+    print_heading("velocities after it")
+    print_rows([(name, f"{after[name]:.6g} {module.layout.unit(name)}") for name in module.v_names])

@@ -1,0 +1,44 @@
+"""Stage cli, inverse: model file -> the forces of chosen drives that make a motion."""
+
+from __future__ import annotations
+
+import click
+
+from .analysis import Prepared, analysis_options, time_option
+from .options import parse_settings
+from .screen import print_heading, print_json, print_rows
+
+
+@click.command()
+@analysis_options
+@time_option
+@click.option("--actuated", multiple=True, metavar="NAME", help="Driven coordinate or input; repeat it for more.")
+@click.option(
+    "--accelerate", multiple=True, metavar="NAME=VALUE", help="Acceleration of an independent coordinate, 0 by default."
+)
+def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tuple[str, ...], as_json: bool) -> None:
+    """Constrained inverse dynamics at the initial state: forces of drives for given accelerations, loops closed."""
+    module = work.module
+    x = module.x0(work.initial or None, t=t)
+    found = module.actuator_forces(t, x, parse_settings(accelerate), actuated=actuated or None)
+    if as_json:
+        print_json(
+            work.heading(t)
+            | {"forces": found.as_dict(), "accelerations": dict(zip(module.layout.a, found.a, strict=True))}
+            | {"constraints": module.constraint_labels, "multipliers": found.multipliers}
+            | {"joints": module.joint_names, "reactions": found.reactions}
+        )
+        return
+    print_heading(f"forces of the drives at t = {t:g} s")
+    print_rows([(name, f"{value:.6g} {_unit(module, name)}") for name, value in found.as_dict().items()])
+    print_heading("accelerations")
+    print_rows([(name, f"{value:.6g} {module.layout.unit(name)}") for name, value in
+                zip(module.layout.a, found.a, strict=True)])  # fmt: skip
+
+
+def _unit(module: object, name: str) -> str:
+    """Unit of the force along a coordinate, or of an input."""
+    layout = module.layout  # type: ignore[attr-defined]
+    if name in layout.u:
+        return str(layout.unit(name))
+    return {"m": "N", "rad": "N m"}.get(layout.unit(name), "")

@@ -1,0 +1,38 @@
+"""Stage equations: Kinematics -> absolute accelerations, joint accelerations and reactions in one sparse linear system.
+
+The amalgamated formulation (Shabana, Computational Dynamics, sec. 7.8: recursive methods, "amalgamated formulations"):
+nothing is eliminated, so that every coefficient is simple and most are zero.  Unknowns are the six accelerations of
+each body, the accelerations of the joint coordinates, the wrench through each joint of the tree, and a multiplier for
+each equation of a cut joint or coupling.
+"""
+
+from __future__ import annotations
+
+from ..graph.core import Expr
+from ..kinematics import Kinematics
+from .equations import LinearSystem, TreeEquations
+from .free_bodies import FreeBodies, cut_joints, scaled, sub
+from .free_body_system import Forces, Unknowns, free_body_equations
+
+
+def derive(kinematics: Kinematics) -> TreeEquations:
+    """The amalgamated equations of all bodies and joints."""
+    return free_body_equations(kinematics, "amalgamated", _system(kinematics))
+
+
+def _system(kinematics: Kinematics) -> LinearSystem:
+    bodies, unknowns = FreeBodies(kinematics), Unknowns(kinematics)
+    parts = [(unknowns.six(), unknowns.take(len(link.columns)), unknowns.six()) for link in kinematics.links]
+    motions, reactions = [m for m, _, _ in parts], [f for _, _, f in parts]
+    a = [x for _, rates, _ in parts for x in rates]
+    forces = Forces(bodies, cut_joints(bodies), unknowns)
+    balances = bodies.balances(motions, reactions)
+    closing = forces.close(balances, motions, a)
+    residuals: list[Expr] = []
+    for k, (link, balance) in enumerate(zip(kinematics.links, balances, strict=True)):
+        joint = bodies.relative(k, motions)
+        for c, column in enumerate(link.columns):
+            joint = sub(joint, scaled(a[link.first + c], column))
+        residuals += [*joint[0], *joint[1], *bodies.powers(k, reactions[k], a, forces.pulls)]
+        residuals += [*balance[0], *balance[1]]
+    return forces.solve(residuals, closing, a)

@@ -1,0 +1,126 @@
+"""Stage equations: free bodies -> what the methods with reactions as unknowns share: symbols, constraints, M and h.
+
+M and h, which other calls of a module want, come from the same balances, summed from the tips inwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..frames import GROUND
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.differentiate import jacobian
+from ..graph.substitute import substitute
+from ..kinematics import Kinematics, Twist
+from ..kinematics.inertia import Wrench
+from .equations import LinearSystem, TreeEquations, linear_system
+from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
+
+
+def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
+    """What a method offers beside its linear system: M, h and energies from the balances of the bodies."""
+    graph, n = kinematics.graph, len(kinematics.v)
+    bodies = FreeBodies(kinematics)
+    inverse = _inverse_dynamics(bodies)
+    entries = jacobian(inverse, list(kinematics.a))
+    kinetic, potential = graph.zero, graph.zero
+    for k, (link, twist) in enumerate(zip(kinematics.links, kinematics.twists, strict=True)):
+        kinetic = kinetic + 0.5 * dot(twist, link.spatial.times(*twist))
+        pose = kinematics.poses.link(k)
+        centre = vec.add(pose.position, vec.times(pose.rotation, link.com))
+        potential = potential - link.mass * vec.dot(kinematics.mechanism.gravity, centre)
+    for terms in kinematics.forces:
+        potential = potential + (graph.zero if terms.potential is None else terms.potential)
+    return TreeEquations(
+        method=method,
+        mass_matrix=tuple(tuple(entries.get((max(i, j), min(i, j)), graph.zero) for j in range(n)) for i in range(n)),
+        bias=tuple(substitute(inverse, dict.fromkeys(kinematics.a, graph.zero))),
+        inverse_dynamics=tuple(inverse),
+        kinetic_energy=kinetic,
+        potential_energy=potential,
+        system=system,
+    )
+
+
+def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
+    """M a + h of the tree without drives: reactions from the balances, tips first, and their part along each joint."""
+    kinematics, graph = bodies.kinematics, bodies.graph
+    motions: list[Twist] = []
+    for link, product in zip(kinematics.links, bodies.products, strict=True):
+        above = motions[link.parent] if link.parent != GROUND else bodies.base
+        motion = add(link.down_twist(above), product)
+        for c, column in enumerate(link.columns):
+            motion = add(motion, scaled(kinematics.a[link.first + c], column))
+        motions.append(motion)
+    none: Wrench = vec.zero(graph), vec.zero(graph)
+    wrenches = bodies.balances(motions, [none] * len(motions))
+    result = [-f for f in bodies.forces]
+    for name, value in bodies.along_cut.items():
+        row = kinematics.loop_coordinates.jacobian[kinematics.loop_coordinates.names.index(name)]
+        result = [r - entry * value for r, entry in zip(result, row, strict=True)]
+    for k in reversed(range(len(wrenches))):
+        link = kinematics.links[k]
+        for c, column in enumerate(link.columns):
+            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
+        if link.parent != GROUND:
+            wrenches[link.parent] = add(wrenches[link.parent], lift(link, wrenches[k]))
+    return result
+
+
+class Unknowns:
+    """Symbols z[0], z[1], ..., handed out in order."""
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self.graph = kinematics.graph
+        self.symbols: list[Expr] = []
+
+    def take(self, count: int) -> list[Expr]:
+        """The next symbols."""
+        first = len(self.symbols)
+        self.symbols += [self.graph.symbol(f"z[{first + k}]") for k in range(count)]
+        return self.symbols[first:]
+
+    def six(self) -> Twist:
+        """The next six, as a twist or wrench."""
+        x = self.take(6)
+        return (x[0], x[1], x[2]), (x[3], x[4], x[5])
+
+
+class Forces:
+    """Multipliers of cut joints and couplings, their equations, and what they do to bodies and joints."""
+
+    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns) -> None:
+        self.bodies, self.cuts, self.unknowns = bodies, cuts, unknowns
+        self.first = len(unknowns.symbols)
+        self.multipliers = [unknowns.take(cut.closing) for cut in cuts]
+        self.rows = bodies.couplings
+        self.along = unknowns.take(len(self.rows))
+        constraints = bodies.kinematics.constraints
+        self.pulls = [bodies.graph.zero] * len(bodies.kinematics.v)  # C_q^T l of the couplings
+        for i, l in zip(self.rows, self.along, strict=True):
+            self.pulls = [f + entry * l for f, entry in zip(self.pulls, constraints.jacobian[i], strict=True)]
+
+    def close(self, balances: list[Wrench], motions: Sequence[Twist], a: Sequence[Expr]) -> list[Expr]:
+        """Apply the wrenches of cut joints to the balances; return all constraint equations."""
+        residuals: list[Expr] = []
+        for cut, multipliers in zip(self.cuts, self.multipliers, strict=True):
+            accelerations = cut.accelerations(motions, self.bodies.base)
+            cut.push(balances, multipliers, accelerations)
+            residuals += accelerations[: cut.closing]
+        constraints = self.bodies.kinematics.constraints
+        for i in self.rows:
+            total = constraints.gamma[i]
+            for entry, x in zip(constraints.jacobian[i], a, strict=True):
+                total = total + entry * x
+            residuals.append(total)
+        return residuals
+
+    def solve(self, residuals: Sequence[Expr], closing: Sequence[Expr], a: Sequence[Expr]) -> LinearSystem:
+        """The system of all equations, the constraints last."""
+        relaxed = [(len(residuals) + k, self.first + k) for k in range(len(closing))]
+        kinematics = self.bodies.kinematics
+        kinds = [kind for cut in self.cuts for kind in cut.kinds]
+        kinds += [kinematics.constraints.kinds[i] for i in self.rows]
+        sizes = [kinematics.length_scale if kind == "length" else self.bodies.graph.one for kind in kinds]
+        return linear_system([*residuals, *closing], self.unknowns.symbols, relaxed, sizes, a)

@@ -1,0 +1,46 @@
+"""Stage equations: Kinematics -> Newton-Euler equations in absolute accelerations and the reactions of all joints.
+
+Every body is set free and every joint, of the tree and cut ones alike, replaced by its reaction (Shabana,
+Computational Dynamics, ch. 3 and sec. 7.6).  Unknowns are the six accelerations of each body, the six components of
+the wrench through each joint of the tree, and a multiplier for each equation of a cut joint or coupling.
+"""
+
+from __future__ import annotations
+
+from ..graph.core import Expr
+from ..graph.symmetric import solve_symmetric
+from ..kinematics import Kinematics
+from .equations import LinearSystem, TreeEquations
+from .free_bodies import FreeBodies, add, cut_joints, dot, scaled, sub
+from .free_body_system import Forces, Unknowns, free_body_equations
+
+
+def derive(kinematics: Kinematics) -> TreeEquations:
+    """Newton-Euler equations of all bodies."""
+    return free_body_equations(kinematics, "newton_euler", _system(kinematics))
+
+
+def _system(kinematics: Kinematics) -> LinearSystem:
+    bodies, unknowns = FreeBodies(kinematics), Unknowns(kinematics)
+    pairs = [(unknowns.six(), unknowns.six()) for _ in kinematics.links]
+    motions, reactions = [m for m, _ in pairs], [f for _, f in pairs]
+    relative = [bodies.relative(k, motions) for k in range(len(pairs))]
+    a: list[Expr] = []
+    for link, motion in zip(kinematics.links, relative, strict=True):  # a = S^+ of the relative acceleration
+        gram = [[dot(x, y) for y in link.columns] for x in link.columns]
+        a += solve_symmetric(gram, [dot(column, motion) for column in link.columns])
+    cuts = cut_joints(bodies)
+    forces = Forces(bodies, cuts, unknowns)
+    pulls = forces.pulls
+    residuals: list[Expr] = []
+    balances = bodies.balances(motions, reactions)
+    closing = forces.close(balances, motions, a)
+    for k, (link, balance) in enumerate(zip(kinematics.links, balances, strict=True)):
+        # across the joint no relative acceleration, along it no force: two parts of one vector that are at right angles
+        joint = relative[k]
+        for c, column in enumerate(link.columns):
+            joint = sub(joint, scaled(a[link.first + c], column))
+        for column, power in zip(link.columns, bodies.powers(k, reactions[k], a, pulls), strict=True):
+            joint = add(joint, scaled(power, column))
+        residuals += [*joint[0], *joint[1], *balance[0], *balance[1]]
+    return forces.solve(residuals, closing, a)

@@ -1,0 +1,33 @@
+"""Stage numeric: a mass matrix -> whether it is safely positive definite, whatever the sizes of its coordinates.
+
+What a pivot is lost in is the rounding of its own diagonal entry: a watch beside a crane is as sound as either alone.
+So each is measured by its own size; only what rounding leaves of a zero, whose square is far below any inertia beside
+it, is measured by the largest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .scales import Array
+
+SINGULAR = 1e-13  #: smallest pivot, relative to its own diagonal entry
+NOTHING = 1e-22  #: smallest pivot, relative to the largest diagonal entry: the square of what rounding leaves of a zero
+
+
+def safely_positive(pivots: Array, sizes: Array) -> bool:
+    """Whether each pivot (n,) of L D L^T exceeds 1e-13 of its size (n,) and 1e-22 of the largest; NaN does not."""
+    return bool((pivots > np.maximum(SINGULAR * sizes, NOTHING * sizes.max(initial=0.0))).all())
+
+
+def correlated(M: Array) -> Array:
+    """M (n, n) with each coordinate in the unit that makes its own entry 1; 0 where no inertia is behind it.
+
+    Eigenvalues of the result say how well motions can be told apart by their inertia, in any units (A. van der Sluis,
+    Numerische Mathematik 14, 1969: this scaling is within a factor of n of the best).
+    """
+    size = M.diagonal()
+    unit = size > NOTHING * np.abs(size).max(initial=0.0)
+    negative = size < 0.0
+    scale = np.where(unit | negative, 1.0 / np.sqrt(np.where(unit | negative, np.abs(size), 1.0)), 0.0)
+    return np.asarray(scale[:, None] * M * scale)

@@ -1,0 +1,72 @@
+/* d = (L U)^-1 d */
+static void substitute_system(const double *restrict lu, const int *restrict plan, double *restrict d)
+{
+    const int *const last = plan + NZ, *const deep = plan + 2 * NZ;
+    for (int k = 0; k < NZ; k++) {
+        const double entry = d[plan[k]];
+        d[plan[k]] = d[k];
+        d[k] = entry;
+        for (int i = k + 1; i <= deep[k]; i++) {
+            d[i] -= lu[i * NZ + k] * entry;
+        }
+    }
+    for (int i = NZ - 1; i >= 0; i--) {
+        for (int j = i + 1; j <= last[i]; j++) {
+            d[i] -= lu[i * NZ + j] * d[j];
+        }
+        d[i] /= lu[i * NZ + i];
+    }
+}
+
+/* K z = r by steps with the factors of the relaxed K: the proximal point method, which of all solutions with redundant
+   constraints finds the one of least multipliers. Ends when the defect no longer halves. */
+static int solve_system(const double *restrict r, const int *restrict plan, double *restrict z, double *restrict w)
+{
+    const double *const K = w + AT_SYSTEM, *const row = w + AT_ROW, *const column = w + AT_COLUMN;
+    double *const d = w + AT_DEFECT;
+    double before = INFINITY;
+    for (int i = 0; i < NZ; i++) {
+        z[i] = 0.0;
+    }
+    for (int count = 0; count < 30; count++) {
+        double size = 0.0;
+        for (int i = 0; i < NZ; i++) {
+            d[i] = r[i];
+        }
+        for (int e = 0; e < PLACES; e++) {
+            d[PLACE[e][0]] -= K[e] * z[PLACE[e][1]];
+        }
+        for (int i = 0; i < NZ; i++) {
+            d[i] *= row[i];
+            size = fabs(d[i]) <= size ? size : fabs(d[i]);
+        }
+        if (!isfinite(size)) {
+            return EOMGEN_NON_FINITE;
+        }
+        if (size == 0.0 || (count > 1 && size > 0.5 * before)) {
+            return 0;
+        }
+        before = size;
+        substitute_system(w + AT_LU, plan, d);
+        for (int i = 0; i < NZ; i++) {
+            z[i] += column[i] * d[i];
+        }
+    }
+    return 0;
+}
+
+/* Accelerations a (N) of the state in w + AT_X; leaves z behind q and v in w + AT_MOTION, and the factors. */
+static int accelerate_system(double t, const double *restrict u, const double *restrict c, int *restrict plan,
+                             double *restrict a, double *restrict w)
+{
+    (void)system_block(t, w + AT_X, u, c, w + AT_SYSTEM, w);
+    balance_system(w);
+    int status = factor_system(w, plan);
+    if (status == 0) {
+        status = solve_system(w + AT_SYSTEM + PLACES, plan, w + AT_MOTION + NQ + N, w);
+    }
+    for (int k = 0; k < NQ + N; k++) {
+        w[AT_MOTION + k] = w[AT_X + k];
+    }
+    return status != 0 ? status : joint_accelerations_block(t, w + AT_MOTION, u, c, a, w);
+}
