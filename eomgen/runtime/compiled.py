@@ -21,6 +21,7 @@ from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
+    from .pace import Pace
     from .progress import Progress
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
@@ -68,8 +69,15 @@ def integrate_compiled(
     dense: bool,
     options: dict[str, Any],
     watch: Progress | None,
+    pace: Pace,
 ) -> tuple[Solution, tuple[int, float, Array] | None]:
-    """Integrate over the parts between `nodes` (start, corners, end); also the last evaluation that failed."""
+    """Integrate over the parts between `nodes` (start, corners, end); also the last evaluation that failed.
+
+    Raises
+    ------
+    Crawling
+        The steps lead nowhere, as `pace` judges.
+    """
     core: Any = module.core  # one with steppers
     context = module.kernels.context
     signals = [(i, 1, s.times, s.values) for i, s in forcing.varying.items() if isinstance(s, Table)]
@@ -94,6 +102,8 @@ def integrate_compiled(
         while status == 0:
             begun = perf_counter()
             status, t, rows = stepper.advance(steps, asked, done)
+            if status == 0:
+                pace.look(stepper.t, stepper.state(), steps)
             done += len(t)
             times.append(t)
             states.append(rows)

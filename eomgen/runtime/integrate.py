@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .names import require, unknown
+from .pace import Pace, watch_steps
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -118,8 +119,15 @@ def integrate(
     events: Sequence[Event],
     dense: bool,
     options: dict[str, Any],
+    pace: Pace,
 ) -> Solution:
-    """Integrate over the parts between `nodes` (start, corners, end)."""
+    """Integrate over the parts between `nodes` (start, corners, end).
+
+    Raises
+    ------
+    Crawling
+        The steps lead nowhere, as `pace` judges.
+    """
     scipy = require("scipy.integrate", "scipy", "simulate")
     times: list[Array] = []
     states: list[Array] = []
@@ -138,7 +146,7 @@ def integrate(
             rhs,
             span,
             x,
-            method=solver,
+            method=watch_steps(solver, pace),
             t_eval=asked,
             events=list(events) or None,
             dense_output=dense,

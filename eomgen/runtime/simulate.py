@@ -14,6 +14,7 @@ from .compiled import can_run, integrate_compiled
 from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
+from .pace import Crawling, Pace, describe_crawl, steepest
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
@@ -134,17 +135,28 @@ def simulate(
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end), end]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
         if compiled:
             solution, failure = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace
             )
             run.last = None if failure is None else ("rhs", *failure)
         else:
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
+                    run.watched(watch),
+                    nodes,
+                    x0,
+                    solver,
+                    stored,
+                    [Event(e) for e in listed],
+                    dense_output,
+                    options,
+                    pace,
                 )
+    except Crawling as crawl:
+        raise run.gave_up(crawl, end, title, options) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
@@ -237,6 +249,18 @@ class _Run:
     def cause(self) -> EvaluationError | None:
         """The last failure of a kernel as an exception."""
         return None if self.last is None else self.module.kernels.fail.exception(*self.last)
+
+    def troubled(self, t: float, x: Array) -> bool:
+        """Whether a state is at a singularity that can be named."""
+        return self.module.kernels.fail.trouble(x, t) is not None
+
+    def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
+        """The error for a run whose steps led nowhere."""
+        if self.troubled(crawl.t, crawl.x):
+            return self.ended(crawl.t, end, method, "", crawl.x)
+        with np.errstate(all="ignore"):
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
 
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
