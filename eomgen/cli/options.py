@@ -195,7 +195,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     """
     if not path.is_file():
         raise UsageError(_missing(path))
-    from ..describe import load
+    from ..loading import load
 
     options = dict(robot or {})
     if "lock" in options:
