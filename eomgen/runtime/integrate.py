@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .names import require, unknown
+from .names import require, require_time_and_state, unknown
 from .pace import Pace, watch_steps
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -38,6 +38,7 @@ class Event:
     def __init__(self, function: Any) -> None:
         if not callable(function):
             raise UsageError(f"an event must be a function f(t, x), not {function!r}")
+        require_time_and_state("an event", function)
         self.function = function
         self.terminal = getattr(function, "terminal", None) or 0
         self.direction = getattr(function, "direction", 0)

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .layout import Layout, number
-from .names import check_names
+from .names import check_names, require_time_and_state
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly
 
@@ -94,6 +94,7 @@ class Forcing:
         self.feedback = False
         for name, value in given.items():
             if callable(value):
+                require_time_and_state(f"input {name}: its function", value)
                 self.varying[layout.u.index(name)] = value
                 self.feedback = True
             elif isinstance(value, (tuple, list)) and len(value) == 2 and np.ndim(value[0]) > 0:

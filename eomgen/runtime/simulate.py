@@ -84,7 +84,8 @@ def simulate(
     Raises
     ------
     SimulationError
-        The integration ended early or met a state that is not finite; its cause is the last failure of a kernel.
+        The integration ended early, met a state that is not finite, or took steps that lead nowhere; its cause is the
+        last failure of a kernel, or the singularity or jump at which it gave up.
     AssemblyError
         The initial values do not fit the loops.
     EvaluationError
