@@ -145,7 +145,9 @@ def run(quick: bool) -> Report:
     limits = [Limit("over a loop of solve_ivp", mine / rate["solve_ivp, every 50th"], 600.0, at_least=True),
               Limit("over 4 lanes by hand", mine / rate[f"4 lanes by hand, {THREADS} threads"], 0.85, at_least=True)]  # fmt: skip
     if "heyoka" in results:
-        limits.append(Limit("over heyoka's batches", mine / rate[f"heyoka, batches, {THREADS} threads"], 1.8, at_least=True))
+        limits.append(
+            Limit("over heyoka's batches", mine / rate[f"heyoka, batches, {THREADS} threads"], 1.8, at_least=True)
+        )
     return Report(
         tables=(
             Table("runs a second", ("who", "median", "best", "eomgen's best over it"), rows),

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .describe import Model as Model
     from .describe import from_sympy as from_sympy
-    from .describe import load as load
+    from .loading import load as load
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
 
-_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "describe"}
+_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "loading"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",

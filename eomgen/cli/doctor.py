@@ -107,7 +107,7 @@ def _compiles() -> Finding:
     from math import sin
     from time import perf_counter
 
-    from ..describe import load
+    from ..loading import load
 
     start = perf_counter()
     try:

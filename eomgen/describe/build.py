@@ -65,6 +65,7 @@ def build(description: Description) -> Mechanism:
         faults.add("name", *fault)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
     build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
     contacts = declare_contacts(reader, sections["constraints"])
@@ -94,7 +95,6 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    numbers = {p.name: p.value for p in parameters if p.value is not None}
     check_bodies(bodies, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)

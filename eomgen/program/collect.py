@@ -19,6 +19,7 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import coefficient_rows, row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
+from .discs import describe_discs
 from .given_multipliers import multiplier_values
 from .program import Limits
 from .soundness import flag_forces
@@ -186,6 +187,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "masses": dict(_mass_parameters(kinematics)),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),
+        "rolling_discs": describe_discs(kinematics),
         "wrenches": wrenches.metadata() if (wrenches := find_wrenches(kinematics)) else None,
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),

@@ -21,6 +21,7 @@ from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
+    from .pace import Pace
     from .progress import Progress
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
@@ -78,6 +79,7 @@ def integrate_compiled(
     dense: bool,
     options: dict[str, Any],
     watch: Progress | None,
+    pace: Pace,
     events: Events | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
     """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
@@ -88,14 +90,14 @@ def integrate_compiled(
     (status, t, x) or None
         The last evaluation that failed.
     exception or None
-        What stopped the run from outside: an interrupt, or a function of the user's.
+        What stopped the run from outside: an interrupt, a function of the user's, or steps that lead nowhere.
     """
     core: Any = module.core  # one with steppers
     start, end = nodes[0], nodes[-1]
     events = events if events is not None and len(events) else None
     plan = {
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
-        "watch": None if watch is None else watch.look,
+        "watch": None if watch is None else watch.look, "pace": pace.look,
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)
     journey = core.journey(

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import UsageError, ZenoError
 from ..numeric.scales import Array
 from .layout import Layout
-from .names import check_names, unknown
+from .names import check_names, require_time_and_state, unknown
 from .tapes import Formula, is_formula, record_tape
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ class Event:
     ) -> None:
         if not callable(function):
             raise UsageError(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
+        require_time_and_state("an event", function)
         self.function, self.action = function, action
         self.name = name or str(getattr(function, "__name__", type(function).__name__))
         self.terminal = (getattr(function, "terminal", None) or 0) if terminal is None else terminal

@@ -14,6 +14,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import CROWD, CROWDED, GO_ON, WAIT, Event, Events
 from .names import require, unknown
+from .pace import Pace, watch_steps
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -104,9 +105,16 @@ def integrate(
     events: Sequence[Event],
     dense: bool,
     options: dict[str, Any],
+    pace: Pace,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
 ) -> Solution:
-    """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state."""
+    """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
+
+    Raises
+    ------
+    Crawling
+        The steps lead nowhere, as `pace` judges.
+    """
     scipy = require("scipy.integrate", "scipy", "simulate")
     times: list[Array] = []
     states: list[Array] = []
@@ -131,7 +139,7 @@ def integrate(
             rhs,
             span,
             x,
-            method=solver,
+            method=watch_steps(solver, pace),
             t_eval=asked,
             events=list(events) or None,
             dense_output=dense,

@@ -184,6 +184,19 @@ class Layout:
         self._check_masses(what, names, result)
         return result
 
+    def explain_constants(self, message: str, p: Any) -> str:
+        """The message that constants cannot be computed, with the names of the parameters; any other as it is."""
+        if "constants that follow" not in message:
+            return message
+        declared = self.metadata["p_values"]
+        given = declared if p is None else list(p)
+        named = list(zip(self.p, given, declared, strict=True))
+        changed = [f"{name} = {x:.6g}" for name, x, value in named if x != value]
+        shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
+        head = "the constants that follow from the parameters are not finite"
+        which = " (changed from their declared values)" if changed else ""
+        return f"{head} with {', '.join(shown)}{which}; look for a division by zero, a root or an overflow in a law"
+
     def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
         """Refuse a negative value of a parameter that is a body's mass."""
         for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
-from .names import check_names, unknown
+from .names import check_names, require_time_and_state, unknown
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -155,6 +155,7 @@ class Forcing:
             if isinstance(value, Signal):
                 self.varying[index] = value
             elif callable(value):
+                require_time_and_state(f"input {name}: its function", value)
                 self.varying[index] = value
                 self.feedback = self.foreign = True
             elif is_formula(value):

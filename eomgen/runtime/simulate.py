@@ -14,10 +14,10 @@ from ..errors import EvaluationError, SimulationError, SimulationInterrupted, Us
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events
-from .failure import rotation_trouble
 from .integrate import Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
+from .pace import Crawling, Pace, describe_crawl, steepest
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
@@ -99,7 +99,8 @@ def simulate(
     SimulationInterrupted
         Ctrl-C; ``trajectory`` of the exception has the run up to there.
     SimulationError
-        The integration ended early or met a state that is not finite; its cause is the last failure of a kernel.
+        The integration ended early, met a state that is not finite, or took steps that lead nowhere; its cause is the
+        last failure of a kernel, or the singularity or jump at which it gave up.
     AssemblyError
         The initial values do not fit the loops.
     EvaluationError
@@ -156,10 +157,11 @@ def simulate(
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     nodes = [start, *forcing.corners(start, end, compiled), end]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, watched
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -173,8 +175,10 @@ def simulate(
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output,
-                    options, partial(watched.reset, bound, forcing),
+                    options, pace, partial(watched.reset, bound, forcing),
                 )  # fmt: skip
+    except Crawling as crawl:
+        raise run.gave_up(crawl, end, title, options) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
@@ -275,10 +279,22 @@ class _Run:
         """The last failure of a kernel as an exception."""
         return None if self.last is None else self.module.kernels.fail.exception(*self.last)
 
+    def troubled(self, t: float, x: Array) -> bool:
+        """Whether a state is at a singularity that can be named."""
+        return self.module.kernels.fail.trouble(x, t) is not None
+
+    def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
+        """The error for a run whose steps led nowhere."""
+        if self.troubled(crawl.t, crawl.x):
+            return self.ended(crawl.t, end, method, "", crawl.x)
+        with np.errstate(all="ignore"):
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
+
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
         cause = self.cause()
-        trouble = None if x is None else rotation_trouble(self.module.layout, x)
+        trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
         if trouble is not None:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
         if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):

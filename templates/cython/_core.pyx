@@ -71,6 +71,8 @@ cdef cnp.ndarray doubles(object value, str label, object error):
     cdef cnp.ndarray array = cnp.PyArray_FROM_O(value)
     if cnp.PyArray_TYPE(array) == cnp.NPY_DOUBLE and cnp.PyArray_ISBEHAVED_RO(array):
         return array
+    if isinstance(value, dict):
+        raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
     if array.dtype.kind not in "biufO":
         raise error(f"{label} must hold real numbers, not {array.dtype}")
     return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)

@@ -99,7 +99,7 @@ cdef class Journey(Stepper):
         As for Stepper.
     plan : dict
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
-        watch: told the time now and then, or None; events: None, or a dict of names (how many of the model's, or 0),
+        watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
         tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
         resets: rows (event, state) of the model's kernel.
 
@@ -111,7 +111,8 @@ cdef class Journey(Stepper):
 
     cdef eomgen_journey journey
     cdef eomgen_events events
-    cdef object watch, outside
+    cdef object watch, pace, outside
+    cdef long seen
     cdef cnp.ndarray times, states, notes, pieces
     cdef list stored
     cdef double looked
@@ -132,7 +133,7 @@ cdef class Journey(Stepper):
         if plan["events"] is not None:
             self.expect(**plan["events"])
         self.allocate(256)
-        self.watch, self.looked = plan["watch"], perf_counter()
+        self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
         self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, 1
 
     cdef keep(self, values, kind):
@@ -271,6 +272,9 @@ cdef class Journey(Stepper):
             now = perf_counter()
             if self.watch is not None:
                 self.watch(t)
+            if self.pace is not None and self.run.steps > self.seen:
+                self.pace(t, copy(self.run.y_old, self.run.n), self.run.steps - self.seen)
+                self.seen = self.run.steps
         except BaseException as error:
             self.raised = error
             return 0

@@ -158,7 +158,7 @@ def test_wrong_calls() -> None:
         m.friction("f", b, 1)
     joint = m.spherical("J", m.ground, b)
     with pytest.raises(UsageError, match="is a joint; a body"):
-        m.force("f", joint, (0, 0, 0))
+        m.damper("f", joint, b, damping=1)
     with pytest.raises(UsageError, match=r"3 coordinates \(J_1, J_2, J_3\)"):
         _ = joint.coordinate
     with pytest.raises(AttributeError, match="did you mean 'revolute'"):

@@ -76,7 +76,9 @@ def test_the_files_of_each_target(packages):
     c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
     assert files["c"] == c_files | {"model.json", "README.md", "Makefile"}
     copied = {"errors.py"} | {
-        str(p.relative_to(ROOT)) for d in ("numeric", "runtime", "analysis", "ensembles") for p in (ROOT / d).glob("*.py")
+        str(p.relative_to(ROOT))
+        for d in ("numeric", "runtime", "analysis", "ensembles")
+        for p in (ROOT / d).glob("*.py")
     }
     python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}

@@ -347,3 +347,35 @@ def test_unknown_options_are_refused_with_the_nearest(pendulum):
             super().__init__(*args, **options)
 
     assert pendulum.simulate(0.1, method=Mine, anything=3).t[-1] == 0.1
+
+
+class Pushing:
+    def push(self, t):
+        return t
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda t: t, r"lambda>\(t\) does not take; write it with both, as lambda t, x"),
+        (Pushing().push, r"push\(t\) does not take"),
+        (lambda: 1.0, r"\(\) does not take"),
+        (lambda t, x, gain: gain, r"\(t, x, gain\) does not take; bind its other arguments"),
+    ],
+)
+def test_functions_of_other_arguments_are_refused_by_name(crank, function, said):
+    m = crank()
+    with pytest.raises(UsageError, match=rf"input tau: its function is called as f\(t, x\), which .*{said}"):
+        m.simulate((0, 0.1), inputs={"tau": function})
+    with pytest.raises(UsageError, match=rf"an event is called as f\(t, x\), which .*{said}"):
+        m.simulate((0, 0.1), events=function)
+
+
+@pytest.mark.parametrize("function", [lambda t, x: 0.0, lambda *a: 0.0, lambda t, x, gain=1.0: 0.0 * gain, max])
+def test_functions_of_time_and_state_are_taken_as_they_are(crank, function):
+    if function is max:  # shows no signature
+        function = np.frompyfunc(lambda t, x: 0.0, 2, 1)
+        with pytest.raises((UsageError, TypeError, ValueError)):
+            crank().simulate((0, 0.01), inputs={"tau": function})
+        return
+    assert crank().simulate((0, 0.01), inputs={"tau": function}).t[-1] == 0.01
