@@ -14,6 +14,7 @@ from .factor import exceeding, factorize, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
+from .slopes import ResidualSlopes, unrolled_jacobian
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
@@ -66,9 +67,16 @@ class BlockMaker:
     @cached_property
     def by_direction(self) -> bool:
         """Whether the Jacobian of the residuals is too large to be written out."""
+        if self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
+            return False
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
         return self.sizes.n_x * nodes > self.limits.jacobian_nodes
+
+    @cached_property
+    def slopes(self) -> ResidualSlopes:
+        """The derivatives of the residuals."""
+        return ResidualSlopes(self.terms, self.limits)
 
     # -- shared expressions ---------------------------------------------------------------------------------------
     @cached_property
@@ -225,6 +233,8 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+        elif name == "jacobian" and self.unrolled and (found := unrolled_jacobian(terms, self.slopes)):
+            outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
         elif name == "outputs" and self.unrolled:
@@ -251,7 +261,9 @@ class BlockMaker:
         if shift:
             return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
         if self.terms.by_columns:
-            return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
+            if name != "jacobian":
+                return ("mass_times",)
+            return ("acceleration_tangent",) if self.by_direction else ("terms", "scales", "residual_jacobian")
         if self.terms.system and (name in ("rhs", "outputs") or (name == "jacobian" and not self.terms.projects)):
             return self._system_needs(name, residual)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
@@ -287,7 +299,8 @@ class BlockMaker:
         terms, n = self.terms, self.sizes.n_v
         match name:
             case "terms":  # M lower packed, h, C_q, gamma
-                lower = [terms.mass_matrix[i][k] for i in range(n) for k in range(i + 1)]
+                mass = self.slopes.mass_matrix if terms.by_columns else terms.mass_matrix
+                lower = [mass[i][k] for i in range(n) for k in range(i + 1)]
                 every = [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
                 return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
@@ -311,7 +324,7 @@ class BlockMaker:
             case "accelerated_outputs":
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
-                return self._internal(name, "q v a multipliers", self._residual_jacobian())
+                return self._internal(name, "q v a multipliers", self.slopes.packed())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
             case "mass_times":  # M a
@@ -365,15 +378,3 @@ class BlockMaker:
         """q and v -> the symbols of their changes."""
         seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
         return dict(zip(self._symbols((*self.terms.q, *self.terms.v)), self._symbols(seeds), strict=True))
-
-    def _residual_jacobian(self) -> list[Expr]:
-        terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero
-        n_q = self.sizes.n_q
-        residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
-        entries = jacobian(residuals, self._symbols((*terms.q, *terms.v)))
-        result = []
-        for first, size, columns in ((0, n, "qv"), (n, m, "qv"), (n + m, m, "q")):
-            for column in columns:
-                start, width = (0, n_q) if column == "q" else (n_q, n)
-                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
-        return result

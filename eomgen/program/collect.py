@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
+from ..equations.slopes import ForceSlopes, can_differentiate
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -72,6 +74,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         system=equations.system,
         projects=c.stabilised is None,
         canonical=equations.canonical,
+        slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..equations.equations import LinearSystem
+from ..equations.slopes import ForceSlopes
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
 from ..kinematics.wrenches import JointWrenches
@@ -68,6 +70,7 @@ class SystemTerms:
     wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
+    slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 

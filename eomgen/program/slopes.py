@@ -1,0 +1,168 @@
+"""Stage program: SystemTerms -> derivatives of the residuals, and the Jacobian of a small tree as straight-line code.
+
+Derivatives of the forces M a + h come by recursion over composite bodies where that takes fewer operations than
+differentiating their formula.  For a tree d(v')/dx = -M^-1 d(M a + h)/dx at a = v', with the factor of M known
+(J. Carpentier, N. Mansard, Analytical derivatives of rigid body dynamics algorithms, RSS 2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+from ..equations.slopes import ForceSlopes
+from ..graph.core import Expr
+from ..graph.count import count
+from ..graph.differentiate import jacobian
+from ..graph.substitute import substitute
+from ..graph.traverse import reachable
+from .factor import Factor, factorize, path, positivity, solve
+from .program import Limits
+from .terms import SystemTerms
+
+Entries = dict[tuple[int, int], Expr]
+
+
+class ResidualSlopes:
+    """Derivatives by [q; v] of r1 = M a + h + C_q^T l, r2 = C_q a + gamma and r3 = C_q v + C_t.
+
+    Parameters
+    ----------
+    terms : SystemTerms
+    limits : Limits
+    """
+
+    def __init__(self, terms: SystemTerms, limits: Limits) -> None:
+        self.terms = terms
+        self.limits = limits
+
+    def _symbols(self, names: Sequence[str]) -> list[Expr]:
+        return [self.terms.graph.symbol(name) for name in names]
+
+    @cached_property
+    def forces(self) -> ForceSlopes | None:
+        """The recursion, where the tree has one."""
+        return self.terms.slopes() if self.terms.slopes is not None else None
+
+    @property
+    def recursive(self) -> bool:
+        """Whether the tree has the recursion."""
+        return self.terms.slopes is not None
+
+    @property
+    def mass_matrix(self) -> Sequence[Sequence[Expr]]:
+        """M, by composite bodies too."""
+        assert self.forces is not None
+        return self.forces.mass_matrix
+
+    @cached_property
+    def operations(self) -> int:
+        """Of the derivatives of M a + h by the recursion."""
+        return count(list(self._by_recursion.values())).total
+
+    @cached_property
+    def _by_recursion(self) -> Entries:
+        assert self.forces is not None
+        return self.joined(self.forces, self._symbols(self.terms.a))
+
+    def joined(self, forces: ForceSlopes, a: Sequence[Expr]) -> Entries:
+        n_q = len(self.terms.q)
+        return forces.by_position(a) | {(i, n_q + k): value for (i, k), value in forces.by_velocity.items()}
+
+    def is_short(self, rows: Sequence[Expr]) -> bool:
+        """Whether differentiating the formula is not too long to be tried."""
+        nodes = len(reachable(self.terms.graph, (r.id for r in rows)))
+        return (len(self.terms.q) + self.terms.n_v) * nodes <= self.limits.jacobian_nodes
+
+    def by_formula(self) -> Entries:
+        """Derivatives of M a + h from its formula."""
+        return jacobian(list(self.terms.inverse_dynamics), self._symbols((*self.terms.q, *self.terms.v)))
+
+    @cached_property
+    def entries(self) -> Entries:
+        """All that are not identically zero, in terms of (q, v, a, multipliers)."""
+        terms = self.terms
+        zero = terms.graph.zero
+        constraint_forces = [zero] * terms.n_v
+        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
+            constraint_forces = [r + c * l for r, c in zip(constraint_forces, row, strict=True)]
+        a = self._symbols(terms.a)
+        r2 = []
+        for row, r in zip(terms.constraint_jacobian, terms.gamma, strict=True):
+            for c, x in zip(row, a, strict=True):
+                r = r + c * x
+            r2.append(r)
+        rest = [*r2, *terms.velocity_constraints]
+        wrt = self._symbols((*terms.q, *terms.v))
+        if not self.recursive:
+            forces = [x + y for x, y in zip(terms.inverse_dynamics, constraint_forces, strict=True)]
+            return jacobian([*forces, *rest], wrt)
+        entries = jacobian([*constraint_forces, *rest], wrt)
+        own = self._by_recursion
+        if self.is_short(terms.inverse_dynamics):
+            other = self.by_formula()
+            own = own if self.operations < count(list(other.values())).total else other
+        for key, value in own.items():
+            entries[key] = entries[key] + value if key in entries else value
+        return entries
+
+    def packed(self) -> list[Expr]:
+        """r1_q, r1_v, r2_q, r2_v, r3_q, each row-major."""
+        terms, zero = self.terms, self.terms.graph.zero
+        n_q, n, m = len(terms.q), terms.n_v, terms.n_c
+        result = []
+        for first, size, columns in ((0, n, "qv"), (n, m, "qv"), (n + m, m, "q")):
+            for column in columns:
+                start, width = (0, n_q) if column == "q" else (n_q, n)
+                result += [self.entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
+        return result
+
+    def by_formula_at(self, accelerations: Sequence[Expr]) -> Entries:
+        """Derivatives of M a + h from its formula, at these accelerations."""
+        found = self.by_formula()
+        mapping = dict(zip(self._symbols(self.terms.a), accelerations, strict=True))
+        return dict(zip(found, substitute(list(found.values()), mapping), strict=True))
+
+
+def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[Expr], list[Expr]] | None:
+    """The Jacobian of a tree, row-major, and checks of its mass matrix; None if it would be too long.
+
+    Of the derivatives by recursion and by formula those that make it shorter.
+    """
+    n, columns, limits = terms.n_v, len(terms.q) + terms.n_v, slopes.limits
+    if terms.given_rates or terms.by_columns:
+        return None
+    substitutions = sum(1 + 4 * len(path(terms.parent, k)) for k in range(n))
+    if columns * substitutions > limits.jacobian_nodes:
+        return None
+    found: list[tuple[Entries, Factor, list[Expr]]] = []
+    if slopes.forces is not None:
+        mass, bias = slopes.forces.mass_matrix, slopes.forces.bias
+        factor = factorize(mass, terms.parent)
+        entries = slopes.joined(slopes.forces, solve(factor, [-h for h in bias]))
+        found.append((entries, factor, positivity(mass, factor, terms.coordinate_scales)))
+    if (terms.accelerations is None or not found) and slopes.is_short(terms.inverse_dynamics):
+        factor = factorize(terms.mass_matrix, terms.parent)
+        entries = slopes.by_formula_at(solve(factor, [-h for h in terms.bias]))
+        found.append((entries, factor, positivity(terms.mass_matrix, factor, terms.coordinate_scales)))
+    if not found:
+        return None
+    made = [(_rows(terms, entries, factor), checks) for entries, factor, checks in found]
+    rows, checks = min(made, key=lambda one: count([*one[0], *one[1]]).total)
+    return (rows, checks) if count(rows).total <= limits.jacobian_nodes else None
+
+
+def _rows(terms: SystemTerms, entries: Mapping[tuple[int, int], Expr], factor: Factor) -> list[Expr]:
+    """dx'/dx, row-major, from derivatives of M a + h and the factor of M."""
+    graph, n_q, n = terms.graph, len(terms.q), terms.n_v
+    symbols = [graph.symbol(name) for name in (*terms.q, *terms.v)]
+    velocities = symbols[n_q:]
+    rates = jacobian(list(terms.rates or velocities), symbols)
+    columns = [
+        [
+            *(rates.get((i, k), graph.zero) for i in range(n_q)),
+            *solve(factor, [-entries.get((i, k), graph.zero) for i in range(n)]),
+        ]
+        for k in range(n_q + n)
+    ]
+    return [column[i] for i in range(n_q + n) for column in columns]
