@@ -13,15 +13,19 @@
     |  '- NonFiniteError            a result is not a finite number
     |- EquilibriumError      no equilibrium was found from the guess; .forces says what is left
     |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
+    |  '- ZenoError                 events that reset the state follow each other ever faster
     |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
     |- MissingDependencyError       an optional package is needed; the message says what to install
     '- UsageError            a call with names or shapes that do not fit the model
+
+    KeyboardInterrupt
+    '- SimulationInterrupted Ctrl-C during a run; .trajectory has what there was
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 
 class EomgenError(Exception):
@@ -142,6 +146,31 @@ class EquilibriumError(EomgenError):
 
 class SimulationError(EomgenError):
     """The integration could not be finished."""
+
+
+class ZenoError(SimulationError):
+    """Events that reset the state follow each other ever faster, or a reset leads nowhere."""
+
+
+class SimulationInterrupted(KeyboardInterrupt):
+    """Ctrl-C came during a run.
+
+    Like every KeyboardInterrupt it is no Exception, so no ``except Exception`` takes it for a failure.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        The run up to there, made when it is asked for.
+    """
+
+    def __init__(self, message: str, complete: Callable[[], Any]) -> None:
+        super().__init__(message)
+        self._complete = complete
+
+    @property
+    def trajectory(self) -> Any:
+        """The run up to the interrupt."""
+        return self._complete()
 
 
 class ToolchainError(EomgenError):

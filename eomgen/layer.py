@@ -6,13 +6,18 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+#: Parts of the steppers' source, in order: a part may use what stands in those before it.
+STEPPERS = ("control", "signals", "tape", "dop853", "rk45", "rk23", "event_values", "event_zero", "crossings", "loop")
+
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
+    "_journeys.pxi": ("cython/_journeys.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
-    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),
+    "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
+    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
 }
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.integrate import Event
+from ..runtime.events import Event
 from ..runtime.signals import Forcing
 from .following import Follower
 from .gaps import describe_gap

@@ -8,7 +8,7 @@ coordinates keep rate 0 (an impact with e = 0 whose impulse may pull).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import combinations
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 MOST_GAPS = 12  #: gaps that can meet at one instant
+TOUCHING = 1e-8  #: gaps at most this open, in lengths of the model or rad, take part in an impact
 SLACK = 1e-10  #: relative, of impulses and rates that count as 0
 
 
@@ -89,17 +90,69 @@ def strike(
 ) -> Impact:
     """See :meth:`~..runtime.analyses.Analyses.impact`."""
     module = module if p is None and u is None else module.bind(p, u)
-    layout = module.layout
     gaps = dict(gaps or {})
     locked = (lock,) if isinstance(lock, str) else tuple(lock)
-    check_gaps(layout, gaps, locked)
+    check_gaps(module.layout, gaps, locked)
+    return _strike(module, t, x, gaps, locked, _normals)
+
+
+def strike_events(
+    module: Module, t: float, x: Array, events: Sequence[Mapping[str, Any]], fired: Sequence[int], u: Array
+) -> Array:
+    """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    x : (n_x,) array
+    events : sequence of mappings
+        As in the metadata; those with a restitution are gaps.
+    fired : sequence of int
+        Events that happened.
+    u : (n_u,) array
+
+    Raises
+    ------
+    UsageError
+        A gap depends on velocities, or no impulses obey the constraints and the laws of restitution.
+    """
+    values = module.kernels.timed("events")(t, x, u=u)
+    near = TOUCHING * max(1.0, module.layout.length)
+    gaps = {
+        i: float(event["restitution"])
+        for i, event in enumerate(events)
+        if event.get("restitution") is not None and (i in fired or abs(values[i]) <= near)
+    }
+    slopes = module.kernels.timed("event_slopes")(t, x, u=u)
+
+    def normals(states: States, names: Sequence[int]) -> tuple[Array, Array]:
+        layout, q, v = module.layout, states.q[:, 0], states.v[:, 0]
+        for i in names:
+            if np.abs(slopes[i, layout.n_q :]).max(initial=0.0) > 0.0:
+                raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
+        rows = np.array([_by_velocity(layout, q, slopes[i, : layout.n_q]) for i in names])
+        return rows, rows @ v
+
+    return _strike(module, t, x, gaps, (), normals).x
+
+
+def _strike(
+    module: Module,
+    t: float,
+    x: ArrayLike,
+    gaps: Mapping[Any, float],
+    locked: tuple[str, ...],
+    normals: Callable[[States, Sequence[Any]], tuple[Array, Array]],
+) -> Impact:
+    layout = module.layout
     states = prepare(module, float(t), x)
     if not states.single:
         raise UsageError(f"x must be one state ({layout.n_x},)")
     q, v = states.q[:, 0], states.v[:, 0]
     C_q = states.jacobian()
     M = states.evaluate(module.mass_matrix, states.q)[..., 0]
-    rows, rates = _normals(states, (*gaps, *locked))
+    rows, rates = normals(states, (*gaps, *locked))
     B = _free(C_q[0], layout)
     factor = np.linalg.cholesky(B.T @ M @ B) if B.shape[1] else np.zeros((0, 0))
     half = np.linalg.solve(factor, B.T @ rows.T) if B.shape[1] else np.zeros((0, len(rows)))

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .impact import Impact, check_gaps, strike
+from .impact import TOUCHING, Impact, check_gaps, strike
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
     from ..runtime.trajectory import Trajectory
 
-TOUCHING = 1e-8  #: gaps at most this open, in lengths of the model or rad, take part in an impact
 STEP = 1e-5  #: (s) over which the curvature of a gap is estimated
 REST = 1e-6  #: rate after an impact, relative to the largest rate at an impact so far, at which a gap counts as closed
 

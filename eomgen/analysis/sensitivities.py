@@ -136,7 +136,7 @@ def differentiate_run(
     require_velocities(module.layout)
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
+    forcing.attach(bound)
     layout = bound.layout
     declared: Any = bound.metadata.get("simulation", {}).get("end") or DEFAULTS["end"]
     start, stop = find_span(span, float(declared))

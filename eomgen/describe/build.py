@@ -12,6 +12,7 @@ from ..graph.core import Expr, Graph
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
 from .build_equations import build_equations, check_energies, declare_equations
+from .build_events import build_events
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -78,6 +79,7 @@ def build(description: Description) -> Mechanism:
     constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
+    events = build_events(reader, sections["events"])
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
@@ -106,6 +108,7 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
+        events=events,
         quantities=dict(reader.quantities),
         initial=initial,
         guess=guess,

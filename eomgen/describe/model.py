@@ -151,6 +151,42 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         """
         self._quantity("outputs", name, expression, unit, doc, key="expression")
 
+    def event(
+        self,
+        name: str,
+        expression: Value,
+        terminal: bool | int = False,
+        direction: int = 0,
+        reset: Mapping[Any, Value] | None = None,
+        restitution: Value | None = None,
+        doc: str = "",
+    ) -> None:
+        """Declare an event: a zero of an expression that runs find, and what happens there.
+
+        Parameters
+        ----------
+        name : str
+            Identifier, for ``Trajectory.t_events[name]``.
+        expression : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, velocities, and the position and velocity of markers.
+        terminal : bool or int
+            End the run there; a number: when it has happened so often.
+        direction : {0, 1, -1}
+            Both ways, only where it rises, only where it falls.
+        reset : mapping of coordinates and velocities to expressions, optional
+            New values, all from the state right before.  Positions and velocities are brought back onto the
+            constraints afterwards.
+        restitution : float, optional
+            The expression is a gap between bodies; where it closes an impact opens it again, this much slower (0 to
+            1; Newton's law), with impulses that obey all joints.
+        doc : str, optional
+        """
+        given = {"expression": expression, "terminal": terminal, "direction": direction, "reset": reset or None}
+        given |= {"restitution": restitution, "doc": doc}
+        defaults = {"terminal": False, "direction": 0, "doc": ""}
+        kept = {k: v for k, v in given.items() if v is not None and (k not in defaults or v != defaults[k])}
+        self._description.add("events", name, kept)
+
     def _quantity(self, section: str, name: str, value: Value, unit: str, doc: str, key: str = "value") -> None:
         given = {key: value, "unit": unit, "doc": doc}
         self._description.add(section, name, {k: v for k, v in given.items() if v is not None and v != ""})

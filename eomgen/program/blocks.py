@@ -211,6 +211,9 @@ class BlockMaker:
             "canonical": lambda: terms.canonical,
             "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
+            "events": lambda: terms.events,
+            "resets": lambda: terms.resets,
+            "event_slopes": self._event_slopes,
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
@@ -368,6 +371,9 @@ class BlockMaker:
         held = terms.loop_coordinates[: 2 * self.sizes.n_k]
         rows = [*terms.constraints, *terms.velocity_constraints, *held]
         return self._derivatives(rows, (*terms.q, *terms.v, *terms.u, *terms.p))
+
+    def _event_slopes(self) -> list[Expr]:
+        return self._derivatives(self.terms.events, (*self.terms.q, *self.terms.v))
 
     def _output_derivatives(self) -> list[Expr]:
         terms = self.terms

@@ -62,6 +62,7 @@ def build_program(
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
     has["energy"] = bool(metadata.get("energy_known", True))
+    has |= {"events": bool(terms.events), "resets": bool(terms.resets)}
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates:
@@ -145,6 +146,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_s=terms.wrenches.needed_size if terms.wrenches else 0,
         n_w=terms.wrenches.size if terms.wrenches else 0,
         n_m=len(terms.canonical) // 2,
+        n_events=len(terms.events),
+        n_resets=len(terms.resets),
         n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 

@@ -8,6 +8,7 @@ from typing import Any
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
+from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -72,6 +73,8 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
         system=equations.system,
+        events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
+        resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
         projects=c.stabilised is None,
         canonical=equations.canonical,
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
@@ -116,7 +119,27 @@ def _poses(kinematics: Kinematics) -> list[Expr]:
 
 def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
     """Outputs in terms of the tree's q, v, a."""
-    expressions = kinematics.resolve([o.expression for o in kinematics.mechanism.outputs])
+    return resolved([o.expression for o in kinematics.mechanism.outputs], kinematics, equations)
+
+
+def _resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
+    """Event, state and its new value, of all resets."""
+    places = {name: k for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
+    found: list[tuple[int, int, Expr]] = []
+    for i, event in enumerate(kinematics.mechanism.events):
+        for name, value in event.reset:
+            if name not in places:
+                raise UsageError(
+                    f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "
+                    f"reset {', '.join(places)}"
+                )
+            found.append((i, places[name], value))
+    return found
+
+
+def resolved(given: list[Expr], kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
+    """Expressions in terms of the tree's q, v, a."""
+    expressions = kinematics.resolve(given)
     graph = kinematics.graph
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,
@@ -199,6 +222,20 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "system": _system(equations),
         "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
+        **(
+            {
+                "events": [
+                    {
+                        "name": e.name, "terminal": e.terminal, "direction": e.direction, "resets": bool(e.reset),
+                        "restitution": e.restitution, "doc": e.doc,
+                    }
+                    for e in m.events
+                ],
+                "resets": [[i, k] for i, k, _ in _resets(kinematics)],
+            }
+            if m.events
+            else {}
+        ),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,

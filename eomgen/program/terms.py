@@ -72,6 +72,8 @@ class SystemTerms:
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
     slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+    events: Row = ()  #: of (q, v): their zeros are the events of the model
+    resets: Row = ()  #: of (q, v): new values of states after events
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property

@@ -69,6 +69,8 @@ class Layout:
         self.n_m: int = data.get("n_m", 0)
         self.n_dae: int = data.get("n_dae", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
+        self.n_events: int = data.get("n_events", 0)
+        self.n_resets: int = data.get("n_resets", 0)
         self.n_e = len(self.fragile_forces)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
@@ -241,5 +243,8 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "canonical": ("x", (2, "n_m")),
     "dae_residual": ("dae", ("n_dae",)),
     "dae_jacobian": ("dae_cj", ("n_dae", "n_dae")),
+    "events": ("x", ("n_events",)),
+    "resets": ("x", ("n_resets",)),
+    "event_slopes": ("x", ("n_events", "n_x")),
     "scales": ("none", ("n_v+n_c",)),
 }

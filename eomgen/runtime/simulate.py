@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, UsageError
+from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
+from .events import UNWATCHED, Events
 from .failure import rotation_trouble
-from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
+from .integrate import Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
 from .progress import Progress, wanted
@@ -58,17 +61,21 @@ def simulate(
         Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints.
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
-    inputs : mapping of str to number, (times, values) or callable f(t, x), optional
-        Tables are linear in between and constant outside; their corners are stepped on exactly.
+    inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
+        Tables are linear in between (a :class:`~.signals.Signal` may hold the last value, or be a cubic spline) and
+        constant outside; their corners are stepped on exactly.  An expression is a text as in model files, of t,
+        coordinates, velocities and parameters.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
-        SciPy's steps unless there are events or inputs that are functions; implicit ones get the exact Jacobian.
+        SciPy's steps unless there are inputs that are functions; implicit ones get the exact Jacobian.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
         Times to store; the solver's steps by default.
-    events : callable or list of callables f(t, x), optional
-        With SciPy's attributes ``terminal`` and ``direction``.
+    events : str, callable f(t, x), list of these, or mapping of names to them, optional
+        Names of the model's events (all by default; those that reset the state are watched in any case), expressions
+        as text, or functions with SciPy's attributes ``terminal`` and ``direction``.  In a mapping also
+        ``{"expression": text, "terminal": times, "direction": 1}``.
     dense_output : bool
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
@@ -83,6 +90,10 @@ def simulate(
 
     Raises
     ------
+    ZenoError
+        Events that reset the state follow each other ever faster.
+    SimulationInterrupted
+        Ctrl-C; ``trajectory`` of the exception has the run up to there.
     SimulationError
         The integration ended early or met a state that is not finite; its cause is the last failure of a kernel.
     AssemblyError
@@ -104,9 +115,9 @@ def simulate(
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
-    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    watched = Events(module.layout, events)
     forcing = Forcing(module.layout, inputs)
-    compiled = can_run(module, method, forcing, listed)
+    compiled = can_run(module, method, forcing)
     if compiled:
         solver, title = None, str(method)
         check_names("option of simulate", options, (), OPTIONS)
@@ -116,7 +127,7 @@ def simulate(
         check_options(solver, options, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
+    forcing.attach(bound)
     x0 = find_state(bound, initial, start)
     u0 = forcing(start, x0)
     forcing.require_finite()
@@ -133,19 +144,27 @@ def simulate(
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    nodes = [start, *forcing.corners(start, end), end]
+    nodes = [start, *forcing.corners(start, end, compiled), end]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     try:
         if compiled:
-            solution, failure = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch
+            solution, failure, raised = integrate_compiled(
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, watched
             )
             run.last = None if failure is None else ("rhs", *failure)
+            if isinstance(raised, KeyboardInterrupt):
+                raise SimulationInterrupted(
+                    f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
+                    lambda: record(bound, forcing, solution, title, options, watched.names),
+                ) from raised
+            if raised is not None:
+                raise raised
         else:
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
-                )
+                    run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output, options,
+                    partial(watched.reset, bound, forcing),
+                )  # fmt: skip
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
@@ -155,7 +174,7 @@ def simulate(
             watch.close()
     _check(run, solution, start, end, title)
     try:
-        return record(bound, forcing, solution, title, options)
+        return record(bound, forcing, solution, title, options, watched.names)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
@@ -177,11 +196,14 @@ def _follow_drivers(
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
-    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    forcing.attach(bound)
+    watched = Events(module.layout, events)
+    if watched.resets:
+        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
+    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
-    return simulate_driven(bound, (start, end), initial, forcing, stored, [Event(e) for e in listed], given)
+    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
 
 
 class _Run:
@@ -190,9 +212,13 @@ class _Run:
     def __init__(self, module: Module, forcing: Forcing) -> None:
         self.module = module
         self.forcing = forcing
-        self.kernel: Timed = module.kernels.timed("rhs", nan=True)
         self.tangent: Timed | None = None
         self.last: tuple[str, int, float, Array] | None = None
+
+    @cached_property
+    def kernel(self) -> Timed:
+        """The right-hand side."""
+        return self.module.kernels.timed("rhs", nan=True)
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""
@@ -257,8 +283,8 @@ class _Run:
 
 
 def _check(run: _Run, solution: Solution, start: float, end: float, method: str) -> None:
-    finite = np.isfinite(solution.x).all(axis=0)
-    if not finite.all():
+    if not np.isfinite(solution.x).all():
+        finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
     if solution.status < 0:
@@ -271,6 +297,8 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
+    if type(span) is tuple and len(span) == 2 and isfinite(span[0]) and isfinite(span[1]):
+        return float(span[0]), float(span[1])
     if np.ndim(span) == 0:
         return 0.0, number("the end of the span", span)
     pair = np.asarray(span, dtype=float)

@@ -46,13 +46,6 @@ def solver_class(core: Any, name: str) -> Any:
     own: Any = getattr(scipy, name)
     rhs = core.timed
 
-    class Dense(scipy.DenseOutput):  # type: ignore[name-defined, misc]
-        """The solution within one step."""
-
-        def __init__(self, piece: Any) -> None:
-            super().__init__(piece.t_old, piece.t)
-            self._call_impl = piece
-
     class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
         """A compiled stepper."""
 
@@ -78,21 +71,26 @@ def solver_class(core: Any, name: str) -> Any:
             options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
             settings = stepper_options(self.n, abs(t_bound - t0), options)
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
-            self.nfev = self._stepper.evaluations
+
+        @property
+        def nfev(self) -> int:
+            """Evaluations of the right-hand side so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.evaluations)
+
+        @nfev.setter
+        def nfev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
 
         def _step_impl(self) -> tuple[bool, str | None]:
             stepper = self._stepper
-            moved = stepper.step()
-            self.nfev = stepper.evaluations
-            if not moved:
+            if not stepper.step():
                 return False, self.TOO_SMALL_STEP
             self.t, self.y = stepper.t, stepper.state()
             return True, None
 
         def _dense_output_impl(self) -> Any:
-            piece = self._stepper.interpolant()
-            self.nfev = self._stepper.evaluations
-            return Dense(piece)
+            return self._stepper.interpolant()  # callable like a DenseOutput, with t_old, t, t_min, t_max
 
     Solver.__name__ = Solver.__qualname__ = name
     return Solver

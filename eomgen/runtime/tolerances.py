@@ -56,6 +56,8 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
 
 
 def _tolerance(name: str, given: Any, n: int) -> Any:
+    if type(given) is float and 0.0 <= given < np.inf:
+        return given
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):

@@ -1,10 +1,17 @@
 # Steppers: the explicit Runge-Kutta methods of eomgen_steppers.h over the model's right-hand side.
 
 cdef extern from "eomgen_steppers.h" nogil:
+    ctypedef struct eomgen_tape:
+        int n, n_out
+        const int *code
+        const double *numbers
+        const int *out
+        double *results
     ctypedef struct eomgen_signal:
         int n, order
         const double *times
         const double *values
+        const eomgen_tape *tape
     ctypedef struct eomgen_run:
         eomgen_function rhs
         const double *c
@@ -26,6 +33,11 @@ cdef extern from "eomgen_steppers.h" nogil:
         int failure
         double failure_time
         double *failure_state
+        double hold
+        long look_in
+        long (*look)(void *, const double *) noexcept nogil
+        void *looker
+        int stopped
     ctypedef struct eomgen_method:
         const char *name
         int rows_K, rows_F, error_order
@@ -34,13 +46,46 @@ cdef extern from "eomgen_steppers.h" nogil:
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
     int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
     void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
-    int eomgen_advance(const eomgen_method *, eomgen_run *, long, const double *, long, long *, double *, double *,
-                       long *) noexcept
+    void eomgen_play(const eomgen_tape *, double, const double *, const double *, const double *, double *) noexcept
+    const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
 cdef method_pointer[3] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
 methods = tuple([METHODS[i].name.decode() for i in range(3)])
+
+
+cdef class Tape:
+    """An expression of t, x, u and p given at run time.
+
+    Parameters
+    ----------
+    code : sequence of (operation, i, j, k)
+        Operations by name; operands are earlier instructions, or an index into numbers, x, u or p.
+    numbers : sequence of float
+    out : sequence of int
+        Instructions whose results are wanted.
+    """
+
+    cdef eomgen_tape tape
+    cdef cnp.ndarray code, numbers, out, results
+
+    def __cinit__(self, code, numbers, out):
+        self.code = np.array([(TAPES[row[0]], *row[1:]) for row in code], dtype=np.intc).reshape(-1, 4)
+        self.numbers, self.out = np.array(numbers, dtype=float), np.array(out, dtype=np.intc)
+        self.results = np.zeros(len(code) + 1)
+        self.tape.n, self.tape.n_out = len(code), len(out)
+        self.tape.code = <const int *>cnp.PyArray_DATA(self.code)
+        self.tape.numbers = <const double *>cnp.PyArray_DATA(self.numbers)
+        self.tape.out = <const int *>cnp.PyArray_DATA(self.out)
+        self.tape.results = <double *>cnp.PyArray_DATA(self.results)
+
+
+cdef dict TAPES = {}
+cdef int _code = 0
+while eomgen_operations[_code] != NULL:
+    TAPES[eomgen_operations[_code].decode()] = _code
+    _code += 1
 
 
 cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
@@ -57,15 +102,30 @@ cdef class Interpolant:
     cdef readonly double t_old, t
 
     def __call__(self, t):
-        times = np.asarray(t, dtype=float)
-        cdef cnp.ndarray flat = np.ascontiguousarray(times.reshape(-1))
-        cdef cnp.npy_intp k = cnp.PyArray_DIM(flat, 0), i
-        cdef cnp.ndarray result = rows(k, self.run.n)
-        cdef double *y = <double *>cnp.PyArray_DATA(result)
+        cdef cnp.ndarray flat = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError)), result
+        cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
+        cdef int j
         cdef double *at = <double *>cnp.PyArray_DATA(flat)
+        cdef double *y = <double *>cnp.PyArray_DATA(self.memory) + n * (1 + self.method.rows_F)
+        cdef double *out
+        if cnp.PyArray_NDIM(flat) == 0:
+            self.method.interpolate(&self.run, at[0], y)
+            return copy(y, n)
+        result = rows(n, k)
+        out = <double *>cnp.PyArray_DATA(result)
         for i in range(k):
-            self.method.interpolate(&self.run, at[i], y + i * self.run.n)
-        return result[0] if times.ndim == 0 else np.ascontiguousarray(result.T)
+            self.method.interpolate(&self.run, at[i], y)
+            for j in range(n):
+                out[j * k + i] = y[j]
+        return result
+
+    @property
+    def t_min(self):
+        return min(self.t_old, self.t)
+
+    @property
+    def t_max(self):
+        return max(self.t_old, self.t)
 
 
 cdef class Stepper:
@@ -84,8 +144,10 @@ cdef class Stepper:
     atol : (n_x,) array
     max_step, first_step : float
         A first step of 0 is chosen.
-    signals : list of (index, order, times, values), optional
-        Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values.
+    signals : list of (index, order, times, values) or (index, (code, numbers, out)), optional
+        Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values; or an expression.
+    plan : dict, optional
+        Of a Journey; then the first evaluation is left to it.
 
     Attributes
     ----------
@@ -101,7 +163,7 @@ cdef class Stepper:
     cdef list held
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
-                  double max_step, double first_step=0.0, signals=()):
+                  double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
         self.method = METHODS[methods.index(method)]
         self.context, self.held = context, []
@@ -126,9 +188,10 @@ cdef class Stepper:
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
         run.rtol, run.max_step, run.h_abs = rtol, max_step, first_step
         run.t = run.t_old = t0
-        run.t_bound, run.direction = t_bound, -1.0 if t_bound < t0 else 1.0
+        run.t_bound, run.direction, run.hold = t_bound, -1.0 if t_bound < t0 else 1.0, NAN
         self.listen(signals)
-        eomgen_start(self.method, run)
+        if plan is None:
+            eomgen_start(self.method, run)
 
     cdef listen(self, signals):
         cdef eomgen_signal *table
@@ -138,7 +201,13 @@ cdef class Stepper:
         memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
         table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
         self.held.append(memory)
-        for index, order, times, values in signals:
+        for index, *given in signals:
+            if len(given) == 1:
+                tape = Tape(*given[0])
+                self.held.append(tape)
+                table[<int>index].n, table[<int>index].tape = 1, &(<Tape>tape).tape
+                continue
+            order, times, values = given
             pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
             self.held.extend(pair)
             table[<int>index].n, table[<int>index].order = len(times), order
@@ -150,35 +219,6 @@ cdef class Stepper:
         """Take one step; False if it would have to be too small."""
         return eomgen_step(self.method, &self.run) == 0
 
-    def advance(self, long steps, t_eval=None, long done=0):
-        """Take up to so many steps without the GIL.
-
-        Returns
-        -------
-        status : int
-            0 while under way, 1 at the end, negative if a step would have to be too small.
-        times : (k,) array
-            Of all steps; with t_eval, of those of t_eval[done:] that were reached.
-        states : (k, n_x) array
-        """
-        cdef cnp.ndarray asked, times, states
-        cdef cnp.npy_intp room
-        cdef long n_eval = -1, stored = 0
-        cdef int status
-        cdef const double *wanted = NULL
-        if t_eval is None:
-            room = steps
-        else:
-            asked = np.ascontiguousarray(t_eval, dtype=float)
-            n_eval, room, wanted = len(t_eval), len(t_eval) - done, <const double *>cnp.PyArray_DATA(asked)
-        times, states = np.empty(room), rows(room, self.run.n)
-        cdef double *T = <double *>cnp.PyArray_DATA(times)
-        cdef double *X = <double *>cnp.PyArray_DATA(states)
-        cdef long first = done
-        with nogil:
-            status = eomgen_advance(self.method, &self.run, steps, wanted, n_eval, &done, T, X, &stored)
-        return status, (times[:stored] if t_eval is None else asked[first:done]), states[:stored]
-
     def state(self):
         """A copy of the state (n_x,)."""
         return copy(self.run.y, self.run.n)
@@ -189,7 +229,7 @@ cdef class Stepper:
         cdef int n = self.run.n
         eomgen_between(self.method, &self.run, self.run.t, self.run.K + n)  # forms the coefficients
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
-        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
+        cdef cnp.npy_intp length = n * (2 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
         memcpy(data, self.run.y_old, n * sizeof(double))
@@ -222,3 +262,5 @@ cdef class Stepper:
 
 
 stepper = Stepper
+
+include "_journeys.pxi"
