@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from .module import Module
 
 
+IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods
+
+
 def find_solver(module: Module, name: str) -> Any:
     """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
     core = eager(module.core)
@@ -50,7 +53,9 @@ def solver_class(core: Any, name: str) -> Any:
         """A compiled stepper."""
 
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
-            if isinstance(fun, rhs) and fun.name == "rhs":
+            jac = options.get("jac")
+            known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
+            if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
             return own(fun, *args, **options)
 
@@ -68,6 +73,8 @@ def solver_class(core: Any, name: str) -> Any:
             **extraneous: Any,
         ) -> None:
             super().__init__(fun, t0, y0, t_bound, vectorized)
+            for key in IMPLICIT if name == "Radau" else ():  # the model's own Jacobian, or none
+                extraneous.pop(key, None)
             options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
             settings = stepper_options(self.n, abs(t_bound - t0), options)
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
@@ -80,6 +87,26 @@ def solver_class(core: Any, name: str) -> Any:
 
         @nfev.setter
         def nfev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def njev(self) -> int:
+            """Evaluations of the Jacobian so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.differentiations)
+
+        @njev.setter
+        def njev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def nlu(self) -> int:
+            """Matrices factored so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.factorizations)
+
+        @nlu.setter
+        def nlu(self, value: int) -> None:
             """OdeSolver sets it to 0 before there is a stepper."""
 
         def _step_impl(self) -> tuple[bool, str | None]:

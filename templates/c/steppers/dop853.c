@@ -182,4 +182,6 @@ static void dop853_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_dop853 = {"DOP853", 16, 7, 7, dop853_attempt, dop853_error, dop853_prepare, dop853_interpolate};
+const eomgen_method eomgen_dop853 = {.name = "DOP853", .rows_K = 16, .rows_F = 7, .error_order = 7, .attempt =
+                                     dop853_attempt, .error = dop853_error, .prepare = dop853_prepare, .interpolate =
+                                     dop853_interpolate};

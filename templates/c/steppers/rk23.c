@@ -67,4 +67,6 @@ static void rk23_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk23 = {"RK23", 4, 3, 2, rk23_attempt, rk23_error, rk23_prepare, rk23_interpolate};
+const eomgen_method eomgen_rk23 = {.name = "RK23", .rows_K = 4, .rows_F = 3, .error_order = 2, .attempt =
+                                   rk23_attempt, .error = rk23_error, .prepare = rk23_prepare, .interpolate =
+                                   rk23_interpolate};

@@ -90,4 +90,6 @@ static void rk45_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk45 = {"RK45", 7, 4, 4, rk45_attempt, rk45_error, rk45_prepare, rk45_interpolate};
+const eomgen_method eomgen_rk45 = {.name = "RK45", .rows_K = 7, .rows_F = 4, .error_order = 4, .attempt =
+                                   rk45_attempt, .error = rk45_error, .prepare = rk45_prepare, .interpolate =
+                                   rk45_interpolate};
