@@ -226,12 +226,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             {
                 "events": [
                     {
-                        "name": e.name,
-                        "terminal": e.terminal,
-                        "direction": e.direction,
-                        "resets": bool(e.reset),
-                        "restitution": e.restitution,
-                        "doc": e.doc,
+                        "name": e.name, "terminal": e.terminal, "direction": e.direction, "resets": bool(e.reset),
+                        "restitution": e.restitution, "doc": e.doc,
                     }
                     for e in m.events
                 ],

@@ -257,6 +257,28 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
 
         return simulate(self, span, initial, parameters, inputs, method=method, **options)
 
+    def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
+        """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
+
+        Parameters
+        ----------
+        t, h : float
+            Time and size of the step (s).
+        x : (n_x,) array
+        u : (n_u,) array, optional
+            Inputs, held over the step.
+        out : (n_x,) array, optional
+            Takes the result; it may be x.
+
+        Returns
+        -------
+        (n_x,) array
+            The state at t + h; loops drift at the order of the step, see :meth:`project`.
+        """
+        from .steppers import march
+
+        return march(self, t, x, h, u, out)
+
     def report(self) -> str:
         """What the model is made of, as text."""
         from .report import text

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
-OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress")
+OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
 
 
 def simulate(
@@ -48,6 +48,7 @@ def simulate(
     max_step: float | None = None,
     first_step: float | None = None,
     progress: bool | None = None,
+    step: float | None = None,
     **options: Any,
 ) -> Trajectory:
     """Integrate the equations of motion.
@@ -67,7 +68,8 @@ def simulate(
         coordinates, velocities and parameters.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
-        SciPy's steps unless there are inputs that are functions; implicit ones get the exact Jacobian.
+        SciPy's steps unless there are inputs that are functions; implicit ones get the exact Jacobian.  RK4 takes steps
+        of one size, in compiled code only.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
@@ -79,6 +81,8 @@ def simulate(
     dense_output : bool
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
+    step : float, optional
+        Size of the steps of RK4 (s), and only of it.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
     **options
@@ -113,11 +117,17 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+    if (method == "RK4") != (step is not None):
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    if step is not None:
+        max_step = first_step = step
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
     forcing = Forcing(module.layout, inputs)
     compiled = can_run(module, method, forcing)
+    if method == "RK4" and not compiled:
+        raise UsageError("method RK4 runs in compiled code only: target='cython', and no input that is a function")
     if compiled:
         solver, title = None, str(method)
         check_names("option of simulate", options, (), OPTIONS)

@@ -121,3 +121,23 @@ def solver_class(core: Any, name: str) -> Any:
 
     Solver.__name__ = Solver.__qualname__ = name
     return Solver
+
+
+def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
+    """See :meth:`~.module.Module.step`."""
+    core = eager(module.core)
+    if hasattr(core, "march"):
+        context = module.kernels.context
+        status, result = core.march(context, t, h, x, u, out)
+        if status != 0:
+            module.kernels.fail("rhs", status, t, np.array(x, dtype=float))
+        return np.asarray(result)
+    start = np.array(x, dtype=float)
+    k = [module.rhs(t, start, u=u)]
+    for part in (0.5, 0.5, 1.0):
+        k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
+    after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    if out is None:
+        return np.asarray(after)
+    out[...] = after
+    return out

@@ -44,7 +44,9 @@ cdef extern from "eomgen_steppers.h" nogil:
         const char *name
         int rows_K, rows_F, error_order, squares
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_radau
+    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau
+    int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
+                     double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
     int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
     void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
@@ -52,10 +54,10 @@ cdef extern from "eomgen_steppers.h" nogil:
     const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
-cdef method_pointer[4] METHODS
+cdef method_pointer[5] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
-METHODS[3] = &eomgen_radau
-methods = tuple([METHODS[i].name.decode() for i in range(4) if METHODS[i].squares == 0 or "jacobian" in names])
+METHODS[3], METHODS[4] = &eomgen_rk4, &eomgen_radau
+methods = tuple([METHODS[i].name.decode() for i in range(5) if METHODS[i].squares == 0 or "jacobian" in names])
 
 
 cdef class Tape:
@@ -276,6 +278,32 @@ cdef class Stepper:
         if self.run.failure == 0:
             return None
         return self.run.failure, self.run.failure_time, copy(self.run.failure_state, self.run.n)
+
+
+def march(Context context not None, double t, double h, x, u=None, out=None):
+    """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
+    cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
+    cdef cnp.ndarray start = vector(x, n, "x", ValueError), inputs = context.u
+    cdef cnp.npy_intp length = n, n_work = MODEL.n_work + 5 * n
+    cdef double[STACK] stack
+    cdef double *w = stack
+    cdef cnp.ndarray result
+    if u is not None:
+        inputs = vector(u, MODEL.n_u, "u", ValueError)
+    if (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
+            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_SIZE(<cnp.ndarray>out) == n):
+        result = out
+    elif out is None:
+        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
+    else:
+        raise ValueError(f"out must be a contiguous float64 array of shape ({n},)")
+    if n_work > STACK:
+        heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
+        w = <double *>cnp.PyArray_DATA(heap)
+    status = eomgen_march(MODEL.kernels[index].call, n, t, h, <double *>cnp.PyArray_DATA(start),
+                          <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
+                          <double *>cnp.PyArray_DATA(result), w, w + MODEL.n_work)
+    return status, result
 
 
 stepper = Stepper

@@ -98,7 +98,8 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
         double t_new = run->t + h_abs * run->direction;
-        if (run->direction * (t_new - run->t_bound) > 0.0) {
+        const double slack = method->fixed ? -1e-9 * h_abs : 0.0; /* no step for what rounding left over */
+        if (run->direction * (t_new - run->t_bound) > slack) {
             t_new = run->t_bound;
         }
         const double h = t_new - run->t;

@@ -62,12 +62,13 @@ typedef struct {
     double (*error)(const eomgen_run *run, double h);
     void (*prepare)(eomgen_run *run);
     void (*interpolate)(const eomgen_run *run, double t, double *y);
+    int fixed; /* steps are all max_step long, but for the last */
     int squares; /* of implicit methods: n x n matrices after the rows in run->K, then 16 + n numbers */
     void (*begin)(eomgen_run *run);
     int (*step)(eomgen_run *run); /* in place of attempt and error */
 } eomgen_method;
 
-extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_radau;
+extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau;
 
 enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101 };
 
@@ -87,6 +88,10 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run);
 
 /* One accepted step: 0, or EOMGEN_STEP_TOO_SMALL or EOMGEN_STOPPED, which leave t and y as they were. */
 int eomgen_step(const eomgen_method *method, eomgen_run *run);
+
+/* One Runge-Kutta step of size h from x into out, which may be x; k: 5 n doubles. The status of the right-hand side. */
+int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
+    double *out, double *w, double *k);
 
 /* The state at time t of the last step. */
 void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, double *y);
