@@ -7,8 +7,10 @@ outwards, with r from the link's origin and v relative to its velocity, the sums
 inertia J are V = sum m v r^T and P = sum m v (twice each), and the wrench of m (a - g).
 
 With the field s x r + l of a column of the motion subspace, which is dr/dq_i, the derivatives of accelerations are
-d(a)/d(q_i') = 2 d/dt (s x r + l) and d(a)/d(q_i) = d2/dt2 (s x r + l).  That takes q' = v and columns that move rigidly
-with their own and all earlier coordinates of their joint, :func:`can_differentiate`.
+d(a)/d(q_i') = 2 d/dt (s x r + l) and d(a)/d(q_i) = d2/dt2 (s x r + l).  That takes columns that move rigidly with
+their own and all earlier coordinates of their joint, :func:`can_differentiate`.  The columns of a ball in Euler
+parameters are fixed in the link instead, and its angular velocity is held fixed there: by angle the rates are those of
+an s fixed in the parent, by velocity there is one such rate and one of an s fixed in the link.
 
 Velocity terms are homogeneous of second degree, so that h follows from its derivative by v and from gravity.
 """
@@ -80,14 +82,30 @@ class Composite(NamedTuple):
 def can_differentiate(kinematics: Kinematics) -> bool:
     """Whether the formulas of this file hold for a mechanism's tree."""
     mechanism = kinematics.mechanism
-    if mechanism.lagrangian is not None or mechanism.given is not None or kinematics.rates != kinematics.v:
+    if mechanism.lagrangian is not None or mechanism.given is not None or drives_cut_joint(kinematics):
         return False
+    places = coordinate_places(kinematics)
     for link in kinematics.links:
-        own = kinematics.names[link.first : link.first + len(link.columns)]
         for c, (angular, linear) in enumerate(link.columns):
-            if not symbols_of([*angular, *linear]) <= set(own[c + 1 :]):
+            index = link.first + c
+            ahead = () if places[index] < 0 else kinematics.names[places[index] + 1 : _last(kinematics, link)]
+            if not symbols_of([*angular, *linear]) <= set(ahead):
                 return False
-    return not drives_cut_joint(kinematics)
+    return True
+
+
+def coordinate_places(kinematics: Kinematics) -> list[int]:
+    """Per velocity the coordinate whose rate it is, -1 for angular velocities of balls."""
+    turning = {k for ball in kinematics.balls for k in range(ball.velocity, ball.velocity + 3)}
+    parameters = {k for ball in kinematics.balls for k in range(ball.coordinate, ball.coordinate + 4)}
+    plain = iter([k for k in range(len(kinematics.q)) if k not in parameters])
+    return [-1 if k in turning else next(plain) for k in range(len(kinematics.v))]
+
+
+def _last(kinematics: Kinematics, link: Link) -> int:
+    """One more than the last coordinate of the link's joint."""
+    end = link.first + len(link.columns)
+    return end + sum(ball.velocity < end for ball in kinematics.balls)
 
 
 class ForceSlopes:
@@ -112,12 +130,16 @@ class ForceSlopes:
         two = kinematics.graph.constant(2.0)
         self._omegas = [twist[0] for twist in kinematics.twists]
         self._twice = [vec.scale(two, omega) for omega in self._omegas]
-        self._fields = [[self._field(k, *column) for column in link.columns] for k, link in self._numbered]
+        self._places = coordinate_places(kinematics)
+        self._fields = [
+            [self._field(k, *column, link.first + c) for c, column in enumerate(link.columns)]
+            for k, link in self._numbered
+        ]
         self._lifted: dict[tuple[int, int], Lifted] = {}  # by index of the velocity and link
-        n, zero = len(kinematics.v), kinematics.graph.zero
+        n_q, n, zero = len(kinematics.q), len(kinematics.v), kinematics.graph.zero
         forces = applied_forces(kinematics)
         by_state = jacobian(forces, [*kinematics.q, *kinematics.v])
-        self._forces_by_position = {key: value for key, value in by_state.items() if key[1] < n}
+        self._forces_by_position = {key: value for key, value in by_state.items() if key[1] < n_q}
         self._composites, rigid, mass, gravity = self._sum_inwards()
         self.bias = []
         for i in range(n):
@@ -127,7 +149,7 @@ class ForceSlopes:
                     total = total + rigid[i, j] * kinematics.v[j]
             self.bias.append(0.5 * total + gravity[i] - forces[i])
         self.by_velocity = rigid
-        _subtract(self.by_velocity, {(i, j - n): value for (i, j), value in by_state.items() if j >= n})
+        _subtract(self.by_velocity, {(i, j - n_q): value for (i, j), value in by_state.items() if j >= n_q})
         for index, inertia in drive_inertias(kinematics).items():
             mass[index, index] = mass[index, index] + inertia
         self.mass_matrix = tuple(tuple(mass.get((max(i, j), min(i, j)), zero) for j in range(n)) for i in range(n))
@@ -136,8 +158,16 @@ class ForceSlopes:
     def _numbered(self) -> Iterator[tuple[int, Link]]:
         return enumerate(self._kinematics.links)
 
-    def _field(self, k: int, s: Vec3, l: Vec3) -> Field:
+    def _above(self, k: int) -> Vec3:
+        """Angular velocity of the parent, link axes."""
+        link = self._kinematics.links[k]
+        return vec.zero(self._kinematics.graph) if link.parent == GROUND else link.down(self._omegas[link.parent])
+
+    def _field(self, k: int, s: Vec3, l: Vec3, index: int) -> Field:
         kinematics = self._kinematics
+        if self._places[index] < 0:
+            above, still = self._above(k), vec.zero(kinematics.graph)
+            return Field(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
         x = jvp([*s, *l], kinematics.flow)
         own, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
         two = kinematics.graph.constant(2.0)
@@ -257,7 +287,12 @@ class ForceSlopes:
         for k, link in self._numbered:
             _, turning, linear = motions[k]
             found.append([])
-            for s, l in link.columns:
+            for c, (s, l) in enumerate(link.columns):
+                if self._places[link.first + c] < 0:
+                    alpha = motions[link.parent][0] if link.parent != GROUND else vec.zero(kinematics.graph)
+                    fixed = _turning(self._above(k), link.down(alpha))
+                    found[k].append((vec.times(fixed, s), vec.neg(vec.cross(s, linear))))
+                    continue
                 first = jvp([*s, *l], kinematics.flow)
                 second = jvp(first, along)
                 rates = [vec.cross(self._omegas[k], _three(first, at)) for at in (0, 3)]
@@ -284,16 +319,44 @@ class ForceSlopes:
                     own = self._lifted[i, at]
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
-                        slopes[j, i] = _project((other.s, other.l), wrench)
+                        if j == i or at != k or self._places[j] >= 0:
+                            slopes[j, i] = _project((other.s, other.l), wrench)
+                        else:  # columns of one ball turn with each other
+                            slopes[j, i] = self._inner(swept[k][c], field, self._lifted[j, k])
                         if j != i:
-                            along = vec.dot(swept[at][d][0], own.wrench[0]) + vec.dot(other.s_rate, own.whirl)
-                            slopes[i, j] = along + vec.dot(swept[at][d][1], own.wrench[1])
+                            slopes[i, j] = self._inner(swept[at][d], other, own)
                     if links[at].parent != GROUND:
                         wrench = _lift(links[at], wrench)
             if (p := links[k].parent) != GROUND:
                 wrenches[p] = _add(wrenches[p], _lift(links[k], wrenches[k]))
+        slopes = self._by_coordinates(slopes)
         _subtract(slopes, self._forces_by_position)
         return slopes
+
+    @staticmethod
+    def _inner(swept: Twist, field: Field, exerted: Lifted) -> Expr:
+        """How the force along a column changes as all that carries it moves along another one."""
+        along = vec.dot(swept[0], exerted.wrench[0]) + vec.dot(field.s_rate, exerted.whirl)
+        return along + vec.dot(swept[1], exerted.wrench[1])
+
+    def _by_coordinates(self, slopes: Entries) -> Entries:
+        """Derivatives by the angles of balls as derivatives by Euler parameters: d(angles)/de = 4 N^T / e^2."""
+        kinematics = self._kinematics
+        found = {(i, self._places[j]): value for (i, j), value in slopes.items() if self._places[j] >= 0}
+        for ball in kinematics.balls:
+            e = kinematics.q[ball.coordinate : ball.coordinate + 4]
+            rates = list(kinematics.rates[ball.coordinate : ball.coordinate + 4])
+            N = jacobian(rates, kinematics.v[ball.velocity : ball.velocity + 3])
+            factor = 4.0 / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
+            for i in sorted({i for i, j in slopes if ball.velocity <= j < ball.velocity + 3}):
+                angles = [slopes.get((i, ball.velocity + c)) for c in range(3)]
+                for m in range(4):
+                    total = kinematics.graph.zero
+                    for c, slope in enumerate(angles):
+                        if slope is not None:
+                            total = total + slope * (N[m, c] * factor)
+                    found[i, ball.coordinate + m] = total
+        return found
 
 
 def applied_forces(kinematics: Kinematics) -> list[Expr]:

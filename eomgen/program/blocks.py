@@ -14,7 +14,7 @@ from .factor import exceeding, factorize, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
-from .slopes import ResidualSlopes, unrolled_jacobian
+from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
@@ -236,7 +236,7 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
-        elif name == "jacobian" and self.unrolled and (found := unrolled_jacobian(terms, self.slopes)):
+        elif (found := self._unrolled_derivative(name)) is not None:
             outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
@@ -360,6 +360,15 @@ class BlockMaker:
         """The port of the changes of inputs or parameters, and what changes -> the symbol of its change."""
         port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
+
+    def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
+        """A derivative of the right-hand side of a small tree, and checks of its mass matrix."""
+        if not self.unrolled or name not in ("jacobian", *SHIFTS):
+            return None
+        if name == "jacobian":
+            return unrolled_jacobian(self.terms, self.slopes)
+        names = self.terms.u if SHIFTS[name] == "input" else self.terms.p
+        return unrolled_shift(self.terms, self.slopes, names)
 
     def _derivatives(self, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
         """All derivatives of rows by symbols, row-major."""

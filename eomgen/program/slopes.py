@@ -7,8 +7,9 @@ differentiating their formula.  For a tree d(v')/dx = -M^-1 d(M a + h)/dx at a =
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 from ..equations.slopes import ForceSlopes
 from ..graph.core import Expr
@@ -129,40 +130,71 @@ def unrolled_jacobian(terms: SystemTerms, slopes: ResidualSlopes) -> tuple[list[
 
     Of the derivatives by recursion and by formula those that make it shorter.
     """
-    n, columns, limits = terms.n_v, len(terms.q) + terms.n_v, slopes.limits
-    if terms.given_rates or terms.by_columns:
+    symbols = [terms.graph.symbol(name) for name in (*terms.q, *terms.v)]
+    if not _fits(terms, slopes.limits, len(symbols)):
         return None
-    substitutions = sum(1 + 4 * len(path(terms.parent, k)) for k in range(n))
-    if columns * substitutions > limits.jacobian_nodes:
-        return None
-    found: list[tuple[Entries, Factor, list[Expr]]] = []
+    found: list[tuple[Entries, Solved]] = []
     if slopes.forces is not None:
-        mass, bias = slopes.forces.mass_matrix, slopes.forces.bias
-        factor = factorize(mass, terms.parent)
-        entries = slopes.joined(slopes.forces, solve(factor, [-h for h in bias]))
-        found.append((entries, factor, positivity(mass, factor, terms.coordinate_scales)))
+        solved = _solve(terms, slopes.forces.mass_matrix, slopes.forces.bias)
+        found.append((slopes.joined(slopes.forces, solved.accelerations), solved))
     if (terms.accelerations is None or not found) and slopes.is_short(terms.inverse_dynamics):
-        factor = factorize(terms.mass_matrix, terms.parent)
-        entries = slopes.by_formula_at(solve(factor, [-h for h in terms.bias]))
-        found.append((entries, factor, positivity(terms.mass_matrix, factor, terms.coordinate_scales)))
+        solved = _solve(terms, terms.mass_matrix, terms.bias)
+        found.append((slopes.by_formula_at(solved.accelerations), solved))
     if not found:
         return None
-    made = [(_rows(terms, entries, factor), checks) for entries, factor, checks in found]
+    rates = jacobian(list(terms.rates or symbols[len(terms.q) :]), symbols)
+    made = [(_rows(terms, rates, entries, solved, len(symbols)), solved.checks) for entries, solved in found]
     rows, checks = min(made, key=lambda one: count([*one[0], *one[1]]).total)
-    return (rows, checks) if count(rows).total <= limits.jacobian_nodes else None
+    return (rows, checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
 
 
-def _rows(terms: SystemTerms, entries: Mapping[tuple[int, int], Expr], factor: Factor) -> list[Expr]:
-    """dx'/dx, row-major, from derivatives of M a + h and the factor of M."""
-    graph, n_q, n = terms.graph, len(terms.q), terms.n_v
-    symbols = [graph.symbol(name) for name in (*terms.q, *terms.v)]
-    velocities = symbols[n_q:]
-    rates = jacobian(list(terms.rates or velocities), symbols)
+def unrolled_shift(
+    terms: SystemTerms, slopes: ResidualSlopes, names: Sequence[str]
+) -> tuple[list[Expr], list[Expr]] | None:
+    """The derivative of a tree's right-hand side by inputs or parameters, and checks, like the Jacobian."""
+    if not terms.mass_matrix or not _fits(terms, slopes.limits, len(names)):
+        return None
+    symbols = [terms.graph.symbol(name) for name in names]
+    solved = _solve(terms, terms.mass_matrix, terms.bias)
+    found = jacobian(list(terms.inverse_dynamics), symbols)
+    a = [terms.graph.symbol(name) for name in terms.a]
+    values = substitute(list(found.values()), dict(zip(a, solved.accelerations, strict=True)))
+    rows = _rows(terms, {}, dict(zip(found, values, strict=True)), solved, len(names))
+    return (rows, solved.checks) if count(rows).total <= slopes.limits.jacobian_nodes else None
+
+
+class Solved(NamedTuple):
+    """The factor of a tree's mass matrix, its accelerations, and the conditions for them to exist."""
+
+    factor: Factor
+    accelerations: list[Expr]
+    checks: list[Expr]
+
+
+def _solve(terms: SystemTerms, mass: Sequence[Sequence[Expr]], bias: Sequence[Expr]) -> Solved:
+    factor = factorize(mass, terms.parent)
+    return Solved(factor, solve(factor, [-h for h in bias]), positivity(mass, factor, terms.coordinate_scales))
+
+
+def _fits(terms: SystemTerms, limits: Limits, columns: int) -> bool:
+    """Whether so many solutions with the factor are not too long for straight-line code."""
+    substitutions = sum(1 + 4 * len(path(terms.parent, k)) for k in range(terms.n_v))
+    return not (terms.given_rates or terms.by_columns) and columns * substitutions <= limits.jacobian_nodes
+
+
+def _rows(terms: SystemTerms, rates: Entries, forces: Entries, solved: Solved, width: int) -> list[Expr]:
+    """Derivatives of x', row-major, from those of q' and of M a + h."""
+    zero, n_q, n = terms.graph.zero, len(terms.q), terms.n_v
     columns = [
         [
-            *(rates.get((i, k), graph.zero) for i in range(n_q)),
-            *solve(factor, [-entries.get((i, k), graph.zero) for i in range(n)]),
+            *(rates.get((i, k), zero) for i in range(n_q)),
+            *solve(solved.factor, [-forces.get((i, k), zero) for i in range(n)]),
         ]
-        for k in range(n_q + n)
+        for k in range(width)
     ]
     return [column[i] for i in range(n_q + n) for column in columns]
+
+
+def sparsity(outputs: Sequence[Expr]) -> list[int]:
+    """Places in a result whose entries are not identically zero."""
+    return [k for k, x in enumerate(outputs) if not x.is_zero]

@@ -11,12 +11,10 @@ from ..numeric.scales import Array
 from .compiled import stepper_options
 from .late import eager
 from .names import require
+from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
     from .module import Module
-
-
-IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods
 
 
 def find_solver(module: Module, name: str) -> Any:
@@ -31,14 +29,14 @@ def find_solver(module: Module, name: str) -> Any:
 def solver_class(core: Any, name: str) -> Any:
     """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
 
-    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs`` it is
-    SciPy's own.  A failed evaluation shortens the step.
+    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
+    Jacobian than the module's, it is SciPy's own.  A failed evaluation shortens the step.
 
     Parameters
     ----------
     core : Core
         Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'RK23'}
+    name : {'DOP853', 'RK45', 'RK23', 'Radau'}
 
     Raises
     ------

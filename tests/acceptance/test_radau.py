@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -85,8 +86,8 @@ def test_order_five_and_dense_output_of_order_three() -> None:
         ends.append(np.abs(found.y[:, -1] - [np.cos(2), -np.sin(2)]).max())
         times = np.linspace(0, 2, 301)
         within.append(np.abs(found.sol(times) - [np.cos(times), -np.sin(times)]).max())
-    assert all(4.8 < np.log2(a / b) < 5.3 for a, b in zip(ends, ends[1:], strict=False))
-    assert all(3.8 < np.log2(a / b) < 4.3 for a, b in zip(within, within[1:], strict=False))  # local error h^4
+    assert all(4.8 < np.log2(a / b) < 5.3 for a, b in pairwise(ends))
+    assert all(3.8 < np.log2(a / b) < 4.3 for a, b in pairwise(within))  # local error h^4
 
 
 def test_van_der_pol() -> None:
