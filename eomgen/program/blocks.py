@@ -67,7 +67,7 @@ class BlockMaker:
     @cached_property
     def by_direction(self) -> bool:
         """Whether the Jacobian of the residuals is too large to be written out."""
-        if self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
+        if not self.has_loops and self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
             return False
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))

@@ -23,6 +23,8 @@ from .terms import SystemTerms
 
 Entries = dict[tuple[int, int], Expr]
 
+PER_PAIR = 60  #: operations of the recursion for each pair of velocities on one path, at least
+
 
 class ResidualSlopes:
     """Derivatives by [q; v] of r1 = M a + h + C_q^T l, r2 = C_q a + gamma and r3 = C_q v + C_t.
@@ -42,13 +44,14 @@ class ResidualSlopes:
 
     @cached_property
     def forces(self) -> ForceSlopes | None:
-        """The recursion, where the tree has one."""
-        return self.terms.slopes() if self.terms.slopes is not None else None
+        """The recursion, where the tree has one that is not too long."""
+        return self.terms.slopes() if self.terms.slopes is not None and self.recursive else None
 
-    @property
+    @cached_property
     def recursive(self) -> bool:
-        """Whether the tree has the recursion."""
-        return self.terms.slopes is not None
+        """Whether the tree has the recursion, and pairs of velocities on one path to ground are few enough for it."""
+        pairs = sum(len(path(self.terms.parent, k)) for k in range(self.terms.n_v))
+        return self.terms.slopes is not None and PER_PAIR * pairs <= self.limits.jacobian_recursive
 
     @property
     def mass_matrix(self) -> Sequence[Sequence[Expr]]:
