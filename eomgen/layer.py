@@ -8,8 +8,11 @@ from pathlib import Path
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
-    "control", "signals", "tape", "plain", "rk4_step", "rk4", "event_values", "event_zero", "crossings", "loop",
-)  # fmt: skip
+    *("control", "signals", "tape"),
+    *("plain", "rk4_step", "rk4"),
+    *("lu", "newton", "radau", "radau_step"),
+    *("event_values", "event_zero", "crossings", "loop"),
+)
 
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {

@@ -64,10 +64,13 @@ def driver_files(program: Program) -> list[str]:
             needed = shift_files(program, driver.name, direct)
         elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
-        elif program.by_columns:
+        elif program.by_columns and "terms" not in driver.blocks:
             needed = COLUMNS[driver.name]
+        elif not program.has_loops and driver.name == "jacobian":
+            along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
+            needed = ("tree", *along)
         elif not program.has_loops:
-            needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
+            needed = TREES[driver.name]
         elif driver.name == "rhs" and "dynamics" in driver.blocks:
             needed = (*LOOPS["rhs"][:-1], "rhs_direct")
         elif driver.name == "jacobian":

@@ -14,6 +14,7 @@ from .factor import exceeding, factorize, is_unrolled, outward, positivity, solv
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
+from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
@@ -67,9 +68,16 @@ class BlockMaker:
     @cached_property
     def by_direction(self) -> bool:
         """Whether the Jacobian of the residuals is too large to be written out."""
+        if not self.has_loops and self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
+            return False
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
         return self.sizes.n_x * nodes > self.limits.jacobian_nodes
+
+    @cached_property
+    def slopes(self) -> ResidualSlopes:
+        """The derivatives of the residuals."""
+        return ResidualSlopes(self.terms, self.limits)
 
     # -- shared expressions ---------------------------------------------------------------------------------------
     @cached_property
@@ -231,6 +239,8 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+        elif (found := self._unrolled_derivative(name)) is not None:
+            outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
         elif name == "outputs" and self.unrolled:
@@ -257,7 +267,9 @@ class BlockMaker:
         if shift:
             return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
         if self.terms.by_columns:
-            return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
+            if name != "jacobian":
+                return ("mass_times",)
+            return ("acceleration_tangent",) if self.by_direction else ("terms", "scales", "residual_jacobian")
         if self.terms.system and (name in ("rhs", "outputs") or (name == "jacobian" and not self.terms.projects)):
             return self._system_needs(name, residual)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
@@ -293,7 +305,8 @@ class BlockMaker:
         terms, n = self.terms, self.sizes.n_v
         match name:
             case "terms":  # M lower packed, h, C_q, gamma
-                lower = [terms.mass_matrix[i][k] for i in range(n) for k in range(i + 1)]
+                mass = self.slopes.mass_matrix if terms.by_columns else terms.mass_matrix
+                lower = [mass[i][k] for i in range(n) for k in range(i + 1)]
                 every = [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
                 return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
@@ -317,7 +330,7 @@ class BlockMaker:
             case "accelerated_outputs":
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
-                return self._internal(name, "q v a multipliers", self._residual_jacobian())
+                return self._internal(name, "q v a multipliers", self.slopes.packed())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
             case "mass_times":  # M a
@@ -351,6 +364,15 @@ class BlockMaker:
         port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
 
+    def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
+        """A derivative of the right-hand side of a small tree, and checks of its mass matrix."""
+        if not self.unrolled or name not in ("jacobian", *SHIFTS):
+            return None
+        if name == "jacobian":
+            return unrolled_jacobian(self.terms, self.slopes)
+        names = self.terms.u if SHIFTS[name] == "input" else self.terms.p
+        return unrolled_shift(self.terms, self.slopes, names)
+
     def _derivatives(self, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
         """All derivatives of rows by symbols, row-major."""
         entries, zero = jacobian(rows, self._symbols(names)), self.terms.graph.zero
@@ -374,15 +396,3 @@ class BlockMaker:
         """q and v -> the symbols of their changes."""
         seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
         return dict(zip(self._symbols((*self.terms.q, *self.terms.v)), self._symbols(seeds), strict=True))
-
-    def _residual_jacobian(self) -> list[Expr]:
-        terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero
-        n_q = self.sizes.n_q
-        residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
-        entries = jacobian(residuals, self._symbols((*terms.q, *terms.v)))
-        result = []
-        for first, size, columns in ((0, n, "qv"), (n, m, "qv"), (n + m, m, "q")):
-            for column in columns:
-                start, width = (0, n_q) if column == "q" else (n_q, n)
-                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
-        return result

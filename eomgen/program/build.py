@@ -18,10 +18,13 @@ from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
+from .slopes import sparsity
 from .terms import SystemTerms
 
 #: Version of the generated functions' signatures and of the table that describes them.
 ABI = 1
+#: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
+SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
 
 
 def build_program(
@@ -39,7 +42,8 @@ def build_program(
         The equations.
     metadata : dict
         JSON-able; ``name`` is the prefix of all functions.  A copy is completed with ``abi``, the sizes,
-        ``kernels`` (shapes by name) and ``operations`` (counts per block; hoisted work under ``precompute``).
+        ``kernels`` (shapes by name), ``sparsity`` (of derivatives: places, row by row, of entries that do not
+        vanish identically) and ``operations`` (counts per block; hoisted work under ``precompute``).
     kernels : sequence of str, optional
         Public kernels wanted; all by default.
     limits : Limits, optional
@@ -97,6 +101,7 @@ def build_program(
         **asdict(sizes),
         "output_accelerations": maker.outputs_need_accelerations,
         "kernels": kernel_shapes,
+        "sparsity": {b.name: sparsity(b.outputs) for b in blocks.values() if b.outputs and b.name in SPARSE},
         "operations": {key: value.as_dict() for key, value in counts.items()},
     }
     _check_symbols(terms, blocks.values())

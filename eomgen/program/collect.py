@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
+from ..equations.slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -78,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
         projects=c.stabilised is None,
         canonical=equations.canonical,
+        slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
 
 

@@ -25,6 +25,7 @@ class Limits:
     unrolled: int = 24
     unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
+    jacobian_recursive: int = 40_000  #: the same of one made by recursion over composite bodies
     statements: int = 1500  #: statements in one generated function at most
 
 

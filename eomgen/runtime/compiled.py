@@ -124,7 +124,7 @@ def integrate_compiled(
             journey.dense() if dense else None,
             {ENDED: 0, TERMINAL: 1}.get(status, -1),
             MESSAGES.get(status, TOO_SMALL),
-            {"nfev": journey.evaluations, "njev": 0, "nlu": 0},
+            {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations},
             (start, journey.t),
         ),
         journey.failure,

@@ -21,7 +21,7 @@ from .pace import Crawling, Pace, describe_crawl, steepest
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
-from .tolerances import check_tolerances
+from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
@@ -126,7 +126,7 @@ def simulate(
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
     forcing = Forcing(module.layout, inputs)
-    compiled = can_run(module, method, forcing)
+    compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
     if method == "RK4" and not compiled:
         raise UsageError("method RK4 runs in compiled code only: target='cython', and no input that is a function")
     if compiled:

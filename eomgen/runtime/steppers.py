@@ -11,6 +11,7 @@ from ..numeric.scales import Array
 from .compiled import stepper_options
 from .late import eager
 from .names import require
+from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
     from .module import Module
@@ -28,14 +29,14 @@ def find_solver(module: Module, name: str) -> Any:
 def solver_class(core: Any, name: str) -> Any:
     """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
 
-    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs`` it is
-    SciPy's own.  A failed evaluation shortens the step.
+    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
+    Jacobian than the module's, it is SciPy's own.  A failed evaluation shortens the step.
 
     Parameters
     ----------
     core : Core
         Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'RK23'}
+    name : {'DOP853', 'RK45', 'RK23', 'Radau'}
 
     Raises
     ------
@@ -50,7 +51,9 @@ def solver_class(core: Any, name: str) -> Any:
         """A compiled stepper."""
 
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
-            if isinstance(fun, rhs) and fun.name == "rhs":
+            jac = options.get("jac")
+            known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
+            if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
             return own(fun, *args, **options)
 
@@ -68,6 +71,8 @@ def solver_class(core: Any, name: str) -> Any:
             **extraneous: Any,
         ) -> None:
             super().__init__(fun, t0, y0, t_bound, vectorized)
+            for key in IMPLICIT if name == "Radau" else ():  # the model's own Jacobian, or none
+                extraneous.pop(key, None)
             options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
             settings = stepper_options(self.n, abs(t_bound - t0), options)
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
@@ -80,6 +85,26 @@ def solver_class(core: Any, name: str) -> Any:
 
         @nfev.setter
         def nfev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def njev(self) -> int:
+            """Evaluations of the Jacobian so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.differentiations)
+
+        @njev.setter
+        def njev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def nlu(self) -> int:
+            """Matrices factored so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.factorizations)
+
+        @nlu.setter
+        def nlu(self, value: int) -> None:
             """OdeSolver sets it to 0 before there is a stepper."""
 
         def _step_impl(self) -> tuple[bool, str | None]:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from .layout import number
 
+IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 LEAST = 100.0 * np.finfo(float).eps  #: smallest relative tolerance, as in SciPy: nothing smaller can be kept
 
 

@@ -5,6 +5,7 @@ cdef extern from "eomgen_ensembles.h" nogil:
         const eomgen_method *method
         const eomgen_model *model
         eomgen_function rhs
+        eomgen_function jacobian
         eomgen_lane_function lane_rhs
         int lane_width
         int n
@@ -111,6 +112,8 @@ cdef class Ensemble:
         self.held = [x0, p, u, nodes, atol, asked]
         all.method, all.model = METHODS[methods.index(method)], MODEL
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
+        if all.method.squares > 0:
+            all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         if LANES != NULL:
             all.lane_rhs, all.lane_width = LANES.kernels[index], LANES.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)

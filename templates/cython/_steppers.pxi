@@ -38,12 +38,14 @@ cdef extern from "eomgen_steppers.h" nogil:
         long look_in
         long (*look)(void *, const double *) noexcept nogil
         void *looker
+        eomgen_function jacobian
+        long differentiations, factorizations
         int stopped
     ctypedef struct eomgen_method:
         const char *name
-        int rows_K, rows_F, error_order
+        int rows_K, rows_F, error_order, squares
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4
+    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
                      double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
@@ -53,10 +55,10 @@ cdef extern from "eomgen_steppers.h" nogil:
     const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
-cdef method_pointer[4] METHODS
+cdef method_pointer[5] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
-METHODS[3] = &eomgen_rk4
-methods = tuple([METHODS[i].name.decode() for i in range(4)])
+METHODS[3], METHODS[4] = &eomgen_rk4, &eomgen_radau
+methods = tuple([METHODS[i].name.decode() for i in range(5) if METHODS[i].squares == 0 or "jacobian" in names])
 
 
 cdef class Tape:
@@ -179,8 +181,9 @@ cdef class Stepper:
 
     Attributes
     ----------
-    t, t_old, evaluations, rejected
-        Time, time before the last step, calls of the right-hand side so far, steps tried in vain.
+    t, t_old, evaluations, rejected, differentiations, factorizations
+        Time, time before the last step, calls of the right-hand side so far, steps tried in vain; of implicit methods,
+        calls of the Jacobian and matrices factored.
     """
 
     cdef eomgen_run run
@@ -197,6 +200,9 @@ cdef class Stepper:
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (4 + self.method.rows_K + self.method.rows_F)
+        if self.method.squares > 0:
+            length += self.method.squares * n * n + 16 + n
+            self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -210,6 +216,8 @@ cdef class Stepper:
         run.failure_state = run.f + n
         run.K = run.failure_state + n
         run.F = run.K + n * self.method.rows_K
+        if self.method.squares > 0:
+            run.F += self.method.squares * n * n + 16 + n
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
@@ -257,6 +265,14 @@ cdef class Stepper:
     @property
     def rejected(self):
         return self.run.rejected
+
+    @property
+    def differentiations(self):
+        return self.run.differentiations
+
+    @property
+    def factorizations(self):
+        return self.run.factorizations
 
     @property
     def failure(self):

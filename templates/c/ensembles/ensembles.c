@@ -39,6 +39,13 @@ long eomgen_ensemble_take(eomgen_ensemble *e)
     return k < e->count ? k : -1;
 }
 
+/* Doubles of an implicit method after its stages. */
+static long squares(const eomgen_ensemble *e)
+{
+    const long n = e->n;
+    return e->method->squares > 0 ? e->method->squares * n * n + 16 + n : 0;
+}
+
 long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const eomgen_lane_worker *const worker = find_worker(e, own);
@@ -46,7 +53,7 @@ long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
         return worker->memory(e);
     }
     const long rows = 4 + e->method->rows_K + e->method->rows_F;
-    return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + e->n_eval;
+    return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + squares(e) + e->n_eval;
 }
 
 static long look_at_stop(void *looker, const double *t)
@@ -127,7 +134,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     eomgen_run run;
     memset(&run, 0, sizeof run);
     double *const constants = own->memory;
-    run.rhs = e->rhs, run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
+    run.rhs = e->rhs, run.jacobian = e->jacobian, run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
     run.rtol = e->rtol, run.atol = e->atol, run.max_step = e->max_step, run.most_steps = e->max_steps;
     run.look = look_at_stop, run.looker = e;
     run.w = constants + e->model->n_const;
@@ -135,7 +142,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     run.y = run.u + e->model->n_u;
     run.y_old = run.y + n, run.f = run.y_old + n, run.failure_state = run.f + n;
     run.K = run.failure_state + n;
-    run.F = run.K + e->method->rows_K * n;
+    run.F = run.K + e->method->rows_K * n + squares(e);
     double *const times = run.F + e->method->rows_F * n;
     for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
         run_one(e, &run, own, constants, times, k);

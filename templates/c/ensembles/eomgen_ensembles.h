@@ -15,6 +15,7 @@ typedef struct {
     const eomgen_method *method;
     const eomgen_model *model;
     eomgen_function rhs;
+    eomgen_function jacobian;      /* of implicit methods */
     eomgen_lane_function lane_rhs; /* NULL: one trajectory at a time */
     int lane_width;
     int n;                        /* states */

@@ -74,10 +74,16 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
     if (!(run->h_abs > 0.0)) {
         run->h_abs = first_step(method, run);
     }
+    if (method->begin != NULL) {
+        method->begin(run);
+    }
 }
 
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
+    if (method->step != NULL) {
+        return method->step(run);
+    }
     const int n = run->n;
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
     double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs < least ? least : run->h_abs;

@@ -53,6 +53,8 @@ typedef struct {
     long look_in;                 /* evaluations until look is called; below 0 never */
     long (*look)(void *looker, const double *t); /* the next look_in, or 0 to stop the run */
     void *looker;
+    eomgen_function jacobian;     /* of implicit methods */
+    long differentiations, factorizations;
     int stopped;                  /* look said so: results of evaluations are NaN from then on, and no step is taken */
 } eomgen_run;
 
@@ -67,9 +69,12 @@ typedef struct {
     void (*prepare)(eomgen_run *run);
     void (*interpolate)(const eomgen_run *run, double t, double *y);
     int fixed; /* steps are all max_step long, but for the last */
+    int squares; /* of implicit methods: n x n matrices after the rows in run->K, then 16 + n numbers */
+    void (*begin)(eomgen_run *run);
+    int (*step)(eomgen_run *run); /* in place of attempt and error */
 } eomgen_method;
 
-extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4;
+extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau;
 
 enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEPS = -104 };
 
@@ -89,6 +94,9 @@ void eomgen_play(const eomgen_tape *tape, double t, const double *y, const doubl
 
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k);
+
+/* dx'/dx at (t, y), where x' is f, into J; spare: 2 n doubles. 0, or the status of a failure, which is remembered. */
+int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare);
 
 /* First evaluation, and h_abs unless it is positive already. */
 void eomgen_start(const eomgen_method *method, eomgen_run *run);

@@ -6,7 +6,8 @@
 #define EVALUATE eomgen_evaluate
 #define root(a) sqrt(a)
 #define larger_of(a, b) fmax(a, b)
-#define METHOD(name, title, ...) \
-    const eomgen_method eomgen_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, \
-                                          name##_interpolate, 0 };
+#define METHOD(name_, title, K, F, order) \
+    const eomgen_method eomgen_##name_ = {.name = title, .rows_K = K, .rows_F = F, .error_order = order, \
+        .attempt = name_##_attempt, .error = name_##_error, .prepare = name_##_prepare, \
+        .interpolate = name_##_interpolate};
 #include "eomgen_methods.h"
