@@ -84,7 +84,7 @@ def integrate_compiled(
     reached = nodes[0]
     for start, end in pairwise(nodes):
         first = {**settings, "first_step": min(settings["first_step"], abs(end - start))}
-        stepper = core.stepper(method, context, start, x, end, signals=signals, **first)
+        stepper = core.stepper(method, context, start, x, end, signals=signals, closed=True, **first)
         asked = None if t_eval is None else _part(t_eval, start, end, end == nodes[-1])
         if asked is not None and asked.size and asked[0] == start:
             times.append(asked[:1])

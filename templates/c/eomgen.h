@@ -39,6 +39,7 @@ typedef struct {
     const eomgen_kernel *kernels;
     int (*precompute)(const double *p, double *c);
     const char *metadata; /* JSON: names, units, values */
+    int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
 } eomgen_model;
 
 /* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */

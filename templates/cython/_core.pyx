@@ -34,6 +34,7 @@ cdef extern from "eomgen.h" nogil:
         const eomgen_kernel *kernels
         int (*precompute)(const double *, double *) noexcept nogil
         const char *metadata
+        int closed_at
     const eomgen_model *eomgen_model_table() noexcept
 
 cdef enum:

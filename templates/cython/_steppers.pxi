@@ -19,6 +19,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         double *y
         double *y_old
         double *f
+        const double *closed
+        double *next
         double *K
         double *F
         int interpolates
@@ -86,6 +88,8 @@ cdef class Stepper:
         A first step of 0 is chosen.
     signals : list of (index, order, times, values), optional
         Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values.
+    closed : bool
+        Start each step on the constraints, where the last one came near them.
 
     Attributes
     ----------
@@ -101,13 +105,13 @@ cdef class Stepper:
     cdef list held
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
-                  double max_step, double first_step=0.0, signals=()):
+                  double max_step, double first_step=0.0, signals=(), closed=False):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
         self.method = METHODS[methods.index(method)]
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
-        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (4 + self.method.rows_K + self.method.rows_F)
+        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -119,7 +123,9 @@ cdef class Stepper:
         run.y_old = run.y + n
         run.f = run.y_old + n
         run.failure_state = run.f + n
-        run.K = run.failure_state + n
+        run.next = run.failure_state + n
+        run.closed = run.w + MODEL.closed_at if closed and MODEL.closed_at else NULL
+        run.K = run.next + n
         run.F = run.K + n * self.method.rows_K
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
