@@ -75,6 +75,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "n_const": n_const,
         "n_work": n_work,
         "hoisted": len(program.hoisted),
+        "closed_at": closed_at(program, areas),
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
         "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
@@ -105,6 +106,12 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "layouts": describe_layouts(program),
         "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
+
+
+def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
+    """Where in the work array the right-hand side leaves its state [q; v] on the constraints; 0 where it does not."""
+    closes = any(d.name == "rhs" for d in program.drivers) and program.has_loops and program.projects
+    return next(start for name, start, _ in areas if name == "X") if closes else 0
 
 
 def _literal_lines(text: str, width: int = 100) -> list[str]:

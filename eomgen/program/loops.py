@@ -25,6 +25,7 @@ LARGE = 8  #: velocities above which configurations of lost rank are passed here
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 LOST = 1e-5  #: least square of the sine between a column and those before it
 VANISHED = 1e-20  #: the same of large mechanisms
+ROUNDED = 2.0**-51  #: of the terms of a constraint row, what rounding may leave of their sum
 
 
 def largest(values: Sequence[Expr]) -> Expr:
@@ -42,6 +43,21 @@ def total_magnitude(values: Sequence[Expr]) -> Expr:
     for x in values:
         total = total + graph.apply("abs", x)
     return total
+
+
+def summands(x: Expr) -> list[Expr]:
+    """The terms of a sum of sums, each once."""
+    found: list[Expr] = []
+    waiting, seen = [x], {x}
+    while waiting:
+        y = waiting.pop()
+        operation, *ids = y.node
+        operands = [] if operation not in ("add", "sub", "neg") else [Expr(x.graph, i) for i in ids]
+        if not operands:
+            found.append(y)
+        waiting += [y for y in operands if y not in seen]
+        seen.update(operands)
+    return found
 
 
 class LoopBlocks:
@@ -101,6 +117,9 @@ class LoopBlocks:
         if not self.h:
             return [graph.zero] * (3 + self.terms.n_v)
         e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
+        if self.gentle:
+            closed = self._closed()
+            e = [graph.apply("select", closed, graph.zero, x) for x in e]
         rows = self.J[: self.h]
         size = total_magnitude(e) * (self.unit / float(self.h))
         factor, term = self._regularised(rows, graph.apply("max", graph.constant(GENTLE), size))
@@ -108,6 +127,12 @@ class LoopBlocks:
         dz = times(transpose(rows, self.terms.n_v), z)
         left = total_magnitude(z) * term * self.unit
         return [size, left, total_magnitude(dz), *(-s * d for s, d in zip(self.s, dz, strict=True))]
+
+    def _closed(self) -> Expr:
+        """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
+        graph = self.terms.graph
+        beyond = [graph.apply("abs", row) - ROUNDED * total_magnitude(summands(row)) for row in self.terms.constraints]
+        return graph.apply("lt", largest(beyond), graph.zero)
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property

@@ -53,6 +53,7 @@ typedef struct {
     int (*precompute)(const double *p, double *c);
     const char *metadata; /* JSON: names, units, values */
     const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
+    int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
 } eomgen_model;
 
 /* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */

@@ -42,6 +42,7 @@ cdef extern from "eomgen.h" nogil:
         int (*precompute)(const double *, double *) noexcept nogil
         const char *metadata
         const eomgen_lanes_pointer *lanes
+        int closed_at
     const eomgen_model *eomgen_model_table() noexcept
 
 cdef enum:

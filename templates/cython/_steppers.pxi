@@ -26,6 +26,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         double *y
         double *y_old
         double *f
+        const double *closed
+        double *next
         double *K
         double *F
         int interpolates
@@ -177,7 +179,7 @@ cdef class Stepper:
     signals : list of (index, order, times, values) or (index, (code, numbers, out)), optional
         Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values; or an expression.
     plan : dict, optional
-        Of a Journey; then the first evaluation is left to it.
+        Of a Journey; then the first evaluation is left to it, and each step starts on the constraints.
 
     Attributes
     ----------
@@ -199,7 +201,7 @@ cdef class Stepper:
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
-        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (4 + self.method.rows_K + self.method.rows_F)
+        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
             length += self.method.squares * n * n + 16 + n
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
@@ -214,7 +216,9 @@ cdef class Stepper:
         run.y_old = run.y + n
         run.f = run.y_old + n
         run.failure_state = run.f + n
-        run.K = run.failure_state + n
+        run.next = run.failure_state + n
+        run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
+        run.K = run.next + n
         run.F = run.K + n * self.method.rows_K
         if self.method.squares > 0:
             run.F += self.method.squares * n * n + 16 + n

@@ -52,7 +52,7 @@ long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
     if (worker != NULL) {
         return worker->memory(e);
     }
-    const long rows = 4 + e->method->rows_K + e->method->rows_F;
+    const long rows = 5 + e->method->rows_K + e->method->rows_F;
     return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + squares(e) + e->n_eval;
 }
 
@@ -141,7 +141,9 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     run.u = run.w + e->model->n_work;
     run.y = run.u + e->model->n_u;
     run.y_old = run.y + n, run.f = run.y_old + n, run.failure_state = run.f + n;
-    run.K = run.failure_state + n;
+    run.next = run.failure_state + n;
+    run.closed = e->model->closed_at ? run.w + e->model->closed_at : NULL;
+    run.K = run.next + n;
     run.F = run.K + e->method->rows_K * n + squares(e);
     double *const times = run.F + e->method->rows_F * n;
     for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {

@@ -41,6 +41,8 @@ typedef struct {
     const double *atol;           /* n */
     double t, t_old, step, h_abs; /* step: the last one taken, with its sign; h_abs: size of the next to try */
     double *y, *y_old, *f;        /* n: state, the one before, x' of the state */
+    const double *closed;         /* n in w: the state of the last evaluation on the constraints; NULL: steps start as they are */
+    double *next;                 /* n: where the next step starts, if not NULL */
     double *K;                    /* rows_K rows of n: stages */
     double *F;                    /* rows_F rows of n: coefficients between y_old and y */
     int interpolates;             /* F belongs to the last step */
