@@ -32,6 +32,7 @@ _ERRORS = (
     "SimulationError",
     "SingularMassMatrixError",
     "ToolchainError",
+    "UnsolvedError",
     "UsageError",
 )
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
