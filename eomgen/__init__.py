@@ -35,6 +35,7 @@ _ERRORS = (
     "SimulationInterrupted",
     "SingularMassMatrixError",
     "ToolchainError",
+    "UnsolvedError",
     "UsageError",
     "ZenoError",
 )

@@ -10,6 +10,7 @@
     |  |- SingularMassMatrixError   a combination of coordinates has no inertia behind it
     |  |- ProjectionError           the state could not be brought onto the constraints
     |  |- PartitionError            the chosen independent coordinates cannot move the mechanism here
+    |  |- UnsolvedError             rounding leaves the linear system of a method unsolved
     |  '- NonFiniteError            a result is not a finite number
     |- EquilibriumError      no equilibrium was found from the guess; .forces says what is left
     |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
@@ -126,6 +127,10 @@ class PartitionError(EvaluationError):
     """The chosen independent coordinates are not independent at this configuration."""
 
 
+class UnsolvedError(EvaluationError):
+    """Rounding leaves the linear system of a method unsolved: its accelerations would be wrong."""
+
+
 class NonFiniteError(EvaluationError):
     """A result is NaN or infinite."""
 
@@ -200,4 +205,5 @@ STATUS: dict[int, type[EvaluationError]] = {
     2: SingularMassMatrixError,
     3: ProjectionError,
     4: PartitionError,
+    5: UnsolvedError,
 }

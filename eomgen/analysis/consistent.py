@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ProjectionError, UsageError
-from ..numeric.projection import ACCEPTED, EXACT, TIKHONOV, gram_solver, largest
+from ..numeric.gram import EXACT, GENTLE, gram_solver
+from ..numeric.projection import ACCEPTED, largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 
@@ -139,7 +140,7 @@ def _positions(
                 return q
             if not np.isfinite(size) or not J.any():
                 return None
-            q, before = moved(q, -J.T @ gram_solver(J, max(TIKHONOV, size))(C)), size
+            q, before = moved(q, -J.T @ gram_solver(J, max(GENTLE, size))(C)), size
         return None
 
     def change(q: Array) -> Array:

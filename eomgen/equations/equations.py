@@ -26,8 +26,9 @@ class LinearSystem:
     right : r
     relaxed : (row, column) of constraint equations and their reactions.  Where constraints are redundant, K is
         singular; solvers subtract a small number there and refine the result until K z = r holds.
-    sizes : per place in ``relaxed`` the typical size of the constraint, of parameters only.  Entries of a redundant
-        equation may be nothing but rounding, so that these equations are not scaled by the size of their entries.
+    sizes : of each equation, then of each unknown, its unit made of a length, a mass and 1 s, of parameters only: what
+        K is balanced from, so that results do not depend on units.  Entries of a redundant equation may be nothing but
+        rounding, so that those of constraints are not scaled by the size of their entries at all.
     accelerations : (n_v,) a in terms of z and the state
     """
 

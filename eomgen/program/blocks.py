@@ -320,7 +320,7 @@ class BlockMaker:
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
-            case "system":  # entries of K, then r, then sizes of the constraints
+            case "system":  # entries of K, then r, then sizes of equations and of unknowns
                 assert terms.system is not None
                 system = terms.system
                 return self._internal(name, "q v", [*system.entries, *system.right, *system.sizes])

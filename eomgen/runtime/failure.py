@@ -28,6 +28,10 @@ WORDS = {
         "the independent coordinates cannot move the mechanism here (dead centre or singular position)",
         "choose other independent coordinates, or start a little away from a change point",
     ),
+    5: (
+        "rounding leaves the linear system of the equations of motion unsolved",
+        "compile with method='embedding', or look for bodies or lengths of very different sizes",
+    ),
 }
 
 

@@ -14,7 +14,8 @@ enum {
     EOMGEN_NON_FINITE = 1,           /* a result is NaN or infinite */
     EOMGEN_SINGULAR_MASS_MATRIX = 2, /* a motion has no inertia behind it */
     EOMGEN_PROJECTION_FAILED = 3,    /* the state could not be brought onto the constraints */
-    EOMGEN_PARTITION_BAD = 4         /* the independent coordinates cannot move the mechanism here */
+    EOMGEN_PARTITION_BAD = 4,        /* the independent coordinates cannot move the mechanism here */
+    EOMGEN_UNSOLVED = 5              /* rounding leaves the linear system of the accelerations unsolved */
 };
 
 /* t: time; x: the inputs one after the other; u: inputs over time; c: constants made by precompute;
