@@ -108,7 +108,8 @@ def compile_loop(
     objects, seconds = [], 0.0
     for file in [f for f in texts if f.endswith(".c")]:
         start = perf_counter()
-        _run([*compiler.command, *flags, "-I", str(own), *extra, "-c", str(own / file), "-o", str(own / f"{file}.o")])
+        includes = ["-I", str(own), "-DEOMGEN_LANES=0"]  # one state at a time: no files of vector kernels
+        _run([*compiler.command, *flags, *includes, *extra, "-c", str(own / file), "-o", str(own / f"{file}.o")])
         seconds += perf_counter() - start
         objects.append(str(own / f"{file}.o"))
     library, loop = own / "loop.so", str(HERE / "rhs_loop.c")

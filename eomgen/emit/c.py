@@ -34,8 +34,11 @@ def emit_c(program: Program) -> SourceSet:
     calls = used_calls(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
     further = {
-        f"{program.name}_part{k}.c": render("c/part.c.j2", {**context, "functions": functions})
-        for k, functions in enumerate(parts, 1)
+        f"{program.name}_part{k}.c": render(
+            "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
+            {**context, "part_names": [name for name, _ in part], "functions": [text for _, text in part]},
+        )
+        for k, part in enumerate(parts, 1)
     }
     return SourceSet(
         {
