@@ -67,9 +67,9 @@ def simulate(
         constant outside; their corners are stepped on exactly.  An expression is a text as in model files, of t,
         coordinates, velocities and parameters.
     method : str or OdeSolver subclass, optional
-        A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
-        SciPy's steps unless there are inputs that are functions; implicit ones get the exact Jacobian.  RK4 takes steps
-        of one size, in compiled code only.
+        A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
+        with SciPy's steps unless there are inputs that are functions; implicit ones get the exact Jacobian.  RK4 takes
+        steps of one size, in compiled code only.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
