@@ -62,7 +62,8 @@ def simulate(
         Tables are linear in between and constant outside; their corners are stepped on exactly.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
-        SciPy's steps unless there are events or inputs that are functions; implicit ones get the exact Jacobian.
+        SciPy's steps, each started on the constraints where the last came near them, unless there are events or inputs
+        that are functions; implicit ones get the exact Jacobian.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
