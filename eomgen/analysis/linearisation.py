@@ -128,7 +128,8 @@ class Linearisation:
         if tangent is None:
             plain = np.array([layout.length if kind == "length" else 1.0 for kind in layout.coordinate_kinds])
             return np.asarray(self.drift / np.concatenate([plain, s]))
-        return np.asarray(self.drift / np.concatenate([s[tangent.positions], s[tangent.velocities]]))
+        places = layout.place_scales.q[tangent.positions]
+        return np.asarray(self.drift / np.concatenate([places, s[tangent.velocities]]))
 
     @property
     def stability(self) -> str:
@@ -158,6 +159,8 @@ class Linearisation:
             integrals of the velocities (nonholonomic constraints).
         """
         if self.mass is None or self.damping is None or self.stiffness is None:
+            if self.layout.given_rates:
+                raise UsageError("rates of coordinates that are functions of other velocities have no such form; use A")
             raise UsageError("the full form has no second-order form; linearise with form='minimal'")
         chosen = names or self.position_names
         rows = []
