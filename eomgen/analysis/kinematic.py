@@ -231,7 +231,7 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
         length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
         path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
-        along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0)
+        along = np.abs(dt) if dt[-1] or not len(dy) else np.abs(dy / follower.led_scales[:, None]).max(axis=0)
         track = Track(follower, path, q, length)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([track.holds(s) for s in along])

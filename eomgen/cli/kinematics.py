@@ -25,6 +25,7 @@ from .options import (
 )
 from .run import TABLES, complete_parameters, final_names, sort_settings
 from .screen import finite, print_heading, print_json, print_rows, print_table, stage
+from .workspace import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
     from ..analysis.motions import KinematicAnalysis
@@ -47,6 +48,14 @@ SHOWN = 9  #: of them on the screen
     help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges have one count.",
 )
 @click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can go from the start.")
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="NAME=LOW:HIGH:COUNT",
+    help="Find the workspace of --of over a grid of coordinates, one --over for each (up to three); t for drivers.",
+)
+@click.option("--of", multiple=True, metavar="NAME", help="Outputs or coordinates of the workspace.")
+@click.option("--within-limits", is_flag=True, help="Keep the workspace within the limits of the joints.")
 @click.option("--partial", is_flag=True, help="Give the part of the range that can be reached.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
@@ -60,6 +69,9 @@ def kinematics(
     target: str,
     ranges: tuple[str, ...],
     limits: tuple[str, ...],
+    over: tuple[str, ...],
+    of: tuple[str, ...],
+    within_limits: bool,
     partial: bool,
     settings: tuple[str, ...],
     out: Path | None,
@@ -68,10 +80,12 @@ def kinematics(
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
 
-    Without --range, drivers move the model from t = 0 to the end given in its file.
+    Without --range, drivers move the model from t = 0 to the end given in its file.  With --over and --of, find what
+    outputs can reach over a grid of coordinates instead.
     """
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
+    grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
     if plot is not None:
@@ -89,12 +103,13 @@ def kinematics(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    named = _values(module, asked) if asked or not limits else {}
+    named = _values(module, asked) if asked or not (limits or grid) else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()
     with stage("kinematics"):
         motion = bound.kinematic_analysis(initial=initial or None, partial=partial, **named) if named else None
         found = [bound.motion_range(name, initial=initial or None) for name in limits]
+        space = bound.workspace(grid, of, initial=initial or None, limits=within_limits) if grid else None
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files: list[str] = []
     if motion is not None and out is not None:
@@ -107,6 +122,8 @@ def kinematics(
 
         plot_motion(motion, find_paths(equations.kinematics.mechanism), plot)
         files.append(str(plot))
+    if space is not None:
+        files += write_workspace(space, out, plot)
     if as_json:
         report: dict[str, Any] = {
             "name": module.name,
@@ -114,9 +131,8 @@ def kinematics(
             "seconds": seconds,
             "files": files,
         }
-        print_json(
-            report | {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
-        )
+        report |= {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
+        print_json(report if space is None else report | {"workspace": workspace_to_dict(space)})
         return
     click.echo(str(equations.report))
     if motion is not None:
@@ -125,6 +141,9 @@ def kinematics(
         print_heading(f"range of {one.name}")
         sides = (("lower", one.lower, one.stops[0], one.gaps[0]), ("upper", one.upper, one.stops[1], one.gaps[1]))
         print_rows([(s, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for s, x, stop, gap in sides])
+    if space is not None:
+        print_heading(space.title)
+        print_rows(space.facts)
     for file in files:
         click.echo(f"wrote {file}")
 

@@ -32,7 +32,7 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
           "simulate_impacts", "consistent")  # fmt: skip
-MOTIONS = ("kinematic_analysis", "motion_range")
+MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", *ANALYSES)
 
