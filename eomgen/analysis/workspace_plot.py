@@ -38,7 +38,7 @@ def plot_workspace(ws: Workspace, by: str, ax: Any = None, figure: Any = None) -
         if k == 1 and len(shown) <= 3 and by not in shown:
             _mark(ws, panel, shown)
         units = {ws.units.get(name, "") for name in shown}
-        if len(units) == 1 and len(shown) == 2:
+        if k == 0 and len(units) == 1 and len(names) == 2:
             panel.set_aspect("equal", adjustable="datalim")
         panels.append(panel)
     if ax is not None:
@@ -69,4 +69,4 @@ def _mark(ws: Workspace, panel: Any, names: tuple[str, ...]) -> None:
             places = [[one.values[name] for one in same] for name in names]
             panel.scatter(*places, marker=marker, s=14, color=colour, linewidths=0.8, label=f"singular: {kind}")
     if panel.get_legend_handles_labels()[0]:
-        panel.legend(fontsize="small", loc="upper right")
+        panel.legend(fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
