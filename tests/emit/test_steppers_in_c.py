@@ -58,7 +58,8 @@ static void *trajectory(void *given)
     run.y = memory, run.y_old = memory + 2, run.f = memory + 4, run.failure_state = memory + 6, run.K = memory + 8;
     run.F = run.K + 2 * 16;
     eomgen_events events = {.n = 1, .n_model = 1, .values = height, .direction = direction, .most = most,
-        .action = action, .resets = rebound, .n_resets = 1, .reset_of = zero, .reset_x = one, .values_reset = reset, .g = numbers,
+        .action = action, .resets = rebound, .n_resets = 1, .reset_of = zero, .reset_x = one,
+        .values_reset = reset, .g = numbers,
         .g_new = numbers + 1, .slope = numbers + 2, .slope_new = numbers + 3, .size = numbers + 4, .trial = numbers + 5,
         .latest = numbers + 6, .bracket = numbers + 7, .y = numbers + 15, .count = count, .leaving = leaving,
         .whose = whose, .fired = fired};
