@@ -67,7 +67,7 @@ def _cython(program: Program) -> dict[str, str]:
     written = (*sources, *read_layer())
     context = _context(program) | {
         "c_files": [name for name in written if name.endswith(".c")],
-        "headers": [name for name in written if name.endswith(".h")],
+        "headers": [name for name in written if name.endswith((".h", ".pxi"))],
     }
     return {
         **sources,
