@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ProjectionError, UsageError
-from ..numeric.gram import EXACT, GENTLE, gram_solver
+from ..numeric.gram import EXACT, GENTLE, gram_solver, least
 from ..numeric.projection import ACCEPTED, largest
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
 CLOSING = 25  #: Newton steps onto the constraints, at most
 STILL = 1e-12  #: scaled step along the constraints at which the nearest position is found
-RANK = 1e-9  #: relative to the largest singular value of the scaled constraint Jacobian
 DAMPING = 0.5  #: largest scaled step
 
 
@@ -188,9 +188,8 @@ def _velocities(
     J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
     J = np.linalg.solve(L, J.T).T
     v = np.array(v)
-    for _ in range(3):  # again, so that the Tikhonov term leaves no trace
-        rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
-        v[free] -= np.linalg.solve(L.T, J.T @ gram_solver(J)(rate))
+    rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
+    v[free] += np.linalg.solve(L.T, least(J, -rate, np.zeros(J.shape[1]), max(largest(v / scales.q), largest(rate))))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
     if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array, Scales
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-RANK = 1e-10  #: relative to the largest singular value of the scaled constraint Jacobian
 
 
 class States(NamedTuple):
@@ -153,3 +152,12 @@ def evaluate(
         for k in range(len(states.t))
     ]
     return states.shaped(np.concatenate(parts, axis=-1), out)
+
+
+def free_motions(J: Array, scales: Scales) -> Array:
+    """Velocities that the constraints C_q = J (m, n_v) allow, (n_v, n_dof), orthonormal in scaled coordinates."""
+    if not len(J):
+        return np.diag(scales.q)
+    _, sizes, Vt = np.linalg.svd(scales.jacobian(J))
+    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
+    return np.asarray(scales.q[:, None] * Vt[rank:].T)

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from .constrained import RANK, States, prepare, solve_multipliers
+from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def find_forces(
     count = len(states.t)
     names = _drives(layout, actuated)
     C_q, free = states.jacobian(), states.accelerations()
-    bases = [_basis(J, layout) for J in C_q]
+    bases = [free_motions(J, layout.scales) for J in C_q]
     accelerations = _complete(states, bases, free, a)
     needed = states.residual(accelerations)
     S, base = _effects(states, names)
@@ -145,16 +146,6 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     if not names or len(set(names)) < len(names):
         raise UsageError("actuated: at least one coordinate or input, each once")
     return names
-
-
-def _basis(J: Array, layout: Layout) -> Array:
-    """Velocities that the constraints allow (n_v, n_dof), in scaled coordinates."""
-    s = layout.scales
-    if not len(J):
-        return np.diag(s.q)
-    _, sizes, Vt = np.linalg.svd(J * (s.q / s.c[:, None]))
-    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
-    return np.asarray(s.q[:, None] * Vt[rank:].T)
 
 
 def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Array:

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from .constrained import RANK, States, prepare, solve_multipliers
+from .constrained import States, free_motions, prepare, solve_multipliers
 from .linear import output_derivatives
 from .tables import as_text
 
@@ -153,7 +154,7 @@ def _strike(
     C_q = states.jacobian()
     M = states.evaluate(module.mass_matrix, states.q)[..., 0]
     rows, rates = normals(states, (*gaps, *locked))
-    B = _free(C_q[0], layout)
+    B = free_motions(C_q[0], layout.scales)
     factor = np.linalg.cholesky(B.T @ M @ B) if B.shape[1] else np.zeros((0, 0))
     half = np.linalg.solve(factor, B.T @ rows.T) if B.shape[1] else np.zeros((0, len(rows)))
     A = half.T @ half  # rates of the gaps by impulses
@@ -190,15 +191,6 @@ def check_gaps(layout: Layout, gaps: Mapping[str, float], locked: Sequence[str])
     for name, e in gaps.items():
         if not 0.0 <= float(e) <= 1.0:
             raise UsageError(f"gaps: the restitution of {name} is between 0 and 1, not {e}")
-
-
-def _free(J: Array, layout: Layout) -> Array:
-    s = layout.scales
-    if not len(J):
-        return np.diag(s.q)
-    _, sizes, Vt = np.linalg.svd(J * (s.q / s.c[:, None]))
-    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
-    return np.asarray(s.q[:, None] * Vt[rank:].T)
 
 
 def _normals(states: States, names: Sequence[str]) -> tuple[Array, Array]:

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import PartitionError
+from .rank_limits import CHOSEN as STRICT
+from .rank_limits import STATE as RANK
 from .scales import Array, Indices
 
 PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best
-RANK = 1e-10  #: smallest pivot, relative to the largest entry of J
-STRICT = 1e-8  #: the same when the set of independent coordinates is fixed
 
 
 class Partition(NamedTuple):

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..numeric.rank_limits import PASSED as SINGULAR
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .module import Module
 
 DIP = 0.5  #: a smallest singular value that falls below this part of its largest over the run is looked at
-SINGULAR = 1e-4  #: relative to the largest singular value: rank is lost
 SUBSTEPS = 24  #: between stored states
 LEVELS = 3  #: times that the neighbourhood of the smallest value is looked at more closely
 
