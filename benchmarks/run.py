@@ -13,7 +13,7 @@ from rich.console import Console
 from .measure import calibrate, describe_machine
 from .report import Report, show, write
 
-BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "loops")
+BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "integrate", "loops")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,7 +7,20 @@ from importlib import import_module
 from pathlib import Path
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
-STEPPERS = ("control", "signals", "tape", "dop853", "rk45", "rk23", "rk4_step", "rk4", "event_values", "event_zero", "crossings", "loop")
+STEPPERS = (
+    "control",
+    "signals",
+    "tape",
+    "dop853",
+    "rk45",
+    "rk23",
+    "rk4_step",
+    "rk4",
+    "event_values",
+    "event_zero",
+    "crossings",
+    "loop",
+)
 
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {

@@ -8,6 +8,7 @@ from __future__ import annotations
 from itertools import product
 
 from ..joints import JOINTS
+from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
 from .field import CONSTANT as CONSTANT
 from .field import MOTION as MOTION
@@ -19,7 +20,6 @@ from .force_fields import FORCE as FORCE
 from .force_fields import ONE_OF as ONE_OF
 from .force_fields import force_fields as force_fields
 from .mechanism import Simulation
-from ..numeric.splines import KINDS as TABLES
 
 #: kind -> how a message describes it
 KINDS = {
@@ -80,7 +80,14 @@ PARAMETER: Fields = {
     "unit": _UNIT,
     "doc": _DOC,
 }
-INPUT: Fields = {"value": Field("number", "value while none is given", default=0.0), "unit": _UNIT, "doc": _DOC}
+INPUT: Fields = {
+    "value": Field("number", "value while none is given", default=0.0),
+    "signal": Field(
+        "expression", "value over time of runs that give none; t, coordinates, velocities, parameters", level=MOTION
+    ),
+    "unit": _UNIT,
+    "doc": _DOC,
+}
 OUTPUT_FIELDS: Fields = {
     "expression": Field(
         "expression", "t, parameters, inputs, coordinates, their rates, motion of markers", required=True, level=OUTPUT
@@ -90,8 +97,10 @@ OUTPUT_FIELDS: Fields = {
 }
 EVENT: Fields = {
     "expression": Field(
-        "expression", "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity "
-        "of markers", required=True, level=OUTPUT
+        "expression",
+        "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity of markers",
+        required=True,
+        level=OUTPUT,
     ),
     "terminal": Field("times", "whether the run ends there, or at which time it happens", default=False),
     "direction": Field("sign", "1: only where it rises, -1: where it falls, 0: both", default=0),

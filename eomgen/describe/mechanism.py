@@ -42,6 +42,7 @@ class Input:
     value: float = 0.0
     unit: str = ""
     doc: str = ""
+    signal: Expr | None = None  #: of runs that give none
 
 
 @dataclass(frozen=True)

@@ -127,14 +127,19 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         self._quantity("parameters", name, value, unit, doc)
         return symbol(name)
 
-    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "") -> Any:
+    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "", signal: Value | None = None) -> Any:
         """Declare a quantity given from outside over time; ``value`` holds while none is given.
+
+        ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
+        calls of the module's own functions still take ``value``.
 
         Returns
         -------
         sympy.Symbol
         """
         self._quantity("inputs", name, value, unit, doc)
+        if signal is not None:
+            self._description.sections["inputs"][-1].values["signal"] = signal
         return symbol(name)
 
     def output(self, name: str, expression: Value, unit: str = "", doc: str = "") -> None:

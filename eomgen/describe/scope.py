@@ -79,8 +79,8 @@ class Namespace:
             self.faults.add(
                 path,
                 f"the name {clash!r} is taken by the {other}{own}",
-                "parameters, inputs, functions, coordinates, outputs and events share one namespace, with the _dot and _ddot "
-                "of coordinates; rename one",
+                "parameters, inputs, functions, coordinates, outputs and events share one namespace, with the _dot "
+                "and _ddot of coordinates; rename one",
             )
             return False
         return True

@@ -12,6 +12,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
+from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
@@ -223,8 +224,12 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             {
                 "events": [
                     {
-                        "name": e.name, "terminal": e.terminal, "direction": e.direction, "resets": bool(e.reset),
-                        "restitution": e.restitution, "doc": e.doc,
+                        "name": e.name,
+                        "terminal": e.terminal,
+                        "direction": e.direction,
+                        "resets": bool(e.reset),
+                        "restitution": e.restitution,
+                        "doc": e.doc,
                     }
                     for e in m.events
                 ],
@@ -233,6 +238,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             if m.events
             else {}
         ),
+        **({"signals": signals} if (signals := _signals(kinematics, equations)) else {}),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,
@@ -240,6 +246,15 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "atol": m.simulation.atol,
         },
     }
+
+
+def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
+    """Inputs over time as tapes, by name."""
+    places = {name: ("x", k) for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
+    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
+    found = zip(given, resolved(list(given.values()), kinematics, equations), strict=True)
+    return {name: list(record_tape([x], places.__getitem__)) for name, x in found}
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:

@@ -80,7 +80,9 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
     Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
     Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events"),
-    Kernel("resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"),
+    Kernel(
+        "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
+    ),
     Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"

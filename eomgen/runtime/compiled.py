@@ -98,7 +98,9 @@ def integrate_compiled(
         "watch": None if watch is None else watch.look,
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)
-    journey = core.journey(method, module.kernels.context, start, x0, end, signals=forcing.encode(), plan=plan, **settings)
+    journey = core.journey(
+        method, module.kernels.context, start, x0, end, signals=forcing.encode(), plan=plan, **settings
+    )
     status = journey.travel()
     while status == WAITING and events is not None:
         after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
@@ -111,14 +113,18 @@ def integrate_compiled(
         which = notes[:, 0]
         t_events = [notes[which == i, 1] for i in range(len(events))]
         x_events = [np.ascontiguousarray(notes[which == i, 2:].T) for i in range(len(events))]
-    return Solution(
-        times,
-        np.ascontiguousarray(states.T),
-        t_events,
-        x_events,
-        journey.dense() if dense else None,
-        {ENDED: 0, TERMINAL: 1}.get(status, -1),
-        MESSAGES.get(status, TOO_SMALL),
-        {"nfev": journey.evaluations, "njev": 0, "nlu": 0},
-        (start, journey.t),
-    ), journey.failure, journey.raised
+    return (
+        Solution(
+            times,
+            np.ascontiguousarray(states.T),
+            t_events,
+            x_events,
+            journey.dense() if dense else None,
+            {ENDED: 0, TERMINAL: 1}.get(status, -1),
+            MESSAGES.get(status, TOO_SMALL),
+            {"nfev": journey.evaluations, "njev": 0, "nlu": 0},
+            (start, journey.t),
+        ),
+        journey.failure,
+        journey.raised,
+    )

@@ -33,7 +33,7 @@ class Named(list[Array]):
         super().__init__(values)
         self.names = tuple(names)
 
-    @overload  # type: ignore[override]
+    @overload
     def __getitem__(self, key: str | SupportsIndex) -> Array: ...
     @overload
     def __getitem__(self, key: slice) -> list[Array]: ...
@@ -203,7 +203,7 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formu
     options = {"expression": given} if isinstance(given, str) else dict(given)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
     text = options.get("expression")
-    if not is_formula(text):
+    if not isinstance(text, str):
         raise UsageError(f"event {name or ''}: its expression must be a text, not {text!r}")
     direction = options.get("direction") or 0
     if direction not in (-1, 0, 1):

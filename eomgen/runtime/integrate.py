@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .events import CROWD, CROWDED, GO_ON, Event, Events
+from .events import CROWD, CROWDED, GO_ON, WAIT, Event, Events
 from .names import require, unknown
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -167,19 +167,27 @@ def integrate(
             break
         jumped = bool(fired)
         if fired and reset is not None:
-            x = reset(ended, x_events[fired[0]][-1][:, -1], fired)
+            before = x_events[fired[0]][-1][:, -1]
+            x = reset(ended, before, fired)
             resets += 1
             crowded = crowded + 1 if abs(ended - last_reset) < CROWDED * abs(nodes[-1] - nodes[0]) else 0
             last_reset, start = ended, ended
             for e in fired:
-                events[e].left = (ended, float(-events[e].direction or np.sign(events[e](ended, x)) or 1.0))
+                came, goes = (_rate(events[e], rhs, ended, state, nodes[-1] - nodes[0]) for state in (before, x))
+                stuck = not abs(goes) > 1e-9 * abs(came) or (events[e].action == WAIT and goes < 0.0)
+                if stuck or events[e].direction * came < 0.0:  # the zero it just left, again
+                    crowded = CROWD
+                events[e].left = (ended, float(np.sign(goes)))
             if crowded >= CROWD or start == nodes[-1]:
+                part.status = 0
                 break
         else:
             x, k, start = y[:, -1], k + 1, nodes[k + 1]
     if crowded >= CROWD:
         raise Events.crowded_near(start, resets, [event.name for event in events if event.action != GO_ON])
-    joined = pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
+    joined = (
+        pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
+    )
     all_times = np.concatenate(times)
     ends = (nodes[0], nodes[0])
     if pieces:
@@ -192,11 +200,18 @@ def integrate(
         [np.concatenate(found) for found in t_events],
         [np.concatenate(found, axis=1) for found in x_events],
         joined,
-        0 if part.status == 1 and jumped else int(part.status),
+        int(part.status),
         str(part.message),
         counts,
         ends,
     )
+
+
+def _rate(event: Event, rhs: Callable[[float, Array], Array], t: float, x: Array, span: float) -> float:
+    """How fast an event's value changes along the motion, in the direction of the run."""
+    h = 1e-8 * span
+    event.left = None
+    return float((event(t + h, x + h * np.asarray(rhs(t, x))) - event(t, x)) / abs(h))
 
 
 def _between(t_eval: Array, span: tuple[float, float], last: bool) -> Array:

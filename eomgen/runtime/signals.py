@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, unknown
-from .tapes import Formula, is_formula, record_tape
+from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
 #: How a table goes on between its times -> the order of its pieces.
@@ -85,13 +85,13 @@ class Signal:
         return result
 
     def kinks(self) -> Array:
-        """Times where the value or its slope jumps."""
+        """Times where the value or a derivative jumps."""
         if not self.corners:
             return np.empty(0)
-        if self.order == 3:  # constant outside
-            return self.times[[0, -1]] if len(self.times) > 1 else np.empty(0)
+        if self.order == 3:  # its third derivative jumps
+            return np.asarray(self.times if len(self.times) > 1 else np.empty(0))
         if self.order == 0:
-            return self.times[1:][np.diff(self.values) != 0.0]
+            return np.asarray(self.times[1:][np.diff(self.values) != 0.0])
         rates = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
         size = np.abs(rates).max()
         return np.asarray(self.times[np.abs(np.diff(rates)) > 1e-9 * size])
@@ -145,7 +145,11 @@ class Forcing:
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
         self.feedback = self.foreign = False
-        self.formulas: dict[int, Formula] = {}
+        self.formulas: dict[int, Formula | DeclaredSignal] = {}
+        for name, tape in layout.metadata.get("signals", {}).items():
+            if name not in given:
+                self.formulas[layout.u.index(name)] = declared = DeclaredSignal(tape)
+                self.feedback = self.feedback or declared.depends_on_state
         for name, value in given.items():
             index = layout.u.index(name)
             if isinstance(value, Signal):
@@ -180,8 +184,10 @@ class Forcing:
 
     def encode(self) -> list[tuple[Any, ...]]:
         """The inputs that vary, as the compiled loop takes them."""
-        tables = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal)]
-        return [*tables, *((i, record_tape([formula])) for i, formula in self.formulas.items())]
+        tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal)]
+        for i, formula in self.formulas.items():
+            tables.append((i, formula.tape if isinstance(formula, DeclaredSignal) else record_tape([formula])))
+        return tables
 
     def require_finite(self) -> None:
         """Raise UsageError if a value was not finite."""
@@ -190,7 +196,7 @@ class Forcing:
 
     def __bool__(self) -> bool:
         """Whether anything varies."""
-        return bool(self.varying)
+        return bool(self.varying or self.formulas)
 
     def __call__(self, t: float, x: Array) -> Array:
         """u (n_u,) at time t and state x."""

@@ -172,8 +172,8 @@ def simulate(
         else:
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output, options,
-                    partial(watched.reset, bound, forcing),
+                    run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output,
+                    options, partial(watched.reset, bound, forcing),
                 )  # fmt: skip
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:

@@ -1,12 +1,13 @@
 """Stage runtime: an expression as text -> a tape that compiled loops play, and a function of (t, x) for all others.
 
-The text is read by the same parser as those of model files; nothing is ever executed.  A generated package, which has no
-parser, refuses texts.
+The text is read by the same parser as those of model files; nothing is ever executed.  A generated package has no
+parser and refuses texts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,36 +68,94 @@ class Formula:
         return lambda t, x: float(evaluate([t, *np.asarray(x).tolist(), *values])[0])
 
 
-def record_tape(formulas: list[Formula]) -> Tape:
+def record_tape(formulas: Sequence[Formula]) -> Tape:
     """One tape for several expressions."""
-    from ..graph.traverse import reachable
+    from ..graph.tape import record_tape as record
 
-    code: list[tuple[str, int, int, int]] = []
-    numbers: list[float] = []
-    out: list[int] = []
-    for formula in formulas:
-        graph, layout = formula.expression.graph, formula.layout
-        place: dict[int, int] = {}
-        for i in reachable(graph, [formula.expression.id]):
-            kind, *given = graph.nodes[i]
-            if kind == "const":
-                code.append(("const", len(numbers), 0, 0))
-                numbers.append(float(given[0]))
-            elif kind == "sym":
-                code.append(_leaf(layout, given[0]))
-            else:
-                a, b, c = (*(place[k] for k in given), 0, 0)[:3]
-                code.append((kind, a, b, c))
-            place[i] = len(code) - 1
-        out.append(place[formula.expression.id])
-    return code, numbers, out
+    layout = formulas[0].layout
+
+    def place(name: str) -> tuple[str, int]:
+        for kind, names in (("x", layout.x), ("p", layout.p)):
+            if name in names:
+                return kind, names.index(name)
+        return "t", 0
+
+    return record([formula.expression for formula in formulas], place)
 
 
-def _leaf(layout: Layout, name: str) -> tuple[str, int, int, int]:
-    for kind, names in (("x", layout.x), ("p", layout.p)):
-        if name in names:
-            return kind, names.index(name), 0, 0
-    return "t", 0, 0, 0
+class DeclaredSignal:
+    """An input's expression over time that the model itself declares, as its metadata hold it.
+
+    Parameters
+    ----------
+    tape : list
+        As :mod:`eomgen.graph.tape` makes them.
+    """
+
+    def __init__(self, tape: Sequence[Any]) -> None:
+        code, numbers, out = tape
+        self.tape: Tape = [(str(op), int(a), int(b), int(c)) for op, a, b, c in code], list(numbers), list(out)
+        self.depends_on_state = any(op == "x" for op, *_ in self.tape[0])
+
+    def function(self, p: Array) -> Callable[[float, Array], float]:
+        """f(t, x) at given parameters (n_p,)."""
+        code, numbers, out = self.tape
+        leaves = {"const": numbers, "p": p.tolist()}
+
+        def play(t: float, x: Array) -> float:
+            results: list[float] = []
+            for op, a, b, c in code:
+                if op == "t":
+                    value = t
+                elif op == "x":
+                    value = float(x[a])
+                elif op in leaves:
+                    value = leaves[op][a]
+                else:
+                    operands = (results[a], results[b], results[c])
+                    try:
+                        value = OPERATIONS[op](*operands)
+                    except (ArithmeticError, ValueError):
+                        value = math.nan
+                results.append(float(value))
+            return results[out[0]]
+
+        return play
+
+
+def _one(function: Callable[[float], float]) -> Callable[[float, float, float], float]:
+    return lambda a, b, c: function(a)
+
+
+def _two(function: Callable[[float, float], float]) -> Callable[[float, float, float], float]:
+    return lambda a, b, c: function(a, b)
+
+
+#: What each operation of a tape does, as tape.c does it.
+OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
+    "add": lambda a, b, c: a + b,
+    "sub": lambda a, b, c: a - b,
+    "mul": lambda a, b, c: a * b,
+    "div": lambda a, b, c: a / b,
+    "neg": lambda a, b, c: -a,
+    "pow": _two(math.pow),
+    "atan2": _two(math.atan2),
+    "abs": _one(abs),
+    "sign": lambda a, b, c: (a > 0) - (a < 0),
+    "min": _two(min),
+    "max": _two(max),
+    "lt": lambda a, b, c: a < b,
+    "le": lambda a, b, c: a <= b,
+    "eq": lambda a, b, c: a == b,
+    "not": lambda a, b, c: not a,
+    "and": lambda a, b, c: bool(a) and bool(b),
+    "or": lambda a, b, c: bool(a) or bool(b),
+    "select": lambda a, b, c: b if a else c,
+}
+OPERATIONS |= {
+    name: _one(getattr(math, name))
+    for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+}
 
 
 def is_formula(value: Any) -> bool:

@@ -180,8 +180,8 @@ def test_wrong_inputs_are_told(pendulum):
         ({"tua": 1.0}, "did you mean tau"),
         ({"tau": ([0.0, 0.0], [1.0, 2.0])}, "times must increase, not go from 0.0 to 0.0"),
         ({"tau": ([0.0, 1.0], [1.0])}, "same length"),
-        ({"tau": "strong"}, "must be a number"),
-        ({"tau": np.zeros((2, 2))}, "number, \\(times, values\\) or a function"),
+        ({"tau": "strong"}, "no name in input tau 'strong'"),
+        ({"tau": np.zeros((2, 2))}, "number, \\(times, values\\), a Signal, an expression as text or a function"),
         ({"tau": lambda t, x: x}, "one number at each time"),
         (3.0, "mapping"),
     ]:
@@ -199,7 +199,7 @@ def test_wrong_options_are_told(pendulum):
         ({"initial": np.zeros(3)}, r"shape \(2,\) \[theta, theta_dot\]"),
         ({"initial": {"thetta": 1.0}}, "did you mean theta"),
         ({"parameters": {"q": 1.0}}, "no parameter 'q'"),
-        ({"events": 3}, "event must be a function"),
+        ({"events": 3}, "event must be a name, an expression or a function"),
     ]:
         with pytest.raises(UsageError, match=words):
             pendulum.simulate(**({"span": 1.0} | options))

@@ -52,6 +52,9 @@ void eomgen_arm(eomgen_run *run, eomgen_events *ev)
 int eomgen_depart(eomgen_run *run, eomgen_events *ev)
 {
     int stuck = 0;
+    for (int i = 0; i < ev->n; i++) {
+        ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
+    }
     run->step = 0.0;
     event_values(run, ev, run->t, run->y, ev->g);
     event_slopes(run, ev, ev->g, ev->slope);
@@ -62,9 +65,9 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
         }
         const double rate = run->direction * ev->slope[i];
         const int touching = fabs(ev->g[i]) <= 1e-9 * ev->size[i];
-        const int side = ev->direction[i] != 0 ? -ev->direction[i] : (touching ? rate : ev->g[i]) > 0.0 ? 1 : -1;
-        stuck = stuck || (touching && side * rate <= 0.0);
-        ev->leaving[i] = touching ? side : 0;
+        const int through = ev->action[i] == EOMGEN_WAIT && rate < 0.0; /* a gap that goes on closing */
+        stuck = stuck || (touching && (through || !(fabs(rate) > 1e-9 * ev->trial[i])));
+        ev->leaving[i] = touching ? (rate > 0.0 ? 1 : -1) : 0;
         ev->fired[i] = 0;
     }
     return stuck;
