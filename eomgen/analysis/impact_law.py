@@ -71,26 +71,28 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
     fastest = float(np.abs(now).max(initial=0.0))
     for k in range(ROUNDS + 1):
         floor = np.maximum(rest[:count], STILL * max(fastest, float(np.abs(now).max(initial=0.0))))
-        involved = live & (now <= floor) if k < ROUNDS else live
-        if k == ROUNDS:  # ever smaller impacts at one instant: what is left of them is plastic
-            if -now.min() > ENDLESS * fastest:
-                raise UsageError(f"impacts at {_listed(names[:count])} follow each other without end: {_JAMMED}")
-            wanted = -now
-        elif k and not (live & (now < -floor)).any():
+        if k and not (live & (now < -floor)).any():
             break
-        elif k:
-            wanted = _need(now, e, floor)
-        z, g = _least_change(
-            free[:, involved], wanted[involved], [n for n, i in zip(names, involved, strict=False) if i]
-        )
+        wanted = _need(now, e, floor) if k else wanted
+        involved = live & (now <= floor)
+        found = _least_change(free[:, involved], wanted[involved]) if k < ROUNDS else None
+        if found is None:  # what is left after ever smaller impacts at one instant is plastic
+            if k == 0 or -now.min() > ENDLESS * fastest:
+                jammed = ", ".join(str(name) for name, one in zip(names, involved, strict=False) if one)
+                raise UsageError(
+                    f"the gaps {jammed} cannot open together: bodies are jammed between them, and Newton's law has no "
+                    "solution; give them restitution 0"
+                )
+            involved, wanted, k = live, -now, ROUNDS
+            found = _least_change(free[:, involved], wanted[involved])
+        z, g = found or (np.zeros(len(H)), np.zeros(int(involved.sum())))
         impulses[involved] += g
         change = change + z
         now = rates[:count] + gaps.T @ change
+        if k == ROUNDS:
+            break
     held = np.linalg.lstsq(locks, change - gaps @ impulses, rcond=None)[0] if locks.shape[1] else np.zeros(0)
     return np.concatenate([impulses, held]) / sizes, change
-
-
-_JAMMED = "bodies are jammed between them, and Newton's law has no solution; give them restitution 0"
 
 
 def _need(rates: Array, e: Array, rest: Array) -> Array:
@@ -98,12 +100,10 @@ def _need(rates: Array, e: Array, rest: Array) -> Array:
     return np.where(rates < -rest, -(1.0 + e) * rates, np.where(np.abs(rates) <= rest, 0.0, -rates))
 
 
-def _listed(names: Sequence[object]) -> str:
-    return ", ".join(str(name) for name in names)
+def _least_change(H: Array, need: Array) -> tuple[Array, Array] | None:
+    """The smallest z (m,) with H^T z >= need, and g (n,), 0 <= g, with z = H g; None if there is none.
 
-
-def _least_change(H: Array, need: Array, names: Sequence[object]) -> tuple[Array, Array]:
-    """The smallest z (m,) with H^T z >= need, and g (n,), 0 <= g, with z = H g; columns of H have about length 1.
+    Columns of H have about length 1.
 
     A least-distance problem, solved as least squares with positive unknowns (Lawson and Hanson, Solving Least Squares
     Problems, 1974, ch. 23.4).
@@ -117,8 +117,7 @@ def _least_change(H: Array, need: Array, names: Sequence[object]) -> tuple[Array
     u = _positive_least_squares(E, y)
     r = 1.0 - float(E[-1] @ u)
     if not r > FARTHEST**-2:
-        tight = [name for name, one in zip(names, u, strict=True) if one > 0.0]
-        raise UsageError(f"the gaps {_listed(tight)} cannot open together: {_JAMMED}")
+        return None
     z, g = most * (H @ u) / r, most * u / r
     P = u > 0.0  # again from the gaps that push, to the last digits
     z_P = np.asarray(np.linalg.lstsq(H[:, P].T, need[P], rcond=None)[0])
