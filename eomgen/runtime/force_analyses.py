@@ -196,10 +196,10 @@ class ForceAnalyses:
         Newton's law of restitution with complementarity, for all gaps at once that close or are at rest: each impulse
         is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and Glocker,
         Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
-        opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but from
-        gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after the
-        impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice: momentum and
-        energy alone do not determine what several bodies that touch do.
+        opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
+        from gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after
+        the impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice:
+        momentum and energy alone do not determine what several bodies that touch do.
         """
         from ..analysis.impact import strike
 
