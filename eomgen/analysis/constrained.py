@@ -156,8 +156,13 @@ def evaluate(
 
 def free_motions(J: Array, scales: Scales) -> Array:
     """Velocities that the constraints C_q = J (m, n_v) allow, (n_v, n_dof), orthonormal in scaled coordinates."""
+    return conditioned_motions(J, scales)[0]
+
+
+def conditioned_motions(J: Array, scales: Scales) -> tuple[Array, float]:
+    """The same, and the condition of the constraints that leave them; 0 without any."""
     if not len(J):
-        return np.diag(scales.q)
+        return np.diag(scales.q), 0.0
     _, sizes, Vt = np.linalg.svd(scales.jacobian(J))
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
-    return np.asarray(scales.q[:, None] * Vt[rank:].T)
+    return np.asarray(scales.q[:, None] * Vt[rank:].T), float(sizes[0] / sizes[rank - 1]) if rank else 0.0
