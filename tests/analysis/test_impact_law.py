@@ -124,6 +124,7 @@ def test_what_geometry_holds_takes_no_impulse() -> None:
     signs = set()
     for _ in range(12):
         x = mod.project(np.concatenate([np.zeros(mod.n_q), rng.normal(size=mod.n_v)]))
+        x[mod.x_names.index("r_dot")] = rng.choice([-1.0, 1.0]) * 1e-16
         for hit in (mod.impact(0.0, x, {"r": 0.5}), mod.impact(0.0, x, lock=["r"])):
             signs.add(float(np.sign(hit.rates_before[0])))
             np.testing.assert_allclose(hit.x, x, atol=1e-13)
