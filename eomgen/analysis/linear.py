@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.analyses import require_velocities
 from .linearisation import Linearisation
+from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:
@@ -63,8 +64,9 @@ def linearise(
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
     mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
+    own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearisation(
-        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent
+        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )
 
 
