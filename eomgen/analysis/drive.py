@@ -300,10 +300,11 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), 1e-300)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
     moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
+    need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"
     where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
     return (
         f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
-        f"{', '.join(moved[:4])}; {layout.n_dof} degrees of freedom need as many drives, "
+        f"{', '.join(moved[:4])}; {need} as many drives, "
         f"such as {', '.join(layout.freedoms[i] for i in layout.independent)}"
     )
 

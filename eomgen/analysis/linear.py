@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.analyses import require_velocities
+from ..runtime.layout import number
 from .linearisation import Linearisation
 from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
@@ -36,7 +37,7 @@ def linearise(
     if form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
-    layout, time = module.layout, float(t)
+    layout, time = module.layout, number("t", t)
     state = module.x0(t=time) if x is None else np.array(x, dtype=float)
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")

@@ -106,7 +106,7 @@ class Linearisation:
 
     @property
     def _forces(self) -> float:
-        """Size of the accelerations that count, at most 1: of the model's own forces, or of their change over a unit."""
+        """Accelerations that count, at most 1: those of the model's own forces, or their change over a unit."""
         if self.own is None or self.tangent is None:
             return 1.0
         n, s = len(self.position_names), self.layout.scales.q

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..numeric.scales import Array
+from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-ROUNDING = 10.0 * float(np.finfo(float).eps)  #: relative error of the entries of a matrix that is exact but for rounding
+ROUNDING = 10.0 * float(
+    np.finfo(float).eps
+)  #: relative error of the entries of a matrix that is exact but for rounding
 ROUNDS = 30  #: of balancing, at most
 WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
 SWEEPS = 12  #: of Jacobi's method, at most
@@ -80,7 +82,7 @@ def _balance(A: Array, own: Array | None) -> Array:
     return np.asarray(A * d / d[:, None])
 
 
-def own_accelerations(module: Module, t: float, x: Array, B: Array, velocities: Array, mass: Array) -> Array:
+def own_accelerations(module: Module, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
     """Accelerations that the forces of the model would make if they did not balance, scaled (1/s^2), (n_dof,).
 
     Parameters
