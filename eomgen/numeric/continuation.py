@@ -89,7 +89,7 @@ def follow(
             if step < SMALLEST * usual:
                 raise AssemblyError(
                     f"the way is blocked after {100 * done:.0f} % of it: there the loops stay open by "
-                    f"{largest(residual):.2g} (scaled), or the mechanism jumps, as at a dead centre of what is led; "
+                    f"{residual:.2g} (scaled), or the mechanism jumps, as at a dead centre of what is led; "
                     "lead another coordinate, or give a position on the other side"
                 )
     return q

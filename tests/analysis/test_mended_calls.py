@@ -159,3 +159,18 @@ def test_the_mass_metric_copes_with_masses_of_all_sizes() -> None:
         M = mod.mass_matrix(y[:n])
         work = free.T @ M @ (y[n:] - x[n:])
         assert np.abs(work).max() < 1e-8 * np.abs(M).max() * np.abs(y[n:] - x[n:]).max()
+
+
+def test_sensitivities_of_a_stabilised_model_are_refused_as_other_analyses() -> None:
+    m = eg.Model("stabilised", gravity=(0, -9.81, 0))
+    a, b = m.body("a", mass=1.0, com=(0.5, 0, 0)), m.body("b", mass=m.parameter("w", 1.0))
+    m.revolute("A", m.ground, a, coordinate="th")
+    m.revolute("B", a.at(1, 0, 0), b)
+    c = m.body("c", mass=1.0)
+    m.revolute("C", b.at(2, 0, 0), c)
+    m.prismatic("D", m.ground, c, axis="x", coordinate="s")
+    m.guess(s=2.5)
+    m.initial(th=0.3)
+    mod = m.compile("augmented", target="numpy", baumgarte=(5.0, 5.0))
+    with pytest.raises(UsageError, match="derive without baumgarte for analyses"):
+        mod.sensitivities(["w"], 0.1)
