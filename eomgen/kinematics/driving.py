@@ -198,10 +198,20 @@ def _contradiction(
 
 
 def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, q: Array) -> bool:
-    """Whether a motion that the loops allow changes what a driver prescribes."""
-    J = functions.scaled_jacobian(q)
+    """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
     loops = _others(functions, list(drivers))
-    return rank(J[[*loops, row]]).rank > rank(J[loops]).rank
+    free = functions.with_rows(loops)
+    random = np.random.default_rng(1)
+    for moved in (0.0, 0.1, 0.3, 0.3):
+        step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
+        try:
+            here = free.close({}, _guess(functions, functions.scales.move(q, step)), restarts=0).q if moved else q
+        except AssemblyError:
+            continue
+        J = functions.scaled_jacobian(here)
+        if rank(J[[*loops, row]]).rank > rank(J[loops]).rank:
+            return True
+    return False
 
 
 def _unit(functions: ConstraintFunctions, row: int) -> str:
