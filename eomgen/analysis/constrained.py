@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -78,6 +78,10 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         The constraints cannot be met near a state.
     """
     layout = module.layout
+    if isinstance(p, Mapping):
+        p = layout.values("parameter", layout.p, p, module.p)
+    if isinstance(u, Mapping):
+        u = layout.values("input", layout.u, u, module.u)
     state = np.asarray(x, dtype=float)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise UsageError(
@@ -85,7 +89,10 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         )
     single = state.ndim == 1
     columns = state[:, None] if single else state
-    time = np.asarray(t, dtype=float)
+    try:
+        time = np.asarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"t must be a number or an array of them, not {t!r}") from None
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
