@@ -36,7 +36,14 @@ LAYER = {
 @cache
 def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
+    return {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+
+
+def read_header(name: str) -> str:
+    """The text of a header that models and the layer share, as it comes with eomgen."""
+    return _read(f"c/{name}")
+
+
+def _read(part: str) -> str:
     root = Path(import_module("eomgen.templates").__path__[0])
-    return {
-        name: "\n".join((root / part).read_text(encoding="utf-8") for part in parts) for name, parts in LAYER.items()
-    }
+    return (root / part).read_text(encoding="utf-8")

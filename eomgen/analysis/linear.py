@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.layout import number
 from .linear_given import find_given_tangent, refuse_inputs
 from .linearisation import Linearisation
+from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ def linearise(
     if form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
-    layout, time = module.layout, float(t)
+    layout, time = module.layout, number("t", t)
     state = module.x0(t=time) if x is None else np.array(x, dtype=float)
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
@@ -78,8 +80,9 @@ def linearise(
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
     mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
+    own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearisation(
-        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent
+        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.analyses import require_velocities
+from ..runtime.analyses import require_projection, require_velocities
 from ..runtime.integrate import choose_solver, integrate
 from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
@@ -135,6 +135,7 @@ def differentiate_run(
 ) -> Sensitivities:
     """See :meth:`~..runtime.analyses.Analyses.sensitivities`."""
     require_velocities(module.layout)
+    require_projection(module.layout)
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)

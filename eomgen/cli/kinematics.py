@@ -161,7 +161,7 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
         raise UsageError(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
     try:
         numbers = parse_settings(tuple(f"{label}={part}" for label, part in zip(("START", "END"), parts, strict=False)))
-        count = int(parts[2]) if len(parts) == 3 else None
+        count = _count(parts[2]) if len(parts) == 3 else None
     except ValueError as error:  # a UsageError too
         raise UsageError(f"--range {words}: {error}") from None
     if count is not None and not 1 <= count <= 10_000_000:
@@ -169,11 +169,18 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
     return name.strip(), numbers["START"], numbers["END"], count
 
 
+def _count(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise UsageError(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
+
+
 def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
     if not asked:
         if module.n_dof:
             free = ", ".join(module.layout.freedoms[i] for i in module.layout.independent)
-            raise UsageError(f"give --range: {module.n_dof} degrees of freedom are left, for example of {free}")
+            raise UsageError(f"give --range: {_left(module.n_dof)}, for example of {free}")
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     if len(set(names)) < len(names):
@@ -187,6 +194,10 @@ def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -
         span = values["t"][-1] - values["t"][0]
         values |= {f"{name}_dot": (end - start) / span for name, start, end, _ in asked if name != "t" and span}
     return values
+
+
+def _left(n: int) -> str:
+    return "1 degree of freedom is left" if n == 1 else f"{n} degrees of freedom are left"
 
 
 def to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
@@ -238,4 +249,6 @@ def print_motion(motion: KinematicAnalysis) -> None:
     names = [n for n in final_names(motion) if not n.endswith("_dot")][:8]
     header = [n + (f" ({motion.units[n]})" if n in motion.units else "") for n in ("t", *names)]
     picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
+    if len(picked) < len(motion):
+        print_rows([("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all")])
     print_table(header, [[f"{motion[n][k]:.6g}" for n in ("t", *names)] for k in picked], right=range(len(header)))

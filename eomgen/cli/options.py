@@ -242,20 +242,26 @@ def require_folder(option: str, file: Path | None) -> None:
         raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
 
 
-def parse_settings(settings: tuple[str, ...]) -> dict[str, float]:
+def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
     """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
+
+    Parameters
+    ----------
+    settings : tuple of str
+    option, example : str, optional
+        Which option has them, for errors, and a word that it takes.
 
     Raises
     ------
     UsageError
     """
-    return dict(_parse_setting(word) for word in settings)
+    return dict(_parse_setting(word, option, example) for word in settings)
 
 
-def _parse_setting(word: str, option: str = "--set") -> tuple[str, float]:
+def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") -> tuple[str, float]:
     name, equals, text = (part.strip() for part in word.partition("="))
     if not equals or not name or not text:
-        raise UsageError(f"{option} {word}: write name=value, for example {option} r=0.12")
+        raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
     try:
         return name, float(text)
     except ValueError:

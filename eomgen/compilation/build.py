@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from ..layer import LAYER, read_layer
+from ..layer import LAYER, read_header, read_layer
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
 from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
@@ -80,10 +80,9 @@ def compile_sources(
     own = read_layer()
     layer = {name: sources.pop(name, own[name]) for name in LAYER}
     _check(sources, name)
-    for header in HEADERS:
-        if header not in sources:
-            raise UsageError(f"the sources of {name!r} lack {header}; there are {', '.join(sources)}")
-    headers = {header: sources[header] for header in HEADERS}
+    if HEADERS[0] not in sources:
+        raise UsageError(f"the sources of {name!r} lack {HEADERS[0]}; there are {', '.join(sources)}")
+    headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
     sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
     flags = _plan(sources, options, compiler, width, extension=True)

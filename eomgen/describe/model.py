@@ -352,9 +352,10 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         return yaml_text(self._description)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the model as a model file."""
+        """Write the model as a model file; one that is there already stays as it is where that fails."""
+        text = self.to_yaml()
         with open(path, "w", encoding="utf-8") as file:
-            file.write(self.to_yaml())
+            file.write(text)
 
     # -- display --------------------------------------------------------------------------------------------------
     def __getattr__(self, name: str) -> Any:

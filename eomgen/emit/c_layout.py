@@ -46,7 +46,7 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return ("shift_columns", name)
     if not program.has_loops:
         return ("tree", "shift_tree", name)
-    return (*LOOPS["rhs"][:-1], "multipliers", direct, "shift_projection", "shift_loops", name)
+    return (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
 
 
 def driver_files(program: Program) -> list[str]:
@@ -75,7 +75,7 @@ def driver_files(program: Program) -> list[str]:
         elif driver.name == "rhs" and "dynamics" in driver.blocks:
             needed = (*LOOPS["rhs"][:-1], "rhs_direct")
         elif driver.name == "jacobian":
-            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian_projection", "jacobian")
+            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
         elif driver.name == "outputs" and "terms" in driver.blocks:
             needed = ACCELERATED
         else:

@@ -64,7 +64,11 @@ def emit_package(program: Program, target: str) -> SourceSet:
 
 def _cython(program: Program) -> dict[str, str]:
     sources = emit_c(program)
-    context = _context(program) | {"c_files": [name for name in (*sources, *read_layer()) if name.endswith(".c")]}
+    written = (*sources, *read_layer())
+    context = _context(program) | {
+        "c_files": [name for name in written if name.endswith(".c")],
+        "headers": [name for name in written if name.endswith((".h", ".pxi"))],
+    }
     return {
         **sources,
         **read_layer(),

@@ -12,7 +12,7 @@ from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from .block import EVENT, MEANING, Plan, find_events
 from .cases import Cases
-from .reductions import names_of, with_outputs
+from .reductions import names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
     import pandas
@@ -133,6 +133,20 @@ class Ensemble:
         order = np.argsort(~mine, axis=0, kind="stable")[:most]
         found = np.take_along_axis(np.where(mine, self._notes[1:], np.nan), order[None], axis=1)
         return found[0], found[1:]
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Mean, deviation, least and greatest of every state and output at the end, over the runs that got there."""
+        if "mean" in self.reduced:
+            rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
+        elif self.x is None:
+            raise UsageError("this ensemble kept no states to summarise")
+        else:
+            parts = summarise(self._outputs(np.where(self.status == 0, self.x, np.nan), self._plan.span[1]))
+            spread = parts["squares"] / max(float(parts["count"]) - 1.0, 1.0)
+            rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
+        keys = ("mean", "deviation", "least", "greatest")
+        values = np.array([rows[0], np.sqrt(rows[1]), *rows[2:]]).T.tolist()
+        return {name: dict(zip(keys, row, strict=True)) for name, row in zip(self.names, values, strict=True)}
 
     def case(self, k: int) -> dict[str, Any]:
         """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from ..graph.core import Expr
 from ..kinematics import Kinematics
+from ..kinematics.units import Units
 from .equations import LinearSystem, TreeEquations
 from .free_bodies import FreeBodies, cut_joints, scaled, sub
-from .free_body_system import Forces, Units, Unknowns, free_body_equations
+from .free_body_system import Forces, Unknowns, free_body_equations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

@@ -346,9 +346,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     r = max(ranks)
     n_dof = n - r
     if len(wanted) > n_dof:
-        message = (
-            f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
-        )
+        has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
+        message = f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {has}"
         raise ModelError(
             [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
         )

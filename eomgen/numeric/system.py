@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
-from .scales import Array
+from .scales import Array, Indices
 
 RELAXATION = 1e-10  #: subtracted from the balanced K at the places of constraints
 PIVOT = 1e-14  #: the balanced, relaxed K counts as singular where it answers more than 1 / PIVOT times what is asked
@@ -24,6 +24,8 @@ BALANCES = 40  #: of rows and columns in turn, at most
 BALANCED = 2.0  #: a largest entry up to this factor from 1 is balanced
 LEFT = 1e-11  #: most that may be left of an equation, relative to the sum of its terms
 ROUNDED = 1e-14  #: the same relative to the largest sum of terms of any equation (balanced)
+FAINT = 1e-15  #: the same of constraints, over the square of the singular value of weak ones: see :mod:`.gram`
+WEAKEST = 1e-13  #: such a square, at least
 
 
 class Pattern:
@@ -76,7 +78,7 @@ class Pattern:
                 break
         relaxed = np.array(balanced)
         relaxed[self.relaxed] -= RELAXATION
-        return Balanced(balanced, relaxed, row, column)
+        return Balanced(balanced, relaxed, row, column, self.relaxed[0])
 
 
 class Balanced:
@@ -87,8 +89,8 @@ class Balanced:
     SingularMassMatrixError
     """
 
-    def __init__(self, K: Array, relaxed: Array, row: Array, column: Array) -> None:
-        self.K, self.relaxed, self.row, self.column = K, relaxed, row, column
+    def __init__(self, K: Array, relaxed: Array, row: Array, column: Array, constraints: Indices) -> None:
+        self.K, self.relaxed, self.row, self.column, self.constraints = K, relaxed, row, column, constraints
         probe = np.cos(np.arange(1.0, len(K) + 1.0))[:, None]  # along no axis and no plane
         answer = self._step(probe)
         if not np.abs(answer).max(initial=0.0) <= 1.0 / PIVOT:
@@ -119,7 +121,11 @@ class Balanced:
                 break
             before = size
             z = z + self._step(defect)
+        # a step leaves 1e-10 / (s^2 + 1e-10) along constraints of singular value s
+        weak = max(WEAKEST, RELAXATION * (before / size - 1.0)) if size else 1.0
+        limit = np.full((len(r), 1), LEFT)
+        limit[self.constraints] = max(LEFT, FAINT / weak)
         terms = np.abs(right) + np.abs(self.K) @ np.abs(z)
-        if not (np.abs(defect) <= LEFT * terms + ROUNDED * terms.max(axis=0, initial=0.0)).all():
+        if not (np.abs(defect) <= limit * terms + ROUNDED * terms.max(axis=0, initial=0.0)).all():
             raise UnsolvedError("the equations of motion are left unsolved by rounding")
         return np.asarray((self.column * z.T).T.reshape(r.shape))

@@ -103,10 +103,14 @@ class Events:
     def __init__(self, layout: Layout, given: Any) -> None:
         self.layout = layout
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
-        known = [str(event["name"]) for event in self.declared]
-        chosen = set(known) if given is None else set()
+        self.names: list[str] = []
+        self.model: list[Event] = []
         self.formulas: list[tuple[Event, Formula]] = []
         self.functions: list[Event] = []
+        if given is None and not self.declared:
+            return
+        known = [str(event["name"]) for event in self.declared]
+        chosen = set(known) if given is None else set()
         for name, one in _listed(given):
             if isinstance(one, str) and one in known and name is None:
                 chosen.add(one)
@@ -116,7 +120,6 @@ class Events:
                 self.functions.append(Event(one, name or ""))
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
         taken: dict[str, int] = {}
-        self.names = []
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
             taken[name] = taken.get(name, 0) + 1
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..numeric.definite import correlated
+from ..numeric.definite import SINGULAR, correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
@@ -104,6 +104,8 @@ class Kernels:
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            if values[0] > SINGULAR:
+                return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]

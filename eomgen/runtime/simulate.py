@@ -141,9 +141,12 @@ def simulate(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     x0 = find_state(bound, initial, start)
-    u0 = forcing(start, x0)
-    forcing.require_finite()
-    bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
+    if forcing:
+        u0 = forcing(start, x0)
+        forcing.require_finite()
+        bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
+    else:
+        bound.rhs(start, x0)
     run = _Run(bound, forcing)
     tolerances = {
         "rtol": declared["rtol"] if rtol is None else rtol,

@@ -132,7 +132,7 @@ cdef class Journey(Stepper):
         journey.pieces_room = 256 if plan["dense"] else 0
         if plan["events"] is not None:
             self.expect(**plan["events"])
-        self.allocate(256)
+        self.allocate(512)
         self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
         self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, 1
 

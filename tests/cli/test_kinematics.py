@@ -52,7 +52,7 @@ def test_settings_and_text(call: Call) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ((), 2, "give --range: 1 degrees of freedom are left, for example of theta"),
+        ((), 2, "give --range: 1 degree of freedom is left, for example of theta"),
         (("--range", "theta"), 2, "write NAME=START:END"),
         (("--range", "theta=0:x"), 2, "'x' is not a number"),
         (("--range", "theta=0:1:0"), 2, "the count is 1 to"),

@@ -13,6 +13,8 @@ import eomgen
 from .conftest import EXAMPLES, Call
 
 MODELS = sorted(EXAMPLES.glob("*.yaml"))
+#: Largest change of a coordinate (rad, m) that a run must make where it is less than 1; these stand on springs.
+TRAVEL = {"car_axis": 0.15, "kapitza_pendulum": 0.35, "double_wishbone": 0.4}
 
 
 def test_what_is_printed(call: Call) -> None:
@@ -47,7 +49,7 @@ def test_examples_move_and_keep_their_energy(call: Call, path: Path) -> None:
     trajectory = eomgen.load_trajectory("run.npz")
     travel = max(np.ptp(trajectory[name]) for name in run["report"]["coordinates"])
     driven = "type: driver" in path.read_text(encoding="utf-8")
-    assert travel > (0.1 if driven else 0.4)
+    assert travel > TRAVEL.get(path.stem, 1.0)
     assert run["loop_residual"]["projected"] < 1e-10
     balance = run["energy"]["power_balance"]
     assert balance is None if driven else balance < 1e-7

@@ -55,9 +55,3 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
     }
     return status;
 }
-
-/* The same for derivatives by some coordinate or parameter. */
-static int correct_change(int rows, double *restrict G, const double *restrict r, double *restrict x, double *restrict w)
-{
-    return correct_linear(rows, G, r, x, 1e-15 * fmax(longest_of(x, N), longest_of(r, rows)), 1, w);
-}

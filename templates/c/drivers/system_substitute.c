@@ -19,8 +19,9 @@ static void substitute_system(const double *restrict lu, const int *restrict pla
 }
 
 /* Whether K z = r holds but for rounding: no more is left of any equation than 1e-11 of its terms, or 1e-14 of the
-   largest terms of all. The defect is in w + AT_DEFECT, balanced. */
-static int is_solved(const double *restrict r, const double *restrict z, double *restrict w)
+   largest terms of all; of constraints along which K has the singular value s (s^2 = weak) 1e-15 / s^2, which is what
+   rounding of the position makes of their accelerations. The defect is in w + AT_DEFECT, balanced. */
+static int is_solved(const double *restrict r, const double *restrict z, double weak, double *restrict w)
 {
     const double *const K = w + AT_SYSTEM, *const row = w + AT_ROW, *const d = w + AT_DEFECT;
     double *const terms = w + AT_DEFECT + NZ;
@@ -34,6 +35,9 @@ static int is_solved(const double *restrict r, const double *restrict z, double 
     for (int i = 0; i < NZ; i++) {
         terms[i] *= row[i];
         most = fmax(most, terms[i]);
+    }
+    for (int e = 0; e < RELAXED; e++) {
+        terms[RELAX[e][0]] *= fmax(1.0, 1e-4 / fmax(weak, 1e-13));
     }
     for (int i = 0; i < NZ; i++) {
         if (!(fabs(d[i]) <= 1e-11 * terms[i] + 1e-14 * most)) {
