@@ -20,8 +20,11 @@ class Units:
         for link in kinematics.links:
             turning = link.inertia[0][0] + link.inertia[1][1] + link.inertia[2][2]
             mass = mass + link.mass + turning / (length * length)
+        # bodies without inertia are told from the solution, not from a division by zero
+        some = graph.make("lt", graph.zero.id, mass.id)
+        mass = Expr(graph, graph.make("select", some, mass.id, graph.one.id))
         #: twice the kinetic energy
-        self.energy = (graph.one if mass.is_zero else mass) * length * length
+        self.energy = mass * length * length
         self.motion = [graph.one] * 3 + [length] * 3  #: a twist or acceleration
         self.wrench = [self.energy] * 3 + [self.energy / length] * 3
         #: force along each coordinate of the tree
