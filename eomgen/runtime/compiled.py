@@ -79,7 +79,7 @@ def integrate_compiled(
     dense: bool,
     options: dict[str, Any],
     watch: Progress | None,
-    pace: Pace,
+    pace: Pace | None = None,
     events: Events | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
     """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
@@ -97,7 +97,7 @@ def integrate_compiled(
     events = events if events is not None and len(events) else None
     plan = {
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
-        "watch": None if watch is None else watch.look, "pace": pace.look,
+        "watch": None if watch is None else watch.look, "pace": None if pace is None else pace.look,
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)
     journey = core.journey(

@@ -33,7 +33,7 @@ static double radau_norm(const eomgen_run *run, const double *x, int rows)
             sum += part * part;
         }
     }
-    return sqrt(sum / (rows * run->n));
+    return run->n > 0 ? sqrt(sum / (rows * run->n)) : 0.0;
 }
 
 /* The last step's polynomial at t, less its state at the start. */

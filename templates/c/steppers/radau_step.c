@@ -91,6 +91,7 @@ static void radau_accept(eomgen_run *run, const newton_area *a, double h, double
     run->y_old = run->y, run->y = y;
     run->t_old = run->t, run->t = t_new, run->step = h;
     run->interpolates = 0;
+    run->steps++;
     eomgen_evaluate(run, t_new, run->y, run->f);
 }
 
@@ -101,6 +102,9 @@ static int radau_step(eomgen_run *run)
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t), entered = run->h_abs;
     double h_abs = fmin(fmax(entered, least), run->max_step), rate = -1.0, size;
     double h_old = a->state[RADAU_H_OLD], error_old = a->state[RADAU_ERROR_OLD];
+    if (run->most_steps > 0 && run->steps >= run->most_steps) {
+        return EOMGEN_TOO_MANY_STEPS;
+    }
     if (h_abs != entered) {
         h_old = 0.0;
     }
