@@ -13,7 +13,11 @@ from rich.console import Console
 from .measure import calibrate, describe_machine
 from .report import Report, show, write
 
-BENCHMARKS = ("derive", "growth", "compile", "panda", "robots", "latency", "call", "simulate", "loops")
+BENCHMARKS = (
+    *("derive", "growth", "compile", "panda", "robots", "latency"),
+    *("call", "simulate", "integrate", "stiff", "loops"),
+    *("rhs", "lanes", "ensembles"),
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .describe import Model as Model
     from .describe import from_sympy as from_sympy
-    from .describe import load as load
+    from .loading import load as load
+    from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
 
-_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "describe", "load_trajectory": "runtime"}
+_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "loading"}
+_HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",
     "EomgenError",
@@ -30,13 +32,16 @@ _ERRORS = (
     "PartitionError",
     "ProjectionError",
     "SimulationError",
+    "SimulationInterrupted",
     "SingularMassMatrixError",
     "ToolchainError",
+    "UnsolvedError",
     "UsageError",
+    "ZenoError",
 )
 _HOMES |= dict.fromkeys(_ERRORS, "errors")
 
-__all__ = ["Model", "__version__", "errors", "from_sympy", "load", "load_trajectory", *_ERRORS]
+__all__ = ["Model", "Signal", "__version__", "errors", "from_sympy", "load", "load_trajectory", *_ERRORS]
 
 
 def __getattr__(name: str) -> Any:

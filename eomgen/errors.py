@@ -10,18 +10,23 @@
     |  |- SingularMassMatrixError   a combination of coordinates has no inertia behind it
     |  |- ProjectionError           the state could not be brought onto the constraints
     |  |- PartitionError            the chosen independent coordinates cannot move the mechanism here
+    |  |- UnsolvedError             rounding leaves the linear system of a method unsolved
     |  '- NonFiniteError            a result is not a finite number
     |- EquilibriumError      no equilibrium was found from the guess; .forces says what is left
     |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
+    |  '- ZenoError                 events that reset the state follow each other ever faster
     |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
     |- MissingDependencyError       an optional package is needed; the message says what to install
     '- UsageError            a call with names or shapes that do not fit the model
+
+    KeyboardInterrupt
+    '- SimulationInterrupted Ctrl-C during a run; .trajectory has what there was
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 
 class EomgenError(Exception):
@@ -122,6 +127,10 @@ class PartitionError(EvaluationError):
     """The chosen independent coordinates are not independent at this configuration."""
 
 
+class UnsolvedError(EvaluationError):
+    """Rounding leaves the linear system of a method unsolved: its accelerations would be wrong."""
+
+
 class NonFiniteError(EvaluationError):
     """A result is NaN or infinite."""
 
@@ -142,6 +151,31 @@ class EquilibriumError(EomgenError):
 
 class SimulationError(EomgenError):
     """The integration could not be finished."""
+
+
+class ZenoError(SimulationError):
+    """Events that reset the state follow each other ever faster, or a reset leads nowhere."""
+
+
+class SimulationInterrupted(KeyboardInterrupt):
+    """Ctrl-C came during a run.
+
+    Like every KeyboardInterrupt it is no Exception, so no ``except Exception`` takes it for a failure.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        The run up to there, made when it is asked for.
+    """
+
+    def __init__(self, message: str, complete: Callable[[], Any]) -> None:
+        super().__init__(message)
+        self._complete = complete
+
+    @property
+    def trajectory(self) -> Any:
+        """The run up to the interrupt."""
+        return self._complete()
 
 
 class ToolchainError(EomgenError):
@@ -171,4 +205,5 @@ STATUS: dict[int, type[EvaluationError]] = {
     2: SingularMassMatrixError,
     3: ProjectionError,
     4: PartitionError,
+    5: UnsolvedError,
 }

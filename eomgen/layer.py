@@ -6,20 +6,44 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+#: Parts of the steppers' source, in order: a part may use what stands in those before it.
+STEPPERS = (
+    *("control", "signals", "tape"),
+    *("plain", "rk4_step", "rk4"),
+    *("lu", "newton", "radau", "radau_step"),
+    *("event_values", "event_zero", "crossings", "loop"),
+)
+
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
+    "_journeys.pxi": ("cython/_journeys.pxi",),
+    "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
-    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in ("control", "dop853", "rk45", "rk23")),
+    "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
+    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
+    "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
+    "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
+    "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
+    "eomgen_lane_runs.h": ("c/ensembles/lane_runs.c",),
+    **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 
 
 @cache
 def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
+    return {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+
+
+def read_header(name: str) -> str:
+    """The text of a header that models and the layer share, as it comes with eomgen."""
+    return _read(f"c/{name}")
+
+
+def _read(part: str) -> str:
     root = Path(import_module("eomgen.templates").__path__[0])
-    return {
-        name: "\n".join((root / part).read_text(encoding="utf-8") for part in parts) for name, parts in LAYER.items()
-    }
+    return (root / part).read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 from .derivation import Equations
 from .equations import GIVEN, METHODS, take_given
 from .equations.positive import require_inertia
-from .errors import AssemblyError, UsageError
+from .errors import AssemblyError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
 from .kinematics.loads import drives_cut_joint
 from .kinematics.mobility import Mobility, judge
@@ -227,6 +227,7 @@ def _load(
         with _timed(seconds, "load"):
             return cast("Core", load_numpy(sources, equations.name, twins(program)))
     from .compilation import Options, compile_sources, load_core
+    from .compilation.native_faults import blame_source
 
     allowed = Options.__dataclass_fields__
     unknown = [name for name in options if name not in allowed]
@@ -235,7 +236,10 @@ def _load(
     with _timed(seconds, "emit"):
         sources = emit_c(program)
     with _timed(seconds, "compile"):
-        artifact = compile_sources(sources, equations.name, Options(**options))
+        try:
+            artifact = compile_sources(sources, equations.name, Options(**options))
+        except ToolchainError as error:
+            raise blame_source(error, equations.kinematics.graph.functions.values()) or error from None
     with _timed(seconds, "load"):
         return cast("Core", load_core(artifact))
 

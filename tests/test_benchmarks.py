@@ -9,6 +9,8 @@ import pytest
 
 from benchmarks.derive import largest_difference
 from benchmarks.report import Limit, number
+from benchmarks.rhs import contest
+from benchmarks.robot_loops import ROBOTS
 from benchmarks.run import main
 
 
@@ -24,6 +26,14 @@ def test_quick_benchmarks_write_their_results(tmp_path: Path, capsys: pytest.Cap
         assert (tmp_path / f"{name}.md").read_text().startswith(f"# {name}\n")
     derived = json.loads((tmp_path / "derive.json").read_text())["measured"]["3"]
     assert derived["eomgen embedding"]["median"] < derived["SymPy, relative angles"]["median"]
+
+
+@pytest.mark.slow
+def test_robots_in_c_move_as_pinocchio_and_mujoco_say(tmp_path: Path) -> None:
+    found = contest(ROBOTS[1], tmp_path, quick=True)
+    assert {"eomgen, default", "eomgen, symbols, default", "MuJoCo"} <= set(found["differences"])
+    assert max(found["differences"].values()) < 1e-9
+    assert set(found["ns"]) >= set(found["differences"])
 
 
 def test_unknown_benchmark_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

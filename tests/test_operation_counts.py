@@ -14,7 +14,8 @@ import pytest
 
 import eomgen as eg
 from benchmarks.growth import operations
-from benchmarks.models import ARMS, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
+from benchmarks.models import ARMS, chain, humanoid, numeric_arm, panda, spatial_chain, symbolic_arm
+from benchmarks.robot_loops import ROBOTS, Robot, build
 from eomgen import pipeline
 from eomgen.emit import emit_c
 from eomgen.equations import METHODS
@@ -29,6 +30,9 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 LIMITS = {"puma560": (498, 402), "stanford": (326, 285), "rx90": (330, 282), "panda": (415, 354), "iiwa": (403, 342)}
 #: What is counted today: multiplications and additions of the inverse dynamics by embedding.
 FOUND = {"puma560": (269, 279), "stanford": (230, 237), "rx90": (252, 258), "panda": (327, 340), "iiwa": (308, 319)}
+#: Right-hand sides of robots from their URDF files, inertias numbers; what CasADi's cse leaves of the same is more.
+ROBOT_LIMITS = {"Panda": 1661, "UR5": 908, "Talos": 8616, "ANYmal": 4284}
+ROBOTS_FOUND = {"Panda": 1198, "UR5": 556, "Talos": 6657, "ANYmal": 3397}
 
 
 @pytest.mark.slow
@@ -90,6 +94,25 @@ def test_forward_dynamics_with_numeric_parameters(name: str, limit: int) -> None
     checks = len(equations.kinematics.v) + 1
     assert chosen <= total <= chosen + checks
     assert total <= 0.75 * limit
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_right_hand_sides_of_robots(robot: Robot) -> None:
+    """Straight-line code also for Talos's 32 joints; with inertias as symbols what depends on them alone is hoisted."""
+    equations, program = build(robot)
+    assert equations.method == "embedding"
+    assert [block.name for block in program.blocks] == ["rhs"]
+    total = program.counts["rhs"].total
+    assert 0.9 * ROBOTS_FOUND[robot.name] <= total <= ROBOTS_FOUND[robot.name] <= 0.85 * ROBOT_LIMITS[robot.name]
+    assert program.counts["precompute"].total == 0
+    _, symbolic = build(robot, symbolic=True)
+    assert symbolic.counts["rhs"].total <= total
+    assert symbolic.counts["precompute"].total > 50
+
+
+def test_hinges_about_parallel_axes_are_resolved_together() -> None:
+    """A planar chain of five: 193 operations in the axes of each link, 181 in common ones."""
+    assert chain(5).derive("embedding").operations["mass_matrix and bias"].total <= 181
 
 
 def test_humanoid_of_thirty_joints() -> None:
@@ -161,4 +184,8 @@ def test_the_table_in_the_documents_is_what_is_counted() -> None:
         assert rows[title] == f"{choice.operations['embedding']:,}"
     for title, counted in bicycle().items():
         assert f"| bicycle, {title} | {counted[0]:,} | {counted[1]:,} |" in text
+    for robot in ROBOTS:
+        numeric, symbolic = (build(robot, symbolic=symbols)[1].counts for symbols in (False, True))
+        ours = f"{numeric['rhs'].total:,} | {symbolic['rhs'].total:,} | {symbolic['precompute'].total:,}"
+        assert f"| {robot.name} (URDF) | {ours} |" in text
     assert rows["humanoid"] == f"{humanoid().derive('embedding').operations['mass_matrix and bias'].total:,}"

@@ -45,6 +45,20 @@ def chain(n: int) -> eg.Model:
     return m
 
 
+def chain_with_joints(n: int) -> tuple[eg.Model, np.ndarray]:
+    """Rods on hinges with stiff springs and dampers in all but the first, and where it starts."""
+    m = eg.Model(f"stiff_chain_{n}", gravity=(0, -9.81, 0))
+    previous = m.ground
+    for k in range(n):
+        mass, length = 1.0 + 0.1 * k, 1.0 - 0.02 * k
+        rod = m.body(f"rod{k}", mass=mass, com=(0, -length / 2, 0), inertia={"zz": mass * length**2 / 12})
+        m.revolute(f"q{k}", previous, rod)
+        if k:
+            m.torque(f"joint{k}", f"q{k}", f"-1e4*q{k} - 1e2*q{k}_dot")
+        previous = rod.at(0, -length, 0)
+    return m, np.array([1.0] + (n - 1) * [0.3] + n * [0.0])
+
+
 def arm_joints(name: str) -> list[dict[str, Any]]:
     """The joints of an arm as in its reference file, entries of rotations next to 0 and +-1 made exact.
 

@@ -11,12 +11,16 @@ from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, force_slopes, weigh
 from .linear import linearise
-from .linearisation import Linearisation, judge
+from .linearisation import Linearisation
+from .rounding import judge
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
     from .search import Search
+
+
+DIFFERENCES = 1e-8  #: relative error of slopes taken from central differences
 
 
 class Equilibrium:
@@ -103,7 +107,7 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A = _held_motion(search, module, here, t)
-        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": judge(A)}
+        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": judge(A, error=DIFFERENCES)}
     return Equilibrium(module, t, here.x, found)
 
 

@@ -15,17 +15,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ProjectionError, UsageError
-from ..numeric.projection import ACCEPTED, EXACT, TIKHONOV, gram_solver, largest
+from ..numeric.gram import EXACT, GENTLE, gram_solver, least
+from ..numeric.projection import ACCEPTED, largest
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
-from ..runtime.layout import Layout
+from ..runtime.layout import Layout, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
 STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
 CLOSING = 25  #: Newton steps onto the constraints, at most
+PASSES = 30  #: of the linear correction of velocities, at most
 STILL = 1e-12  #: scaled step along the constraints at which the nearest position is found
-RANK = 1e-9  #: relative to the largest singular value of the scaled constraint Jacobian
 DAMPING = 0.5  #: largest scaled step
 
 
@@ -41,7 +43,7 @@ def find_consistent(
 ) -> Array:
     """See :meth:`~..runtime.force_analyses.ForceAnalyses.consistent`."""
     module = module if p is None and u is None else module.bind(p, u)
-    layout = module.layout
+    layout, t = module.layout, number("t", t)
     state = np.array(x, dtype=float)
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
@@ -139,13 +141,18 @@ def _positions(
                 return q
             if not np.isfinite(size) or not J.any():
                 return None
-            q, before = moved(q, -J.T @ gram_solver(J, max(TIKHONOV, size))(C)), size
+            sizes = np.linalg.norm(J, axis=1)
+            sizes = np.where(sizes > RANK * sizes.max(), sizes, np.inf)
+            alike = J / sizes[:, None]  # in any metric, so that the Tikhonov term weighs all rows in the same way
+            q, before = moved(q, -alike.T @ gram_solver(alike, max(GENTLE, size))(C / sizes)), size
         return None
 
     def change(q: Array) -> Array:
         return np.asarray(L.T @ _difference(layout, q, start)[free])
 
     q = close(start)
+    if q is None and not held:  # the metric leads astray far from the constraints: begin at the projection
+        q = close(np.asarray(module.project(np.concatenate([start, np.zeros(layout.n_v)]), t=t))[: layout.n_q])
     if q is None:
         kept = f" with {', '.join(held)} held" if held else ""
         C, _ = rows(start)
@@ -186,14 +193,20 @@ def _velocities(
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
     J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
     J = np.linalg.solve(L, J.T).T
-    v = np.array(v)
-    for _ in range(3):  # again, so that the Tikhonov term leaves no trace
+    sizes = np.linalg.norm(J, axis=1)
+    sizes = np.where(sizes > RANK * sizes.max(initial=0.0), sizes, np.inf)
+    J = J / sizes[:, None]  # rows alike, so that the Tikhonov term weighs all in the same way
+    v, before = np.array(v), np.inf
+    for _ in range(PASSES):
         rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
-        v[free] -= np.linalg.solve(L.T, J.T @ gram_solver(J)(rate))
+        if largest(rate) == 0.0 or not largest(rate) < before or not J.any():
+            break
+        before = largest(rate)
+        fast = max(largest(v / scales.q), largest(rate))
+        v[free] += np.linalg.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
     if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]
-        raise ProjectionError(
-            f"no consistent velocities with {', '.join(held)} held: the rate of {worst} is left at {largest(rate):.2g}"
-        )
+        kept = f" with {', '.join(held)} held" if held else ""
+        raise ProjectionError(f"no consistent velocities{kept}: the rate of {worst} is left at {largest(rate):.2g}")
     return v

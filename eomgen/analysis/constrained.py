@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array, Scales
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-RANK = 1e-10  #: relative to the largest singular value of the scaled constraint Jacobian
 
 
 class States(NamedTuple):
@@ -79,6 +78,10 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         The constraints cannot be met near a state.
     """
     layout = module.layout
+    if isinstance(p, Mapping):
+        p = layout.values("parameter", layout.p, p, module.p)
+    if isinstance(u, Mapping):
+        u = layout.values("input", layout.u, u, module.u)
     state = np.asarray(x, dtype=float)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise UsageError(
@@ -86,7 +89,10 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         )
     single = state.ndim == 1
     columns = state[:, None] if single else state
-    time = np.asarray(t, dtype=float)
+    try:
+        time = np.asarray(t, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"t must be a number or an array of them, not {t!r}") from None
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
@@ -153,3 +159,17 @@ def evaluate(
         for k in range(len(states.t))
     ]
     return states.shaped(np.concatenate(parts, axis=-1), out)
+
+
+def free_motions(J: Array, scales: Scales) -> Array:
+    """Velocities that the constraints C_q = J (m, n_v) allow, (n_v, n_dof), orthonormal in scaled coordinates."""
+    return conditioned_motions(J, scales)[0]
+
+
+def conditioned_motions(J: Array, scales: Scales) -> tuple[Array, float]:
+    """The same, and the condition of the constraints that leave them; 0 without any."""
+    if not len(J):
+        return np.diag(scales.q), 0.0
+    _, sizes, Vt = np.linalg.svd(scales.jacobian(J))
+    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
+    return np.asarray(scales.q[:, None] * Vt[rank:].T), float(sizes[0] / sizes[rank - 1]) if rank else 0.0

@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.partitions import partition
+from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from .constrained import RANK, States, prepare, solve_multipliers
+from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
 if TYPE_CHECKING:
@@ -97,11 +99,12 @@ def find_forces(
     for k, B in enumerate(bases):
         A = B.T @ S[:, :, k]
         want = B.T @ (needed[:, k] + S[:, :, k] @ base)
-        found = np.linalg.lstsq(A / weights, want, rcond=RANK)[0] / weights
+        found = _solve(A, want, weights)
         left = want - A @ found
         if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), 1e-300):
             raise UsageError(_out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None))
         forces[:, k] = found
+    _check_inputs(states, names, accelerations, forces, bases, S)
     rest = needed - np.einsum("jik,ik->jk", S, forces - base[:, None])
     multipliers = solve_multipliers(C_q, rest, layout.scales)
     reactions = None
@@ -117,6 +120,50 @@ def find_forces(
         shaped(multipliers),
         None if reactions is None else shaped(reactions),
     )
+
+
+def _solve(A: Array, want: Array, weights: Array) -> Array:
+    """Forces with A f = want, the smallest where there are several.
+
+    As many drives as freedoms are eliminated one by one, so that forces of mechanisms that have nothing to do with each
+    other stay apart, whatever their sizes.
+    """
+    m, n = A.shape
+    if m == n and m:
+        rows = np.abs(A * (1.0 / weights)).max(axis=1, keepdims=True)
+        if rows.all() and np.linalg.cond(A / weights / rows) < 1e-2 / RANK:
+            return np.asarray(np.linalg.solve(A / rows, want / rows[:, 0]))
+    return np.asarray(np.linalg.lstsq(A / weights, want, rcond=RANK)[0] / weights)
+
+
+def _check_inputs(
+    states: States, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
+) -> None:
+    """The forces found, applied all at once, must make the motion: inputs may multiply each other.
+
+    Raises
+    ------
+    UsageError
+    """
+    module, layout = states.module, states.module.layout
+    inputs = [(i, layout.u.index(name)) for i, name in enumerate(names) if name in layout.u]
+    if len(inputs) < 2:
+        return
+    others = [i for i in range(len(names)) if i not in [own for own, _ in inputs]]
+    for k, B in enumerate(bases):
+        u = module.u
+        for i, j in inputs:
+            u[j] = forces[i, k]
+        left = B.T @ (
+            module.inverse_dynamics(states.q[:, k], states.v[:, k], a[:, k], u=u, t=float(states.t[k]))
+            - S[:, others, k] @ forces[others, k]
+        )
+        size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
+        if (np.abs(left) > REACHED * np.maximum(size, 1e-300)).any():
+            raise UsageError(
+                f"forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together (they "
+                "multiply each other); name one of them, or the coordinates that they drive"
+            )
 
 
 def _size(layout: Layout, name: str) -> float:
@@ -150,11 +197,13 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
 def _basis(J: Array, layout: Layout) -> Array:
     """Velocities that the constraints allow (n_v, n_dof), in scaled coordinates."""
     s = layout.scales
-    if not len(J):
-        return np.diag(s.q)
-    _, sizes, Vt = np.linalg.svd(J * (s.q / s.c[:, None]))
-    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
-    return np.asarray(s.q[:, None] * Vt[rank:].T)
+    if len(J):
+        scaled = s.jacobian(J)
+        sizes = np.linalg.svd(scaled, compute_uv=False)
+        rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
+        if rank == layout.rank:  # by elimination, which keeps mechanisms apart that have nothing to do with each other
+            return np.asarray(s.q[:, None] * partition(scaled, rank, layout.independent).B)
+    return free_motions(J, s)
 
 
 def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Array:
@@ -250,10 +299,11 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), 1e-300)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
     moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
+    need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"
     where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
     return (
         f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
-        f"{', '.join(moved[:4])}; {layout.n_dof} degrees of freedom need as many drives, "
+        f"{', '.join(moved[:4])}; {need} as many drives, "
         f"such as {', '.join(layout.freedoms[i] for i in layout.independent)}"
     )
 

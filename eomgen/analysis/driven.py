@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.integrate import Event
+from ..runtime.events import Event
 from ..runtime.signals import Forcing
 from .following import Follower
 from .gaps import describe_gap
@@ -134,6 +134,8 @@ class _Run:
         for event, places in zip(events, found, strict=True):
             values = [event(self.start + self.sense * s, x) for s, x in zip(grid, states.T, strict=True)]
             for k in range(len(grid) - 1):
+                if k and values[k] == 0.0:
+                    continue  # found where the interval before ends
                 up, down = values[k] <= 0.0 <= values[k + 1], values[k] >= 0.0 >= values[k + 1]
                 if (up and event.direction >= 0) or (down and event.direction <= 0):
                     low, high = float(grid[k]), float(grid[k + 1])

@@ -12,6 +12,7 @@ from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
 from ..runtime.analyses import require_velocities
 from ..runtime.initial import Initial
+from ..runtime.layout import number
 from ..runtime.names import unknown
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
@@ -33,7 +34,7 @@ def find_equilibrium(
     """See :meth:`~..runtime.analyses.Analyses.equilibrium`."""
     require_velocities(module.layout)
     module = module if p is None and u is None else module.bind(p, u)
-    time = float(t)
+    time = number("t", t)
     unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
     names = (hold,) if isinstance(hold, str) else hold
     wanted: dict[str, float | None] = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)

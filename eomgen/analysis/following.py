@@ -152,8 +152,8 @@ class Follower:
 
     # motion
 
-    def _right(self, q: Array, t: float, t1: float, y1: Array) -> Array:
-        """Scaled right-hand side of K v = [-C_t t1; y1]."""
+    def right(self, q: Array, t: float, t1: float, y1: Array) -> Array:
+        """Scaled right-hand side of K v = [-C_t t1; y1] where dt/ds = t1 and dy/ds = y1."""
         C_t = np.zeros(self.layout.n_c)
         if t1 and self.layout.n_c:
             C_t = self._rate(np.concatenate([q, self._zero]), t=t)
@@ -163,7 +163,7 @@ class Follower:
         """dq/ds where dt/ds = t1 and dy/ds = y1."""
         K = self.matrix(q, t)
         U, S, V = np.linalg.svd(K, full_matrices=False)
-        right = U.T @ self._right(q, t, t1, y1)
+        right = U.T @ self.right(q, t, t1, y1)
         small = 1e-13 * S[0]
         rate = V.T @ np.divide(right, S, out=np.zeros_like(S), where=small < S)
         square = K[self._square]
@@ -184,7 +184,7 @@ class Follower:
             found = self._kinematics(np.concatenate([self.led_values(q, t), y1, y2, q]), t=t)
             return found[n_q : n_q + n], found[n_q + n :]
         K = self.matrix(q, t)
-        v = self.scales.q * np.linalg.lstsq(K, self._right(q, t, 1.0, y1), rcond=1e-13)[0]
+        v = self.scales.q * np.linalg.lstsq(K, self.right(q, t, 1.0, y1), rcond=1e-13)[0]
         a = self._some_acceleration(t, q, v)
         if not all(self.in_tree):
             second = self._loop_values(q, t, v, a)[2]

@@ -1,17 +1,13 @@
 """Analysis: a state at an impact, or at which coordinates are locked -> the state after it, impulses, energy lost.
 
-M (v+ - v-) + C_q^T i = sum n g, C_q v+ = C_q v-, with the normals n = d(gap)/dt by v.  Frictionless impacts obey
-Newton's law of restitution, gap'+ = -e gap'-, wherever their impulse pushes (Pfeiffer and Glocker, Multibody Dynamics
-with Unilateral Contacts, ch. 8; Moreau 1988): 0 <= g, 0 <= gap'+ + e gap'-, and one of the two is 0.  Locked
-coordinates keep rate 0 (an impact with e = 0 whose impulse may pull).
+M (v+ - v-) + C_q^T i = sum n g, C_q v+ = C_q v-, with the normals n = d(gap)/dt by v; the law that gives the impulses g
+is in :mod:`.impact_law`.  Locked coordinates keep rate 0 (their impulses may pull).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
-from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,16 +15,19 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.layout import Layout
-from .constrained import RANK, States, prepare, solve_multipliers
-from .linear import output_derivatives
+from ..runtime.layout import Layout, number
+from .constrained import States, conditioned_motions, prepare, solve_multipliers
+from .impact_gaps import Gaps, allowance, by_velocity, check_gaps, drift
+from .impact_law import collide
 from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-MOST_GAPS = 12  #: gaps that can meet at one instant
-SLACK = 1e-10  #: relative, of impulses and rates that count as 0
+TOUCHING = 1e-8  #: gaps of a run at most this open, in lengths of the model or rad, take part in an impact
+CLOSED = 1e-6  #: the same of gaps that a user says are closed
+HELD = 1e-9  #: part of a normal, along which nothing is free to move, that is rounding
+ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -42,15 +41,15 @@ class Impact:
     before : (n_x,) array
         The state right before it, on the constraints.
     names : tuple of str
-        Gaps, then locked coordinates.
+        Gaps, then locked coordinates: ``hit["gap"]`` is an impulse.
     impulses : (n,) array
         N s, or N m s: along the gap, positive where it pushes; on a locked coordinate.
     rates_before, rates_after : (n,) arrays
-        Of the gaps and locked coordinates.
+        Of the gaps and locked coordinates; of gaps that move by themselves in time, this included.
     constraint_impulses : (n_rows,) array
         Of all constraint rows, with the sign of ``multipliers``.
     energy_lost : float
-        Kinetic energy before less that after (J).
+        Kinetic energy before less that after (J).  Negative only where a gap that moves in time brings energy in.
     """
 
     x: Array
@@ -84,118 +83,146 @@ def strike(
     gaps: Mapping[str, float] | None = None,
     *,
     lock: Sequence[str] = (),
+    closed: bool = False,
     p: Any = None,
     u: Any = None,
 ) -> Impact:
-    """See :meth:`~..runtime.analyses.Analyses.impact`."""
+    """See :meth:`~..runtime.force_analyses.ForceAnalyses.impact`."""
     module = module if p is None and u is None else module.bind(p, u)
-    layout = module.layout
-    gaps = dict(gaps or {})
-    locked = (lock,) if isinstance(lock, str) else tuple(lock)
-    check_gaps(layout, gaps, locked)
-    states = prepare(module, float(t), x)
-    if not states.single:
-        raise UsageError(f"x must be one state ({layout.n_x},)")
-    q, v = states.q[:, 0], states.v[:, 0]
-    C_q = states.jacobian()
-    M = states.evaluate(module.mass_matrix, states.q)[..., 0]
-    rows, rates = _normals(states, (*gaps, *locked))
-    B = _free(C_q[0], layout)
-    factor = np.linalg.cholesky(B.T @ M @ B) if B.shape[1] else np.zeros((0, 0))
-    half = np.linalg.solve(factor, B.T @ rows.T) if B.shape[1] else np.zeros((0, len(rows)))
-    A = half.T @ half  # rates of the gaps by impulses
-    e = np.array([*gaps.values(), *(0.0 for _ in locked)])
-    impulses = _restitute(A, (1.0 + e) * rates, len(gaps))
-    change = B @ np.linalg.solve(factor.T, half @ impulses) if B.shape[1] else np.zeros_like(v)
-    after = np.concatenate([q, v + change])
-    held = solve_multipliers(C_q, (M @ change - rows.T @ impulses)[:, None], layout.scales)[:, 0]
-    lost = -float(change @ M @ (v + 0.5 * change))
-    before = np.ascontiguousarray(states.x[:, 0])
-    return Impact(after, before, (*gaps, *locked), impulses, rates, rates + rows @ change, held, lost)
+    found, locked = check_gaps(module.layout, gaps, lock)
+    states = _one_state(module, number("t", t), x)
+    watched = Gaps(module, tuple(found))
+    rows = watched.normals(float(states.t[0]), states.x[:, 0])
+    if not closed:
+        _require_closed(watched, states)
+    return _strike_gaps(states, watched, rows, found, locked)
 
 
-def check_gaps(layout: Layout, gaps: Mapping[str, float], locked: Sequence[str]) -> None:
-    """Refuse unknown names and restitutions outside 0 .. 1.
+def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]) -> Impact:
+    """The impact of some gaps of a run, with inputs as they are then."""
+    u = gaps.inputs(t, x)
+    module = gaps.module if u is None else gaps.module.bind(None, u)
+    own, states = Gaps(module, tuple(restitutions), gaps.forcing), _one_state(module, t, x)
+    return _strike_gaps(states, own, own.normals(t, states.x[:, 0]), restitutions, ())
+
+
+def strike_events(
+    module: Module, t: float, x: Array, events: Sequence[Mapping[str, Any]], fired: Sequence[int], u: Array
+) -> Array:
+    """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    x : (n_x,) array
+    events : sequence of mappings
+        As in the metadata; those with a restitution are gaps.
+    fired : sequence of int
+        Events that happened.
+    u : (n_u,) array
 
     Raises
     ------
     UsageError
+        A gap depends on velocities, or no impulses obey the constraints and the laws of restitution.
     """
-    if not gaps and not locked:
-        raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
-    if len(gaps) > MOST_GAPS:
-        raise UsageError(f"at most {MOST_GAPS} gaps can meet at one instant, not {len(gaps)}")
-    if layout.given_rates:
-        raise UsageError("impacts need q' = v; the rates of this model's coordinates are given")
-    coordinates = [*layout.freedoms, *layout.loops]
-    for what, names, allowed in (("gaps", gaps, [*coordinates, *layout.y]), ("lock", locked, coordinates)):
-        for name in names:
-            if name not in allowed:
-                near = get_close_matches(name, allowed, 1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
-                raise UsageError(f"{what}: no coordinate or output {name!r}{hint}; there are {', '.join(allowed)}")
-    for name, e in gaps.items():
-        if not 0.0 <= float(e) <= 1.0:
-            raise UsageError(f"gaps: the restitution of {name} is between 0 and 1, not {e}")
+    layout = module.layout
+    kernel = module.kernels.timed("events")
+    values = kernel(t, x, u=u)
+    near = TOUCHING * max(1.0, layout.length)
+    gaps = {
+        i: float(event["restitution"])
+        for i, event in enumerate(events)
+        if event.get("restitution") is not None and (i in fired or abs(values[i]) <= near)
+    }
+    slopes = module.kernels.timed("event_slopes")(t, x, u=u)
+    states = _one_state(module, t, x)
+    q, v = states.q[:, 0], states.v[:, 0]
+    for i in gaps:
+        if np.abs(slopes[i, layout.n_q :]).max(initial=0.0) > 0.0:
+            raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
+    rows = np.array([by_velocity(layout, q, slopes[i, : layout.n_q]) for i in gaps])
+    rates = rows @ v + drift(lambda time: kernel(time, x, u=u), t)[[*gaps]]
+    names = [str(events[i]["name"]) for i in gaps]
+    return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
 
 
-def _free(J: Array, layout: Layout) -> Array:
-    s = layout.scales
-    if not len(J):
-        return np.diag(s.q)
-    _, sizes, Vt = np.linalg.svd(J * (s.q / s.c[:, None]))
-    rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
-    return np.asarray(s.q[:, None] * Vt[rank:].T)
+def _one_state(module: Module, t: float, x: ArrayLike) -> States:
+    states = prepare(module, t, x)
+    if not states.single:
+        raise UsageError(f"x must be one state ({module.layout.n_x},)")
+    return states
 
 
-def _normals(states: States, names: Sequence[str]) -> tuple[Array, Array]:
-    """Rates of coordinates and outputs: by v (n, n_v), and as they are (n,)."""
-    module, layout = states.module, states.module.layout
+def _require_closed(gaps: Gaps, states: States) -> None:
+    values = gaps.values(float(states.t[0]), states.x[:, 0])
+    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, CLOSED), strict=True):
+        if abs(value) > limit:
+            how = "open" if value > 0.0 else "closed too far"
+            unit = gaps.layout.unit(name)
+            raise UsageError(
+                f"gap {name} is {value:.6g}{' ' * bool(unit)}{unit}, {how}; an impact needs 0, within {limit:.2g}: "
+                "set the state there, or take it as closed whatever its value (closed=True, --closed)"
+            )
+
+
+def _strike_gaps(
+    states: States, gaps: Gaps, rows: Array, restitutions: Mapping[str, float], locked: tuple[str, ...]
+) -> Impact:
+    rates = gaps.rates(float(states.t[0]), states.x[:, 0], rows)
+    if locked:
+        held = _locks(states, locked)
+        rows, rates = np.vstack([rows, held]), np.concatenate([rates, held @ states.v[:, 0]])
+    return _apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked))
+
+
+def _locks(states: States, names: Sequence[str]) -> Array:
+    layout = states.module.layout
     rows = np.zeros((len(names), layout.n_v))
-    q, v, t = states.q[:, 0], states.v[:, 0], float(states.t[0])
-    slopes: Array | None = None
     for i, name in enumerate(names):
         if name in layout.freedoms:
             rows[i, layout.freedoms.index(name)] = 1.0
-        elif name in layout.loops:
-            every = states.evaluate(module.kernels.state("loop_coordinate_jacobian"), states.q)
-            rows[i] = every[layout.loops.index(name), :, 0]
         else:
-            if slopes is None:
-                slopes = output_derivatives(module, t, states.x[:, 0], states.accelerations()[:, 0])
-            own = slopes[layout.y.index(name)]
-            if np.abs(own[layout.n_q : layout.n_x + layout.n_v]).max(initial=0.0) > 0.0:
-                raise UsageError(f"gaps: output {name!r} depends on velocities; a gap is a function of positions")
-            rows[i] = _by_velocity(layout, q, own[: layout.n_q])
-    return rows, rows @ v
+            every = states.evaluate(states.module.kernels.state("loop_coordinate_jacobian"), states.q)
+            rows[i] = every[layout.loops.index(name), :, 0]
+    return rows
 
 
-def _by_velocity(layout: Layout, q: Array, slope: Array) -> Array:
-    """Derivative of a rate by v from that of the value by q: N^T slope."""
-    if layout.space is None:
-        return slope
-    return np.array([slope @ layout.space.rates(q, e) for e in np.eye(layout.n_v)])
+def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[str]) -> Impact:
+    layout, v = states.module.layout, states.v[:, 0]
+    C_q = states.jacobian()
+    M = states.evaluate(states.module.mass_matrix, states.q)[..., 0]
+    B, condition = conditioned_motions(C_q[0], layout.scales)
+    rows, rates = rows.reshape(-1, layout.n_v), np.asarray(rates, dtype=float)
+    rest, fixed = _rounding(rows, v, B, condition, layout)
+    for i in np.flatnonzero(fixed).tolist():
+        if rates[i] < -rest[i] or (i >= len(e) and rates[i] > rest[i]):
+            what = f"gap {names[i]} closes" if i < len(e) else f"lock: {names[i]} moves"
+            raise UsageError(
+                f"{what} at the rate {rates[i]:.6g}, which drivers or constraints impose: no impulse changes it"
+            )
+    if B.shape[1]:
+        factor = np.linalg.cholesky(B.T @ M @ B)
+        H = np.where(fixed, 0.0, np.linalg.solve(factor, B.T @ rows.T))
+        impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
+        change = B @ np.linalg.solve(factor.T, z)
+    else:
+        impulses, change = np.zeros(len(rates)), np.zeros_like(v)
+    after = np.concatenate([states.q[:, 0], v + change])
+    held = solve_multipliers(C_q, (M @ change - rows.T @ impulses)[:, None], layout.scales)[:, 0]
+    lost = 0.0 - float(change @ M @ (v + 0.5 * change))
+    before = np.ascontiguousarray(states.x[:, 0])
+    return Impact(after, before, tuple(names), impulses, rates, rates + rows @ change, held, lost)
 
 
-def _restitute(A: Array, b: Array, gaps: int) -> Array:
-    """g with 0 <= g, 0 <= A g + b, g (A g + b) = 0 for the gaps, and A g + b = 0 for what is locked."""
-    size = max(np.abs(b).max(initial=0.0), 1e-300)
-    locked = list(range(gaps, len(b)))
-    order = sorted(range(gaps), key=lambda i: b[i])
-    for count in range(gaps + 1):
-        for chosen in combinations(order, count):
-            active = [*sorted(chosen), *locked]
-            g = np.zeros(len(b))
-            if active:
-                block = A[np.ix_(active, active)]
-                g[active] = np.linalg.lstsq(block, -b[active], rcond=RANK)[0]
-            rest = A @ g + b
-            push = g[:gaps] * np.diag(A)[:gaps]
-            if (
-                (push >= -SLACK * size).all()
-                and (rest[:gaps] >= -SLACK * size).all()
-                and (np.abs(rest[active]) <= 1e-8 * size).all()
-            ):
-                return g
-    stuck = "the locked coordinates cannot all stop" if locked else "these gaps cannot open together"
-    raise UsageError(f"no impulses obey the constraints and the laws of restitution: {stuck}")
+def _rounding(rows: Array, v: Array, B: Array, condition: float, layout: Layout) -> tuple[Array, Array]:
+    """Sizes of rates (n,) that are rounding, and which rates (n,) no impulse can change."""
+    s = layout.scales.q
+    lengths = np.linalg.norm(rows * s, axis=1)
+    fast = float(np.linalg.norm(v / s))
+    rest = ROUNDING * (np.abs(rows) @ np.abs(v) + condition * lengths * fast)
+    part = np.linalg.norm((rows @ B), axis=1)
+    fixed = part <= max(HELD, ROUNDING * condition) * lengths
+    rest[fixed] += HELD * lengths[fixed] * fast
+    return rest, fixed

@@ -1,90 +1,36 @@
-"""Analysis: a run that stops at every closing gap, applies the impact and goes on."""
+"""Analysis: a run that stops at every closing gap, applies the impact and goes on -> a trajectory with impacts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import UsageError
+from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from .impact import Impact, check_gaps, strike
+from ..runtime.recording import Columns, describe, units_of
+from ..runtime.signals import Forcing
+from ..runtime.simulate import find_span, find_state
+from ..runtime.trajectory import Residuals, Trajectory
+from .impact import TOUCHING, Impact, strike_run
+from .impact_gaps import Gaps, allowance, check_gaps
+from .impact_trajectory import ImpactRun
+from .impact_watch import Watch, first_missed
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-    from ..runtime.trajectory import Trajectory
 
-TOUCHING = 1e-8  #: gaps at most this open, in lengths of the model or rad, take part in an impact
-STEP = 1e-5  #: (s) over which the curvature of a gap is estimated
 REST = 1e-6  #: rate after an impact, relative to the largest rate at an impact so far, at which a gap counts as closed
-
-
-@dataclass(frozen=True)
-class ImpactRun:
-    """A motion with impacts.
-
-    Attributes
-    ----------
-    t : (n_t,) array
-        Times (s); each impact has two, the same one before and after.
-    x : (n_x, n_t) array
-    impacts : list of (float, Impact)
-    pieces : list of Trajectory
-        Between impacts.
-    ended : {'end', 'impacts', 'rest'}
-        Why it ended: the span is over, as many impacts as allowed, or a gap that no longer opens (bodies that stay in
-        contact need a joint or a contact force).
-    """
-
-    t: Array
-    x: Array
-    impacts: list[tuple[float, Impact]]
-    pieces: list[Trajectory]
-    ended: str
-
-    def __getitem__(self, name: str) -> Array:
-        return np.concatenate([piece[name] for piece in self.pieces])
-
-    def __repr__(self) -> str:
-        return f"<ImpactRun: {len(self.t)} points, t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, {self.count}>"
-
-    @property
-    def count(self) -> str:
-        """How many impacts there were, and how it ended."""
-        reasons = {"end": "", "impacts": "; as many as allowed", "rest": "; a gap stays closed"}
-        return f"{len(self.impacts)} impact{'s' * (len(self.impacts) != 1)}{reasons[self.ended]}"
-
-
-def gap_functions(module: Module, names: tuple[str, ...]) -> list[Callable[[float, Array], float]]:
-    """f(t, x) of each gap."""
-    layout = module.layout
-    found: list[Callable[[float, Array], float]] = []
-    for name in names:
-        if name in layout.q:
-            i = layout.q.index(name)
-            found.append(lambda t, x, i=i: float(x[i]))  # type: ignore[misc]
-        elif name in layout.loops:
-            kernel, k = module.kernels.motion("loop_coordinates"), layout.loops.index(name)
-
-            def of_loop(t: float, x: Array, k: int = k, kernel: Any = kernel) -> float:
-                q, v = x[: layout.n_q], x[layout.n_q :]
-                return float(kernel(q, v, np.zeros_like(v), t=t)[0, k])
-
-            found.append(of_loop)
-        elif name in layout.y:
-            j = layout.y.index(name)
-            found.append(lambda t, x, j=j: float(module.outputs(t, x)[j]))  # type: ignore[misc]
-        else:
-            raise UsageError(f"gaps: {name!r} is no coordinate or output, whose value can be followed")
-    return found
+BEYOND = 1e-6  #: negative gaps of this size, in lengths of the model or rad, are an error
+IDLE = 50  #: closings in a row that bring neither an impact nor time
+MOMENT = 1e-6  #: (s) over which the acceleration of a gap is taken
 
 
 def run_with_impacts(
     module: Module,
-    span: float | tuple[float, float],
+    span: float | tuple[float, float] | None,
     gaps: Mapping[str, float],
     initial: Mapping[str, float] | ArrayLike | None = None,
     parameters: Any = None,
@@ -93,71 +39,181 @@ def run_with_impacts(
     most: int = 1000,
     **options: Any,
 ) -> ImpactRun:
-    """See :meth:`~..runtime.analyses.Analyses.simulate_impacts`."""
+    """See :meth:`~..runtime.force_analyses.ForceAnalyses.simulate_impacts`."""
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
-            raise UsageError(f"simulate_impacts has no {key}=; the pieces of the run are what the solver stepped")
-    names = tuple(gaps)
-    check_gaps(module.layout, gaps, ())
-    steady = {k: v for k, v in (inputs or {}).items() if isinstance(v, (int, float))}
-    bound = module.bind(parameters, steady or None)
-    functions = gap_functions(bound, names)
-    start, end = (0.0, float(span)) if np.ndim(span) == 0 else map(float, span)  # type: ignore[arg-type]
-    x: Any = initial
-    if initial is None or isinstance(initial, Mapping):
-        x = bound.x0(initial, t=start)
-    limit = TOUCHING * max(1.0, module.layout.length)
-    for name, f in zip(names, functions, strict=True):
-        if f(start, np.asarray(x, dtype=float)) < -limit:
-            raise UsageError(f"gaps: {name} is {f(start, np.asarray(x)):.3g} at the start; a gap is 0 or positive")
-
-    def event_of(f: Callable[[float, Array], float]) -> Any:
-        def closing(t: float, state: Array) -> float:
-            return f(t, state)
-
-        closing.terminal, closing.direction = True, -1.0  # type: ignore[attr-defined]
-        return closing
-
-    events = {name: event_of(f) for name, f in zip(names, functions, strict=True)}
-    pieces: list[Trajectory] = []
-    impacts: list[tuple[float, Impact]] = []
-    fastest, ended = 0.0, "end"
-    leaving: dict[str, float] = {}  # gaps that an impact opened, and when they are widest
-    while True:
-        until = min([end, *leaving.values()])
-        watched = [event for name, event in events.items() if name not in leaving]
-        piece = bound.simulate((start, until), x, None, inputs, events=watched, **options)
-        pieces.append(piece)
-        start, x = float(piece.t[-1]), np.array(piece.x[:, -1])
-        leaving = {name: t for name, t in leaving.items() if t > start}
-        if piece.status != 1:
-            if start >= end:
-                break
-            continue
-        closed = {name: e for (name, e), f in zip(gaps.items(), functions, strict=True) if f(start, x) <= limit}
-        impact = strike(bound, start, x, closed)
-        impacts.append((start, impact))
-        fastest = max(fastest, float(np.abs(impact.rates_before).max()))
-        x = impact.x
-        hit = impact.impulses > 0.0
-        if (impact.rates_after[hit] <= REST * fastest).any():
-            ended = "rest"
-            break
-        if len(impacts) >= most:
-            ended = "impacts"
-            break
-        if start >= end:
-            break
-        for name, rate in zip(impact.names, impact.rates_after, strict=True):
-            bend = _curvature(bound, functions[names.index(name)], start, x, float(rate))
-            if rate > 0.0 > bend and start - rate / bend > start:
-                leaving[name] = start - rate / bend
-    times = np.concatenate([piece.t for piece in pieces])
-    return ImpactRun(times, np.concatenate([piece.x for piece in pieces], axis=1), impacts, pieces, ended)
+            raise UsageError(
+                f"simulate_impacts has no {key}=; the run it returns has t_events, and at(t) for any times"
+            )
+    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
+        raise UsageError(f"most is a number of impacts, 1 or more, not {most!r}")
+    found, _ = check_gaps(module.layout, gaps)
+    if not module.n_dof:
+        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no impact can change its motion")
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    if end < start:
+        raise UsageError(f"a run with impacts goes forward in time, not from {start:.6g} s to {end:.6g} s")
+    forcing = Forcing(module.layout, inputs)
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    run = _Run(bound, found, forcing, inputs, end, most, options)
+    return run.finish(run.travel(start, find_state(bound, initial, start)))
 
 
-def _curvature(module: Module, f: Callable[[float, Array], float], t: float, x: Array, rate: float) -> float:
-    """Second derivative of a gap along the motion, roughly: it tells when an opened gap begins to close."""
-    middle = x + 0.5 * STEP * module.rhs(t, x)
-    after = x + STEP * module.rhs(t + 0.5 * STEP, middle)
-    return 2.0 * (f(t + STEP, after) - f(t, x) - rate * STEP) / STEP**2
+class _Run:
+    """A run on its way."""
+
+    def __init__(
+        self,
+        module: Module,
+        restitutions: dict[str, float],
+        forcing: Forcing,
+        inputs: Mapping[str, Any] | None,
+        end: float,
+        most: int,
+        options: dict[str, Any],
+    ) -> None:
+        self.module, self.forcing, self.inputs, self.end, self.most = module, forcing, inputs, end, most
+        self.options, self.restitutions = options, restitutions
+        self.gaps = Gaps(module, tuple(restitutions), forcing if forcing else None)
+        self.limits = allowance(module.layout, self.gaps.names, TOUCHING)
+        self.times: list[Array] = []
+        self.states: list[Array] = []
+        self.samples: list[tuple[float, Trajectory]] = []  # ends, and what has dense output
+        self.impacts: list[tuple[float, Impact]] = []
+        self.breaks: list[int] = []
+        self.fastest, self._struck = 0.0, False
+
+    def travel(self, t: float, x: Array) -> str:
+        """Go on from a state until the run ends, and tell why."""
+        values = self.gaps.values(t, x)
+        low = values < -np.maximum(self.limits, allowance(self.module.layout, self.gaps.names, BEYOND))
+        for i in np.flatnonzero(low):
+            raise UsageError(f"gaps: {self.gaps.names[i]} is {values[i]:.3g} at the start; a gap is 0 or positive")
+        fired, idle = np.zeros(len(values), dtype=bool), 0
+        while True:
+            closed = fired | (self.gaps.values(t, x) <= self.limits)
+            rates = self.gaps.rates(t, x)
+            if closed.any():
+                if not self.times:  # before an impact at the start
+                    self._store(np.array([t]), x[:, None])
+                after = self._strike(t, x, closed)
+                if after is not None:
+                    x, rates = after, self.gaps.rates(t, after)
+            ended = "rest" if self._rests(t, x, closed, rates) else ""
+            ended = ended or ("impacts" if len(self.impacts) >= self.most else "end" if t >= self.end else "")
+            if ended:
+                self._store(np.array([t]), x[:, None])
+                return ended
+            began = t
+            t, x, fired = self._go_on(t, x, rates)
+            if not fired.any():
+                return "event" if t < self.end else "end"
+            idle = idle + 1 if t - began <= 1e-14 * max(abs(t), 1.0) else 0
+            if idle > IDLE:
+                names = ", ".join(name for name, one in zip(self.gaps.names, fired, strict=True) if one)
+                raise SimulationError(f"the gap {names} closes again and again at t = {t:.6g} s without an impact")
+
+    def _store(self, t: Array, x: Array) -> None:
+        if self.times and self.impacts and self.impacts[-1][0] == t[0] and self._struck:
+            self.breaks.append(sum(map(len, self.times)))
+        elif self.times:  # goes on where it was
+            t, x = t[1:], x[:, 1:]
+        self._struck = False
+        self.times.append(t)
+        self.states.append(x)
+
+    def _strike(self, t: float, x: Array, closed: NDArray[np.bool_]) -> Array | None:
+        """The state after an impact of closed gaps, if one closes."""
+        chosen = {name: e for (name, e), one in zip(self.restitutions.items(), closed, strict=True) if one}
+        impact = strike_run(self.gaps, t, x, chosen)
+        if not (impact.impulses > 0.0).any():
+            return None
+        self.impacts.append((t, impact))
+        self.fastest = max(self.fastest, float(np.abs(impact.rates_before).max()))
+        self._struck = True
+        return impact.x
+
+    def _rests(self, t: float, x: Array, closed: NDArray[np.bool_], rates: Array) -> bool:
+        """Whether a closed gap no longer opens and is pressed together, so that it would not stay 0 by itself."""
+        slow = closed & (rates <= max(REST * self.fastest, 1e-12 * self._speed(x)))
+        if not slow.any() or t >= self.end:
+            return False
+        x_rate = self.module.rhs(t, x, u=self.gaps.inputs(t, x))
+        ahead, behind = (self.gaps.rates(t + h, x + h * x_rate) for h in (MOMENT, -MOMENT))
+        pressed = (ahead - behind) / (2.0 * MOMENT)
+        return bool((slow & (0.5 * pressed * (self.end - t) ** 2 < -self.limits)).any())
+
+    def _speed(self, x: Array) -> float:
+        layout = self.module.layout
+        return float(np.abs(x[layout.n_q :] / layout.scales.q).max(initial=0.0)) * max(1.0, layout.length)
+
+    def _go_on(self, t: float, x: Array, rates: Array) -> tuple[float, Array, NDArray[np.bool_]]:
+        """Integrate to the next closing gap: the time and state there, and which gaps close."""
+        n = len(self.limits)
+        watch = Watch(self.gaps, t, x, rates, self.limits)
+        piece = self.module.simulate(
+            (t, self.end), x, None, self.inputs, events=watch.events(), dense_output=True, **self.options
+        )
+        fired = np.array([len(times) > 0 for times in [*piece.t_events][-n:]])
+        times, states = piece.t, piece.x
+        missed = first_missed(watch, piece)
+        if missed is not None:
+            at, fired = missed
+            kept = times < at
+            times, states = np.append(times[kept], at), np.hstack([states[:, kept], piece.at(at).x])
+        self._store(times, states)
+        self.samples.append((float(times[-1]), piece))
+        return float(times[-1]), np.array(states[:, -1]), fired
+
+    def finish(self, ended: str) -> ImpactRun:
+        """All of it as one trajectory."""
+        t, x = np.concatenate(self.times), np.concatenate(self.states, axis=1)
+        self._check(t, x)
+        columns = Columns(self.module, t, x, self.forcing.sample(t, x))
+        pieces = [piece for _, piece in self.samples]
+        off = np.max([[*piece.residuals] for piece in pieces] or [[*Residuals()]], axis=0)
+        header: dict[str, Any] = {
+            **describe(self.module),
+            **({key: pieces[-1].metadata[key] for key in ("method", "rtol", "atol")} if pieces else {}),
+            "span": [float(t[0]), float(t[-1])],
+            "status": 0 if ended == "end" else 1,
+            **{key: sum(getattr(piece, key) for piece in pieces) for key in ("nfev", "njev", "nlu")},
+            "residuals": dict(zip(Residuals._fields, off.tolist(), strict=True)),
+            "event_names": list(self.gaps.names),
+            "units": units_of(self.module, columns.names),
+        }
+        hits: dict[str, list[tuple[float, Array]]] = {name: [] for name in self.gaps.names}
+        for time, impact in self.impacts:
+            for name, impulse in zip(impact.names, impact.impulses, strict=True):
+                if impulse > 0.0:
+                    hits[name].append((time, impact.before))
+        t_events = [np.array([time for time, _ in of]) for of in hits.values()]
+        x_events = [np.array([before for _, before in of]).reshape(-1, len(x)).T for of in hits.values()]
+        ends = np.array([end for end, _ in self.samples])
+        only = x[:, :1]
+
+        def sample(times: Array) -> Trajectory:
+            which = np.searchsorted(ends, times)
+            states = np.repeat(only, len(times), axis=1)
+            for k in np.unique(which[which < len(pieces)]):
+                states[:, which == k] = pieces[k].at(times[which == k]).x
+            return Trajectory(
+                times, states, Columns(self.module, times, states, self.forcing.sample(times, states)), header
+            )
+
+        run = ImpactRun(t, x, columns, header, t_events, x_events, sample, self.impacts, self.breaks, ended)
+        run.message = run.count
+        return run
+
+    def _check(self, t: Array, x: Array) -> None:
+        """Refuse to hand out states beyond a wall."""
+        values = self.gaps.values(t, x)
+        beyond = values < -allowance(self.module.layout, self.gaps.names, BEYOND)[:, None]
+        if beyond.any():
+            k = int(np.flatnonzero(beyond.any(axis=0))[0])
+            i = int(np.flatnonzero(beyond[:, k])[0])
+            raise SimulationError(
+                f"the gap {self.gaps.names[i]} is {values[i, k]:.6g} at t = {t[k]:.6g} s without an impact before: "
+                "it jumps there, or closes and opens within less than a step; give max_step"
+            )

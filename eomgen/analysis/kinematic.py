@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 ALIGNED = 1e-12  #: relative difference of two directions that count as one
+LONGEST = 4000.0 * np.pi  #: radians or length scales walked at most, 2000 turns
 MOVES = 1e-12  #: scaled change below which a coordinate stands still
 
 
@@ -83,7 +84,10 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
 
 
 def _column(name: str, value: Any) -> Array:
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
     return array
@@ -120,6 +124,7 @@ def analyse(
         np.concatenate([asked.y1, still]),
         np.concatenate([asked.y2, still]),
     )
+    _refuse_long_ways(follower, names, np.column_stack([start_y, asked.y]))
     q = walk_in(follower, q, (start_t, start_y), (t0, asked.y[:, 0]))
     return walk_range(follower, asked, q, partial, led)
 
@@ -166,8 +171,7 @@ def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[
     layout = module.layout
     initial: Initial = Initial(module.kernels, t)
     if len(names) > layout.n_dof:
-        what = "none is left to lead, the drivers move all; give t" if not layout.n_dof else f"at most {layout.n_dof}"
-        raise UsageError(f"{', '.join(names)} cannot all be led: {layout.n_dof} degrees of freedom, {what}")
+        raise UsageError(f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be led: {_freedom(module, q, t)}")
     free = [layout.freedoms[i] for i in layout.independent if layout.freedoms[i] in layout.q]
     others = [name for name in [*free, *layout.q] if name not in names]
     values = dict.fromkeys(list(dict.fromkeys(others)), 0.0)
@@ -184,7 +188,10 @@ def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[
     held = list(initial.compatible(q, names, values))[: layout.n_dof - len(names)]
     if len(names) + len(held) < layout.n_dof:
         module.layout.require_minimal_form()
-        raise UsageError(f"{layout.n_dof} degrees of freedom, and too few coordinates to lead them at this position")
+        plural = "s" * (layout.n_dof != 1)
+        raise UsageError(
+            f"{layout.n_dof} degree{plural} of freedom, and too few coordinates to lead them at this position"
+        )
     result = (*names, *held)
     Q = Follower(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
     if Q < NEAR:
@@ -193,6 +200,31 @@ def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[
             f"the initial position is singular ({place}): branches meet there; give an initial position beside it", t, q
         )
     return result
+
+
+def _refuse_long_ways(follower: Follower, names: Sequence[str], y: Array) -> None:
+    """Ways of more than LONGEST are not walked: they take hours, and positions repeat."""
+    ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / follower.led_scales
+    k = int(ways.argmax()) if ways.size else 0
+    if ways.size and ways[k] > LONGEST:
+        raise UsageError(
+            f"the range of {names[k]}, walked from the initial position on, is {ways[k]:.6g} rad or length scales long "
+            f"({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are walked; the positions of a turn "
+            "repeat, so give angles within a turn, or an initial position near the first point"
+        )
+
+
+def _freedom(module: Module, q: Array, t: float) -> str:
+    """Why no more coordinates can be led."""
+    n = module.n_dof
+    if n:
+        return f"{n} degree{'s' * (n > 1)} of freedom, at most {n}"
+    gaps = [module.constraints(q, t=t + step, rows="all") for step in (0.0, 0.0137, 0.377, 1.0)]
+    if any((gap != gaps[0]).any() for gap in gaps):
+        return "0 degrees of freedom, none is left to lead, the drivers move all; give t"
+    return (
+        "0 degrees of freedom: the mechanism is locked, and nothing drives it; take a constraint away, or free a joint"
+    )
 
 
 def walk_in(follower: Follower, q: Array, start: tuple[float, Array], first: tuple[float, Array]) -> Array:
@@ -231,7 +263,7 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
         length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
         path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
-        along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0)
+        along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0, initial=0.0)
         track = Track(follower, path, q, length)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([track.holds(s) for s in along])

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.analyses import require_velocities
+from ..runtime.layout import number
+from .linear_given import find_given_tangent, refuse_inputs
 from .linearisation import Linearisation
+from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:
@@ -31,23 +33,38 @@ def linearise(
     independent: Sequence[str] | None = None,
 ) -> Linearisation:
     """See :meth:`~..runtime.analyses.Analyses.linearise`."""
-    require_velocities(module.layout)
+    if module.layout.given_rates:
+        refuse_inputs(module.layout)
     if form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
-    layout, time = module.layout, float(t)
+    layout, time = module.layout, number("t", t)
     state = module.x0(t=time) if x is None else np.array(x, dtype=float)
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     state = module.project(state, t=time)
-    rates, J, U = module.rhs(time, state), module.jacobian(time, state), module.input_jacobian(time, state)
+    rates, J = module.rhs(time, state), module.jacobian(time, state)
+    U = module.input_jacobian(time, state) if layout.n_u else np.zeros((layout.n_x, 0))
     if form == "full":
         if independent is not None:
             raise UsageError("independent= chooses the states of the minimal form; the full form has all of x")
+        if layout.given_rates:
+            raise UsageError(
+                "where rates of coordinates are given, A of the full form is jacobian(t, x), and no more is derived"
+            )
         P = projected_directions(module, time, state, J)
         A, B, drift, states = J, U, rates, layout.x
         C, D = _outputs(module, time, state, rates, P, J, U)
         return Linearisation(layout, time, state, module.u, (A, B, C, D), states, drift)
+    if layout.given_rates:
+        tangent = find_given_tangent(module, time, state, independent)
+        moved = J @ tangent.T
+        chosen = np.concatenate([tangent.positions, layout.n_q + tangent.velocities])
+        C, D = _outputs(module, time, state, rates, tangent.T, moved, U)
+        names = tuple(layout.x[k] for k in chosen)
+        return Linearisation(
+            layout, time, state, module.u, (moved[chosen], U[chosen], C, D), names, rates[chosen], None, tangent
+        )
     tangent = find_tangent(module, time, state, J, independent)
     n_q, n_z = layout.n_q, len(tangent.positions)
     moved = J @ tangent.T
@@ -63,8 +80,9 @@ def linearise(
     states = (*(names[k] for k in tangent.positions), *(layout.v[k] for k in tangent.velocities))
     mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
+    own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
     return Linearisation(
-        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent
+        layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.names import unknown
+from .rounding import judge
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
@@ -17,31 +18,7 @@ if TYPE_CHECKING:
     from .tangent import Tangent
 
 STILL = 1e-7  #: scaled rates below which a state counts as an equilibrium
-MARGIN = 1e-6  #: real parts below this part of the largest eigenvalue (at least 1/s) count as zero
-LOOSEST = 1e-4  #: the same for eigenvalues that rounding moves far
 COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
-
-
-def judge(A: Array) -> str:
-    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
-
-    Eigenvalues that rounding can move far, such as repeated zeros, count as zero within ten times that distance (their
-    condition numbers: G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., section 7.2.2).
-    """
-    if not A.size:
-        return "asymptotically stable"
-    values, vectors = np.linalg.eig(A)
-    size = max(1.0, float(np.abs(values).max()))
-    with np.errstate(over="ignore", invalid="ignore"):
-        try:
-            condition = np.linalg.norm(np.linalg.inv(vectors), axis=1)
-        except np.linalg.LinAlgError:
-            condition = np.full(len(A), np.inf)
-        rounding = 10.0 * np.finfo(float).eps * float(np.linalg.norm(A, 2)) * condition
-    margin = np.minimum(np.maximum(MARGIN * size, rounding), LOOSEST * size)
-    if (values.real > margin).any():
-        return "unstable"
-    return "marginal" if (values.real >= -margin).any() else "asymptotically stable"
 
 
 class Linearisation:
@@ -82,7 +59,9 @@ class Linearisation:
         drift: Array,
         second: tuple[Array, Array, Array] | None = None,
         tangent: Tangent | None = None,
+        own: Array | None = None,
     ) -> None:
+        self.own = own  # accelerations of the model's own forces, scaled (1/s^2)
         self.layout, self.name, self.t, self.x, self.u = layout, layout.name, t, x, u
         self.A, self.B, self.C, self.D = matrices
         self.states, self.inputs, self.outputs, self.drift = states, layout.u, layout.y, drift
@@ -113,13 +92,26 @@ class Linearisation:
 
     @property
     def is_equilibrium(self) -> bool:
-        """Whether nothing moves, up to 1e-7 in units of the length scale, radians and seconds."""
-        return bool((np.abs(self._scaled_drift) <= STILL).all())
+        """Whether nothing moves, up to 1e-7 in units of the length scale, radians and seconds.
+
+        Where the model's own forces are weaker than that, accelerations are compared with those that they would make.
+        """
+        n = len(self.position_names)
+        return self.is_steady and bool((np.abs(self._scaled_drift[:n]) <= STILL).all())
 
     @property
     def is_steady(self) -> bool:
         """Whether no velocity changes, up to 1e-7."""
-        return bool((np.abs(self._scaled_drift[len(self.position_names) :]) <= STILL).all())
+        return bool((np.abs(self._scaled_drift[len(self.position_names) :]) <= STILL * self._forces).all())
+
+    @property
+    def _forces(self) -> float:
+        """Accelerations that count, at most 1: those of the model's own forces, or their change over a unit."""
+        if self.own is None or self.tangent is None:
+            return 1.0
+        n, s = len(self.position_names), self.layout.scales.q
+        slopes = np.abs(self.A[n:, :n]) * s[self.tangent.positions] / s[self.tangent.velocities, None]
+        return min(1.0, max(float(self.own.max(initial=0.0)), float(slopes.max(initial=0.0))))
 
     @property
     def _scaled_drift(self) -> Array:
@@ -128,16 +120,17 @@ class Linearisation:
         if tangent is None:
             plain = np.array([layout.length if kind == "length" else 1.0 for kind in layout.coordinate_kinds])
             return np.asarray(self.drift / np.concatenate([plain, s]))
-        return np.asarray(self.drift / np.concatenate([s[tangent.positions], s[tangent.velocities]]))
+        places = layout.place_scales.q[tangent.positions]
+        return np.asarray(self.drift / np.concatenate([places, s[tangent.velocities]]))
 
     @property
     def stability(self) -> str:
         """By the largest real part of the eigenvalues: 'asymptotically stable', 'marginal' or 'unstable'.
 
-        'marginal' where it vanishes within 1e-6 of the largest eigenvalue, or of what rounding can do to repeated ones:
-        the linear equations do not decide.
+        'marginal' where rounding alone could move one of them to the imaginary axis, and none is beyond it: the linear
+        equations do not decide.
         """
-        return judge(self.A)
+        return judge(self.A, self.own)
 
     def second_order(self, *names: str) -> tuple[Array, Array, Array]:
         """M, C, K of ``M z'' + C z' + K z = 0``, square.
@@ -158,6 +151,8 @@ class Linearisation:
             integrals of the velocities (nonholonomic constraints).
         """
         if self.mass is None or self.damping is None or self.stiffness is None:
+            if self.layout.given_rates:
+                raise UsageError("rates of coordinates that are functions of other velocities have no such form; use A")
             raise UsageError("the full form has no second-order form; linearise with form='minimal'")
         chosen = names or self.position_names
         rows = []

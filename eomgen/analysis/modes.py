@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .linearisation import Linearisation
+from .rounding import ROUNDING, graded_modes
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-RIGID = 1e-9  #: squares of frequencies below this part of the largest (at least 1/s^2) are rigid-body modes
 SYMMETRIC = 1e-9  #: relative difference up to which K counts as symmetric
 
 
@@ -62,12 +62,24 @@ class Modes:
         self.linear, self.name = linear, linear.name
         self.names, self.v_names = linear.velocity_names, linear.layout.v
         self.squares, self.shapes = _undamped(linear.mass, stiffness(linear))
-        size = RIGID * max(1.0, float(np.abs(self.squares).max(initial=0.0)))
-        still = np.abs(self.squares) <= size
-        self.rigid, self.diverging = int(still.sum()), int((self.squares < -size).sum())
+        still = np.abs(self.squares) <= self._uncertainty()
+        self._still = still
+        self.rigid, self.diverging = int(still.sum()), int((self.squares[~still] < 0.0).sum())
         self.frequencies = np.sqrt(np.where(still, 0.0, np.maximum(self.squares, 0.0)))
         self.hertz = self.frequencies / (2.0 * np.pi)
         self.motions = linear.tangent.B @ self.shapes
+
+    def _uncertainty(self) -> Array:
+        """What rounding can do to each square: to the slopes of forces, to the forces behind them, to the shapes."""
+        linear, eps = self.linear, float(np.finfo(float).eps)
+        assert linear.mass is not None
+        n_z = len(linear.position_names)
+        size = np.abs(linear.mass) @ np.abs(linear.A[n_z:, :n_z]) @ np.abs(linear.A[:n_z, n_z:])
+        if linear.own is not None:
+            size = size + np.diag(linear.mass.diagonal() * linear.own)
+        shapes = np.abs(self.shapes) + eps * np.abs(self.shapes).sum(axis=1, keepdims=True)
+        bound = 5.0 * ROUNDING * np.einsum("ik,ij,jk->k", shapes, size, shapes)
+        return np.asarray(np.maximum(bound, ROUNDING * eps * np.abs(self.squares).max(initial=0.0)))
 
     @cached_property
     def damped(self) -> list[Damped]:
@@ -93,9 +105,7 @@ class Modes:
                                                                                          strict=True))  # fmt: skip
             what = f"{self.frequencies[k]:.6g} rad/s, {self.hertz[k]:.6g} Hz"
             if self.frequencies[k] == 0.0:
-                what = "rigid body" if abs(square) <= RIGID * max(1.0, np.abs(self.squares).max()) else (
-                    f"diverges, {np.sqrt(-square):.6g} 1/s"
-                )  # fmt: skip
+                what = "rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s"
             lines.append((f"mode {k + 1}", f"{what}: {shape}"))
         for mode in self.damped:
             lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {mode.ratio:.4g}"))
@@ -123,7 +133,9 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     inverse = np.linalg.inv(factor)
     reduced = inverse @ K @ inverse.T
     if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):
-        squares, vectors = np.linalg.eigh(0.5 * (reduced + reduced.T))
+        vectors = np.linalg.eigh(0.5 * (reduced + reduced.T))[1]
+        squares, vectors = graded_modes(M, K, inverse.T @ vectors)
+        vectors = factor.T @ vectors
     else:
         values, complexes = np.linalg.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):

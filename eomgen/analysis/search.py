@@ -12,6 +12,7 @@ from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import assembly_jacobian, force_slopes, slopes, weigh
+from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
@@ -156,11 +157,12 @@ class Search:
 
     def _newton(self, point: _Point) -> tuple[_Point, int, bool]:
         """The last iterate, the number of steps, and whether it is balanced."""
-        first = max(1.0, float(np.abs(point.residual).max(initial=0.0)))
-        damping = 0.0
+        residual, damping = float(np.abs(point.residual).max(initial=0.0)), 0.0
+        own = self._own(point)
         for step in range(STEPS):
             size = float(np.linalg.norm(point.residual))
             J, moved, changed = self.jacobian(point)
+            first = max(residual, min(1.0, max(own, float(np.abs(J).max(initial=0.0)))))
             newton = np.linalg.lstsq(J, -point.residual, rcond=1e-12)[0] if J.size else np.zeros(J.shape[1])
             left = float(np.linalg.norm(point.residual + J @ newton))
             arrived = float(np.abs(newton).max(initial=0.0)) <= SMALL and left <= 1e-6 * first
@@ -182,6 +184,14 @@ class Search:
                 return point, step, False
             point, damping = there, 0.0 if damping <= 1e-5 else 0.1 * damping
         return point, STEPS, False
+
+    def _own(self, point: _Point) -> float:
+        """Size of the accelerations that the model's forces make without each other, or of their share, scaled."""
+        if self.supported:
+            return 1.0
+        here = weigh(point.module, self.t, point.q)
+        mass = self._mass(point, here.B)
+        return float(own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass).max(initial=0.0))
 
     def _descend(self, point: _Point) -> tuple[_Point, int]:
         """Along the accelerations at rest in steps of equal length, shorter at each turn, until they no longer lead on.

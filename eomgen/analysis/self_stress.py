@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from ..numeric.rank_limits import BALANCE as RANK
 from ..numeric.scales import Array
 from .constrained import States
-from .reactions import GROUND, RANK, SEEN, Geometry, along_free, free_of, shift, transmitted
+from .reactions import GROUND, SEEN, Geometry, along_free, free_of, shift, transmitted
 
 
 def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:

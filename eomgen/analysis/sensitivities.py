@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.analyses import require_velocities
+from ..runtime.analyses import require_projection, require_velocities
 from ..runtime.integrate import choose_solver, integrate
 from ..runtime.names import unknown
+from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
 from ..runtime.simulate import DEFAULTS, find_span, ordered_times
@@ -134,9 +135,10 @@ def differentiate_run(
 ) -> Sensitivities:
     """See :meth:`~..runtime.analyses.Analyses.sensitivities`."""
     require_velocities(module.layout)
+    require_projection(module.layout)
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
+    forcing.attach(bound)
     layout = bound.layout
     declared: Any = bound.metadata.get("simulation", {}).get("end") or DEFAULTS["end"]
     start, stop = find_span(span, float(declared))
@@ -159,15 +161,22 @@ def differentiate_run(
     z0 = np.concatenate([x0, (S0 * weights).ravel()])
     settings = {"rtol": rtol, "atol": atol, **options}
     nodes = [start, *forcing.corners(start, stop), stop]
-    with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-        solution = integrate(run, nodes, z0, solver, times, [], False, settings)
+    fail, title = bound.kernels.fail, solver.__name__
+    longest = float(options.get("max_step", np.inf))
+    pace = Pace(start, stop, z0, layout.n_q, longest, lambda t, z: fail.trouble(z[: layout.n_x], t) is not None)
+    try:
+        with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+            solution = integrate(run, nodes, z0, solver, times, [], False, settings, pace)
+    except Crawling as crawl:
+        trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())
+        raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
     if solution.status < 0 or not np.isfinite(solution.x).all():
         failure = run.rhs.failure or run.tangent.failure
         cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)
-        raise SimulationError(f"{solver.__name__} stopped: {solution.message} {cause or ''}".strip()) from cause
+        raise SimulationError(f"{title} stopped: {solution.message} {cause or ''}".strip()) from cause
     n, k = layout.n_x, len(columns.names)
     raw = solution.x[n:].reshape(n, k, -1) / weights[:, None]
-    trajectory = record(bound, forcing, solution._replace(x=solution.x[:n]), solver.__name__, settings)
+    trajectory = record(bound, forcing, solution._replace(x=solution.x[:n]), title, settings)
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
         x, here = trajectory.x[:, j], bound.bind(u=forcing(float(time), trajectory.x[:, j]))

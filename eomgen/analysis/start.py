@@ -61,9 +61,9 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
         elif name in held:
             initial.append((column, name))
         elif name in (*layout.x, *layout.loops, *layout.loop_rates):
+            which = f"{', '.join(held)} {'are' if len(held) > 1 else 'is'}" if held else "nothing is"
             raise UsageError(
-                f"{name} is not held at the start ({', '.join(held)} are), so nothing depends on it alone; name it in "
-                "hold="
+                f"{name} is not held at the start ({which}), so nothing depends on it alone; name it in hold="
             )
         else:
             raise unknown("parameter, input or initial value", name, (*layout.p, *layout.u, *held))

@@ -15,6 +15,7 @@ from .failures import USAGE
 #: verb -> what it does; the file of the same name in this folder holds the command of the same name.
 VERBS = {
     "run": "Derive, compile and simulate a model.",
+    "ensemble": "Run a model many times, with values from a table or drawn at random.",
     "kinematics": "Analyse the motion over a range of time or coordinates, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",

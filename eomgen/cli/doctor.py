@@ -24,6 +24,7 @@ EXTRAS = {
     "robots": ("robots in MJCF files", ("mujoco",)),
     "mesh": ("mass and inertia from a mesh", ("trimesh",)),
     "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
+    "cluster": ("ensembles on many machines", ("distributed",)),
     "plot": ("plots", ("matplotlib",)),
     "results": ("tables of results", ("pandas",)),
     "compiler": ("a C compiler from pip", ("ziglang",)),
@@ -107,7 +108,7 @@ def _compiles() -> Finding:
     from math import sin
     from time import perf_counter
 
-    from ..describe import load
+    from ..loading import load
 
     start = perf_counter()
     try:

@@ -12,6 +12,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute
+from ..graph.traverse import reachable
 
 if TYPE_CHECKING:
     from ..derivation import Equations
@@ -73,6 +74,8 @@ def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, f
     power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in inputs.items()})[0]
     if power.is_zero:
         return np.zeros(len(trajectory.t))
+    if _without_twin(power):
+        return None
     nodes, weights = np.polynomial.legendre.leggauss(POINTS)
     start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
     times = (start + step * (nodes + 1.0) / 2.0).ravel()
@@ -80,6 +83,17 @@ def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, f
     values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True))}
     watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
     return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
+
+
+def uncounted_functions(equations: Equations) -> list[str]:
+    """Functions that the power depends on and that NumPy cannot evaluate: the work of such a run is not known."""
+    return _without_twin(_power(equations.kinematics))
+
+
+def _without_twin(power: Expr) -> list[str]:
+    graph = power.graph
+    called = {graph.nodes[i][0] for i in reachable(graph, [power.id])} & graph.calls.keys()
+    return sorted({function.name for function, _ in (graph.calls[key] for key in called) if function.evaluator is None})
 
 
 def _power(kinematics: Kinematics) -> Expr:

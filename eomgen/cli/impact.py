@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
 from .options import parse_settings
 from .screen import print_heading, print_json, print_rows
@@ -14,10 +15,16 @@ from .screen import print_heading, print_json, print_rows
 @time_option
 @click.option("--gap", multiple=True, metavar="NAME=E", help="Coordinate or output that closes, with its restitution.")
 @click.option("--stop", multiple=True, metavar="NAME", help="Coordinate that is locked; repeat it for more.")
-def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...], as_json: bool) -> None:
+@click.option("--closed", is_flag=True, help="Take the gaps as closed whatever their values.")
+def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...], closed: bool, as_json: bool) -> None:
     """An impact without friction at the initial state, by Newton's law of restitution."""
+    from ..analysis.impact_gaps import check_gaps
+
+    if not gap and not stop:
+        raise UsageError("give --gap NAME=RESTITUTION for what closes, or --stop NAME for a coordinate that is locked")
     module = work.module
-    found = module.impact(t, module.x0(work.initial or None, t=t), parse_settings(gap), lock=stop)
+    gaps, locked = check_gaps(module.layout, parse_settings(gap, "--gap", "s=0.5"), stop, ("--gap", "--stop"))
+    found = module.impact(t, module.x0(work.initial or None, t=t), gaps, lock=locked, closed=closed)
     after = dict(zip(module.x_names, found.x.tolist(), strict=True))
     if as_json:
         print_json(

@@ -25,6 +25,7 @@ from .options import (
 )
 from .run import TABLES, complete_parameters, final_names, sort_settings
 from .screen import finite, print_heading, print_json, print_rows, print_table, stage
+from .workspace import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
     from ..analysis.motions import KinematicAnalysis
@@ -47,6 +48,14 @@ SHOWN = 9  #: of them on the screen
     help="Values of a coordinate, or of t for drivers, e.g. theta=0:2*pi:361; all ranges have one count.",
 )
 @click.option("--limits", multiple=True, metavar="NAME", help="Find how far a coordinate can go from the start.")
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="NAME=LOW:HIGH:COUNT",
+    help="Find the workspace of --of over a grid of coordinates, one --over for each (up to three); t for drivers.",
+)
+@click.option("--of", multiple=True, metavar="NAME", help="Outputs or coordinates of the workspace.")
+@click.option("--within-limits", is_flag=True, help="Keep the workspace within the limits of the joints.")
 @click.option("--partial", is_flag=True, help="Give the part of the range that can be reached.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
@@ -60,6 +69,9 @@ def kinematics(
     target: str,
     ranges: tuple[str, ...],
     limits: tuple[str, ...],
+    over: tuple[str, ...],
+    of: tuple[str, ...],
+    within_limits: bool,
     partial: bool,
     settings: tuple[str, ...],
     out: Path | None,
@@ -68,10 +80,12 @@ def kinematics(
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
 
-    Without --range, drivers move the model from t = 0 to the end given in its file.
+    Without --range, drivers move the model from t = 0 to the end given in its file.  With --over and --of, find what
+    outputs can reach over a grid of coordinates instead.
     """
     chosen = parse_settings(settings)
     asked = [read_range(words) for words in ranges]
+    grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
     if plot is not None:
@@ -89,12 +103,13 @@ def kinematics(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    named = _values(module, asked) if asked or not limits else {}
+    named = _values(module, asked) if asked or not (limits or grid) else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()
     with stage("kinematics"):
         motion = bound.kinematic_analysis(initial=initial or None, partial=partial, **named) if named else None
         found = [bound.motion_range(name, initial=initial or None) for name in limits]
+        space = bound.workspace(grid, of, initial=initial or None, limits=within_limits) if grid else None
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files: list[str] = []
     if motion is not None and out is not None:
@@ -107,6 +122,8 @@ def kinematics(
 
         plot_motion(motion, find_paths(equations.kinematics.mechanism), plot)
         files.append(str(plot))
+    if space is not None:
+        files += write_workspace(space, out, plot)
     if as_json:
         report: dict[str, Any] = {
             "name": module.name,
@@ -114,9 +131,8 @@ def kinematics(
             "seconds": seconds,
             "files": files,
         }
-        print_json(
-            report | {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
-        )
+        report |= {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
+        print_json(report if space is None else report | {"workspace": workspace_to_dict(space)})
         return
     click.echo(str(equations.report))
     if motion is not None:
@@ -125,6 +141,9 @@ def kinematics(
         print_heading(f"range of {one.name}")
         sides = (("lower", one.lower, one.stops[0], one.gaps[0]), ("upper", one.upper, one.stops[1], one.gaps[1]))
         print_rows([(s, f"{x:.9g}" + (f"   {stop}; {gap}" if stop else "")) for s, x, stop, gap in sides])
+    if space is not None:
+        print_heading(space.title)
+        print_rows(space.facts)
     for file in files:
         click.echo(f"wrote {file}")
 
@@ -142,7 +161,7 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
         raise UsageError(f"--range {words}: write NAME=START:END[:COUNT], for example theta=0:2*pi:361")
     try:
         numbers = parse_settings(tuple(f"{label}={part}" for label, part in zip(("START", "END"), parts, strict=False)))
-        count = int(parts[2]) if len(parts) == 3 else None
+        count = _count(parts[2]) if len(parts) == 3 else None
     except ValueError as error:  # a UsageError too
         raise UsageError(f"--range {words}: {error}") from None
     if count is not None and not 1 <= count <= 10_000_000:
@@ -150,11 +169,18 @@ def read_range(words: str) -> tuple[str, float, float, int | None]:
     return name.strip(), numbers["START"], numbers["END"], count
 
 
+def _count(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise UsageError(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
+
+
 def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
     if not asked:
         if module.n_dof:
             free = ", ".join(module.layout.freedoms[i] for i in module.layout.independent)
-            raise UsageError(f"give --range: {module.n_dof} degrees of freedom are left, for example of {free}")
+            raise UsageError(f"give --range: {_left(module.n_dof)}, for example of {free}")
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]
     if len(set(names)) < len(names):
@@ -168,6 +194,10 @@ def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -
         span = values["t"][-1] - values["t"][0]
         values |= {f"{name}_dot": (end - start) / span for name, start, end, _ in asked if name != "t" and span}
     return values
+
+
+def _left(n: int) -> str:
+    return "1 degree of freedom is left" if n == 1 else f"{n} degrees of freedom are left"
 
 
 def to_dict(motion: KinematicAnalysis) -> dict[str, Any]:
@@ -219,4 +249,6 @@ def print_motion(motion: KinematicAnalysis) -> None:
     names = [n for n in final_names(motion) if not n.endswith("_dot")][:8]
     header = [n + (f" ({motion.units[n]})" if n in motion.units else "") for n in ("t", *names)]
     picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
+    if len(picked) < len(motion):
+        print_rows([("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all")])
     print_table(header, [[f"{motion[n][k]:.6g}" for n in ("t", *names)] for k in picked], right=range(len(header)))

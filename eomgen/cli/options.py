@@ -128,15 +128,24 @@ def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
         raise
 
 
+_MIMIC, _ROTATIONS = ("independent", "coupling"), ("euler_angles", "euler_parameters")
 _ROBOT = (
     click.option("--floating", is_flag=True, help="Robots (URDF): the base moves freely."),
     click.option("--lock", multiple=True, metavar="JOINT[=VALUE]", help="Robots: hold a joint; repeat it for more."),
-    click.option("--mimic", metavar="HOW", help="Robots: joints that mimic others are independent, or a coupling."),
-    click.option("--rotation", metavar="HOW", help="Robots: free and ball joints in euler_angles or euler_parameters."),
+    click.option(
+        "--mimic",
+        type=click.Choice(["independent", "coupling"]),
+        help="Robots: joints that mimic others are independent, or a coupling.",
+    ),
+    click.option(
+        "--rotation",
+        type=click.Choice(["euler_angles", "euler_parameters"]),
+        help="Robots: free and ball joints in euler_angles or euler_parameters.",
+    ),
     click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
     click.option(
         "--friction",
-        type=float,
+        type=click.FloatRange(min=0, min_open=True),
         metavar="VELOCITY",
         help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
     ),
@@ -164,7 +173,7 @@ def _locked(words: tuple[str, ...]) -> dict[str, float]:
     result: dict[str, float] = {}
     for word in words:
         name, equals, _ = word.rpartition("=")
-        result |= dict([_parse_setting(word)]) if equals and name else {word: 0.0}
+        result |= dict([_parse_setting(word, "--lock")]) if equals and name else {word: 0.0}
     return result
 
 
@@ -186,7 +195,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     """
     if not path.is_file():
         raise UsageError(_missing(path))
-    from ..describe import load
+    from ..loading import load
 
     options = dict(robot or {})
     if "lock" in options:
@@ -233,20 +242,26 @@ def require_folder(option: str, file: Path | None) -> None:
         raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
 
 
-def parse_settings(settings: tuple[str, ...]) -> dict[str, float]:
+def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
     """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
+
+    Parameters
+    ----------
+    settings : tuple of str
+    option, example : str, optional
+        Which option has them, for errors, and a word that it takes.
 
     Raises
     ------
     UsageError
     """
-    return dict(_parse_setting(word) for word in settings)
+    return dict(_parse_setting(word, option, example) for word in settings)
 
 
-def _parse_setting(word: str) -> tuple[str, float]:
+def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") -> tuple[str, float]:
     name, equals, text = (part.strip() for part in word.partition("="))
     if not equals or not name or not text:
-        raise UsageError(f"--set {word}: write name=value, for example --set r=0.12")
+        raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
     try:
         return name, float(text)
     except ValueError:
@@ -261,7 +276,7 @@ def _parse_setting(word: str) -> tuple[str, float]:
     try:
         value = parse(text, Graph(), resolve).value
     except ExpressionError as error:
-        raise UsageError(f"--set {word}: {error.message}; {error.remedy}") from None
+        raise UsageError(f"{option} {word}: {error.message}; {error.remedy}") from None
     if value is None:
-        raise UsageError(f"--set {word}: not a number")
+        raise UsageError(f"{option} {word}: not a number")
     return name, value

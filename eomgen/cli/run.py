@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -112,7 +113,7 @@ def run(
             **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
-    from .energy import balance_energy
+    from .energy import balance_energy, uncounted_functions
 
     values = dict(zip(module.u_names, module.u.tolist(), strict=True)) | inputs
     with after_integration():
@@ -124,7 +125,7 @@ def run(
         return
     click.echo(str(equations.report))
     print_operations(equations)
-    print_trajectory(trajectory, energy)
+    print_trajectory(trajectory, energy, uncounted_functions(equations) if energy and energy.work is None else ())
     for file in files:
         click.echo(f"wrote {file}")
 
@@ -198,7 +199,7 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance 
     }
 
 
-def _energy_rows(energy: EnergyBalance | None) -> list[tuple[str, str]]:
+def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list[tuple[str, str]]:
     if energy is None:
         return [("energy", "not known: the equations have no kinetic_energy")]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
@@ -208,11 +209,18 @@ def _energy_rows(energy: EnergyBalance | None) -> list[tuple[str, str]]:
             ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),
         ]
     kept = f"; kept to {energy.drift:.1e} of the largest kinetic energy" if energy.work is not None else ""
-    return [("energy", f"{change}{kept}")]
+    rows = [("energy", f"{change}{kept}")]
+    if uncounted:
+        names = ", ".join(uncounted)
+        rows.append(("power balance", f"not formed: {names} is C code without a Python twin (key python)"))
+    return rows
 
 
-def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None) -> None:
-    """Statistics of a run, its residuals, its energy and its final values."""
+def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncounted: Sequence[str] = ()) -> None:
+    """Statistics of a run, its residuals, its energy and its final values.
+
+    ``uncounted`` are functions whose work is not known.
+    """
     header, residuals = trajectory.metadata, trajectory.residuals
     print_heading(f"simulation from {trajectory.t[0]:g} to {trajectory.t[-1]:g} s")
     if header["rtol"] is None:
@@ -231,7 +239,7 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None) -> No
     if points:
         rows += [("change point" if k == 0 else "", str(point)) for k, point in enumerate(points[:POINTS])]
         rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
-    print_rows(rows + _energy_rows(energy))
+    print_rows(rows + _energy_rows(energy, uncounted))
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
     print_rows(
         [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]

@@ -7,16 +7,17 @@ import re
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from ..layer import LAYER, read_layer
+from ..layer import LAYER, read_header, read_layer
 from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
-from .cython_layer import HEADER, build_layer, describe_interpreter, describe_layer
+from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags
+from .processor import choose_lanes
 
 Progress = Callable[[str], None]
 
@@ -79,13 +80,15 @@ def compile_sources(
     own = read_layer()
     layer = {name: sources.pop(name, own[name]) for name in LAYER}
     _check(sources, name)
-    if HEADER not in sources:
-        raise UsageError(f"the sources of {name!r} lack {HEADER}; there are {', '.join(sources)}")
+    if HEADERS[0] not in sources:
+        raise UsageError(f"the sources of {name!r} lack {HEADERS[0]}; there are {', '.join(sources)}")
+    headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
-    flags = _plan(sources, options, compiler, extension=True)
+    flags = _plan(sources, options, compiler, width, extension=True)
     parts = {
         "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
-        "layer": describe_layer(layer, sources[HEADER], compiler),
+        "layer": describe_layer(layer, headers, compiler),
     }  # fmt: skip
     cache, key = Cache(cache_directory()), compute_key(parts)
     entry = cache.find(key)
@@ -94,7 +97,7 @@ def compile_sources(
     product = f"_core{describe_interpreter()['suffix']}"
 
     def objects() -> list[str]:
-        return list(map(str, build_layer(cache, layer, sources[HEADER], compiler, progress)))
+        return list(map(str, build_layer(cache, layer, headers, compiler, progress)))
 
     entry = _build(cache, key, "extension", name, sources, flags, product, objects, options, compiler, progress)
     return _artifact(entry, start, from_cache=False)
@@ -111,8 +114,9 @@ def compile_c_library(
     options = options or Options()
     sources = {file: text for file, text in sources.items() if file not in LAYER}
     _check(sources, name)
+    sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
-    flags = _plan(sources, options, compiler, extension=False)
+    flags = _plan(sources, options, compiler, width, extension=False)
     parts = {
         "kind": "library", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
         "compiler": [*compiler.command, compiler.version], "platform": describe_interpreter()["platform"],
@@ -138,12 +142,13 @@ def _check(sources: Mapping[str, str], name: str) -> None:
 
 
 def _plan(
-    sources: Mapping[str, str], options: Options, compiler: CompilerInfo, *, extension: bool
+    sources: Mapping[str, str], options: Options, compiler: CompilerInfo, lanes: int, *, extension: bool
 ) -> dict[str, list[str]]:
     """Flags of every C file, and under "" those of the linker."""
     files = [file for file in sources if file.endswith(".c")]
     size = sum(len(sources[file]) for file in files)
     flags = {file: compile_flags(options, compiler, size, hidden=extension) for file in files}
+    flags = {file: [*words, f"-DEOMGEN_LANES={lanes}"] for file, words in flags.items()}
     return {**flags, "": link_flags(options, compiler, extension=extension)}
 
 
@@ -180,7 +185,7 @@ def _build(
         _command([*compiler.command, *compiled, *further, "-o", product, *flags[""]], directory, directory / product)
         for file in compiled:
             (directory / file).unlink()
-        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags)}
+        recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
         return cache.publish(directory, key, kind, name, product, recipe)
 
 

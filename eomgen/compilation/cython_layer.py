@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingDependencyError, ToolchainError
+from ..layer import LAYER
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, raise_failure, run
 from .options import layer_flags, stepper_flags
+from .processor import lane_width
 
 SOURCE = "_core.pyx"
-HEADER = "eomgen.h"
-STEPPERS = "eomgen_steppers.c"
-_OBJECTS = ("_core.o", "eomgen_steppers.o")
+#: Of a model, that the layer reads too.
+HEADERS = ("eomgen.h", "eomgen_real.h")
+C_FILES = tuple(name for name in LAYER if name.endswith(".c"))
+_OBJECTS = ("_core.o", *(f"{name}.o" for name in C_FILES))
 _lock = threading.Lock()  # Cython keeps state of its own
 
 
@@ -34,13 +37,13 @@ def describe_interpreter() -> dict[str, str]:
     }
 
 
-def describe_layer(texts: Mapping[str, str], header: str, compiler: CompilerInfo) -> dict[str, Any]:
+def describe_layer(texts: Mapping[str, str], headers: Mapping[str, str], compiler: CompilerInfo) -> dict[str, Any]:
     """What the layer depends on, apart from the version of Cython.
 
     Models' keys hold this: a module that is built already needs no Cython to be found.
     """
     return {
-        "kind": "layer", "sources": {**texts, HEADER: header}, "flags": layer_flags(compiler),
+        "kind": "layer", "sources": {**texts, **headers}, "flags": [layer_flags(compiler), _c_flags(compiler)],
         "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
     }  # fmt: skip
 
@@ -48,7 +51,7 @@ def describe_layer(texts: Mapping[str, str], header: str, compiler: CompilerInfo
 def build_layer(
     cache: Cache,
     texts: Mapping[str, str],
-    header: str,
+    headers: Mapping[str, str],
     compiler: CompilerInfo,
     progress: Callable[[str], None] | None = None,
 ) -> list[Path]:
@@ -60,8 +63,8 @@ def build_layer(
         Where it is kept.
     texts : mapping of str to str
         The layer's files.
-    header : str
-        Text of eomgen.h.
+    headers : mapping of str to str
+        Texts of ``HEADERS``.
     compiler : CompilerInfo
         Who compiles.
     progress : callable, optional
@@ -81,7 +84,7 @@ def build_layer(
             'target="cython" needs Cython to build its layer once: pip install cython. target="numpy" needs neither '
             "Cython nor a compiler"
         ) from error
-    key = compute_key({**describe_layer(texts, header, compiler), "cython": version})
+    key = compute_key({**describe_layer(texts, headers, compiler), "cython": version})
     if (entry := cache.find(key)) is not None:
         return _objects(entry)
     from concurrent.futures import ThreadPoolExecutor  # slow to import
@@ -90,10 +93,10 @@ def build_layer(
     if progress is not None:
         progress("building the Cython layer (once)")
     with cache.attempt(key) as directory:
-        for name, text in {**texts, HEADER: header}.items():
+        for name, text in {**texts, **headers}.items():
             (directory / name).write_text(text, encoding="utf-8")
         commands = [
-            [*compiler.command, *stepper_flags(compiler), "-I.", "-c", STEPPERS, "-o", _OBJECTS[1]],
+            *([*compiler.command, *_c_flags(compiler), "-I.", "-c", name, "-o", f"{name}.o"] for name in C_FILES),
             [*compiler.command, *layer_flags(compiler), "-I.", *includes, "-c", "_core.c", "-o", _OBJECTS[0]],
         ]
 
@@ -102,14 +105,19 @@ def build_layer(
             if result.returncode != 0:
                 raise_failure(f"compiling the Cython layer {directory / command[-3]}", result, directory)
 
-        with ThreadPoolExecutor(1) as pool:  # the steppers while Cython translates
-            steppers = pool.submit(compile_one, commands[0])
+        with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
+            others = pool.map(compile_one, commands[:-1])
             _run_cython(directory / SOURCE)
-            compile_one(commands[1])
-            steppers.result()
+            compile_one(commands[-1])
+            list(others)
         (directory / "_core.c").unlink()
         recipe = {"commands": commands, "cython": version}
         return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))
+
+
+def _c_flags(compiler: CompilerInfo) -> list[str]:
+    """Flags of the C files, with all lanes that this processor takes: models choose."""
+    return [*stepper_flags(compiler), f"-DEOMGEN_LANES={sum(w for w in (2, 4, 8) if w <= lane_width())}"]
 
 
 def _objects(entry: CacheEntry) -> list[Path]:

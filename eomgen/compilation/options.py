@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from ..errors import UsageError
 from .compiler import CompilerInfo
 
-#: Source files longer than this (bytes) are compiled with -O1. Measured with gcc 12 on generated chains of 7 and 20
-#: bodies, 0.56 and 1.7 MB: 1.2 and 3.1 s at -O1, 1.5 and 6.0 s at -O2; the code ran up to 22 % slower and no slower.
+#: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code
+#: to its harm: Panda, UR5, Talos, ANYmal take 0.97, 0.96, 0.96, 0.91 of the time, linkages with loops 0.97 to 1, and
+#: the compiler 0.6 of its time; -O3 is no faster than -O2 (``python -m benchmarks.run rhs``).
+GCC_LEVEL = 1
+#: Other compilers: -O2, and -O1 for models whose files are longer than this (bytes) together.
 LARGE_SOURCE = 800_000
 
 
@@ -21,15 +24,20 @@ class Options:
     Attributes
     ----------
     optimize : int or None
-        Level 0 to 3; None chooses 2, and 1 for large files. Changes the build.
+        Level 0 to 3; None chooses what was measured to be best: 1 for gcc, else 2, and 1 for large files. Changes the
+        build.
     native : bool
-        Use every instruction of this processor; results may differ in the last digits. Changes the build.
+        Use every instruction of this processor, and contract a*b + c into one of them; results may differ in the last
+        digits. Changes the build.
     warnings : bool
         Treat the compiler's warnings as errors. Changes the build.
     extra : sequence of str
         More flags for compiling and linking. Changes the build.
     compiler : str or None
         Command line of the compiler; None finds one. Changes the build.
+    lanes : {0, 2, 4, 8} or None
+        States that batches take at a time in vector registers; None takes what suits this processor, 0 leaves them
+        out. Results are the same, to the last bit. Changes the build.
     jobs : int or None
         Files compiled at a time; None takes the number of processors. Does not change the build.
     """
@@ -39,11 +47,14 @@ class Options:
     warnings: bool = False
     extra: Sequence[str] = ()
     compiler: str | None = None
+    lanes: int | None = None
     jobs: int | None = None
 
     def __post_init__(self) -> None:
         if self.optimize not in (None, 0, 1, 2, 3):
             raise UsageError(f"optimize must be None, 0, 1, 2 or 3, not {self.optimize!r}")
+        if self.lanes not in (None, 0, 2, 4, 8):
+            raise UsageError(f"lanes must be None, 0, 2, 4 or 8, not {self.lanes!r}")
         if isinstance(self.extra, str):
             raise UsageError(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))
@@ -63,11 +74,12 @@ def compile_flags(options: Options, compiler: CompilerInfo, size: int, *, hidden
     hidden : bool
         Keep the symbols inside the library, so that two models in one process never meet.
     """
-    level = options.optimize if options.optimize is not None else (1 if size > LARGE_SOURCE else 2)
+    best = GCC_LEVEL if compiler.kind == "gcc" else 1 if size > LARGE_SOURCE else 2
+    level = best if options.optimize is None else options.optimize
     flags = ["-std=c99", f"-O{level}", "-fPIC", *machine_flags(options, compiler)]
     if compiler.kind != "other":
-        # errno is never read; contraction would make results depend on the processor.
-        flags += ["-ffp-contract=off", "-fno-math-errno"]
+        # errno is never read; contraction makes results depend on the processor.
+        flags += [f"-ffp-contract={'fast' if options.native else 'off'}", "-fno-math-errno"]
     if hidden:
         flags.append("-fvisibility=hidden")
     if options.warnings:
@@ -91,8 +103,8 @@ def layer_flags(compiler: CompilerInfo) -> list[str]:
 
 
 def stepper_flags(compiler: CompilerInfo) -> list[str]:
-    """Flags that compile the steppers: like a model's own code."""
-    return compile_flags(Options(), compiler, 0, hidden=True)
+    """Flags that compile the steppers: like a model's own code, but loops over states are vectorised."""
+    return compile_flags(Options(optimize=2), compiler, 0, hidden=True)
 
 
 def link_flags(options: Options, compiler: CompilerInfo, *, extension: bool) -> list[str]:

@@ -10,40 +10,36 @@ from .base import Condition, Constraint, View
 
 
 @dataclass(frozen=True)
-class Gear(Constraint):
-    """Two gears that roll on each other's pitch circles: a + ratio b = phase.
+class Pair(Constraint):
+    """Two angles, measured from the part that carries the two axes, in a fixed ratio: a + ratio b = phase."""
 
-    With both angles measured from the part that carries the two axes, ratio = r_b / r_a outside and -r_b / r_a where
-    one gear is internal (Shabana, Computational Dynamics, sec. 3.2; Norton, Design of Machinery, eq. 9.1).
+    written: ClassVar[bool] = True
+    a: Expr
+    b: Expr
+    ratio: Expr
+    phase: Expr
+
+    def conditions(self, view: View) -> list[Condition]:
+        return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
+
+
+class Gear(Pair):
+    """Two gears that roll on each other's pitch circles.
+
+    ratio = r_b / r_a outside and -r_b / r_a where one gear is internal (Shabana, Computational Dynamics, sec. 3.2;
+    Norton, Design of Machinery, eq. 9.1).
     """
 
     type_name: ClassVar[str] = "gear"
-    written: ClassVar[bool] = True
-    a: Expr
-    b: Expr
-    ratio: Expr
-    phase: Expr
-
-    def conditions(self, view: View) -> list[Condition]:
-        return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
 
 
-@dataclass(frozen=True)
-class Belt(Constraint):
+class Belt(Pair):
     """A belt or chain that does not stretch or slip on two pulleys: r_a a = r_b b, with b reversed where it crosses.
 
-    (Norton, Design of Machinery, sec. 9.11.)  The angles are measured from the part that carries both axes.
+    (Norton, Design of Machinery, sec. 9.11.)
     """
 
     type_name: ClassVar[str] = "belt"
-    written: ClassVar[bool] = True
-    a: Expr
-    b: Expr
-    ratio: Expr
-    phase: Expr
-
-    def conditions(self, view: View) -> list[Condition]:
-        return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
 
 
 @dataclass(frozen=True)

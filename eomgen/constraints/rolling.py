@@ -16,6 +16,9 @@ from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from .base import VELOCITY, Condition, Constraint, View
 
+#: What is wrong where the lowest point of a disc is not defined.
+LYING = "the disc lies flat (axle along the plane's normal)"
+
 
 @dataclass(frozen=True)
 class _Rolling(Constraint):
@@ -68,6 +71,10 @@ class RollingDisc(_Rolling):
         axle = vec.transpose(view.rotation(self.wheel))[2]
         along = view.relative(self.plane, self.wheel).rotation[2][2]
         return n, vec.sub(n, vec.scale(along, axle)), sqrt(1.0 - along * along)
+
+    def lies_flat(self, view: View) -> bool:
+        """Whether the axle is along the normal at every position."""
+        return self._lean(view)[2].is_zero
 
     def height(self, view: View) -> Expr:
         _, _, s = self._lean(view)

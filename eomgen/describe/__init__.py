@@ -7,7 +7,7 @@ from .mechanism import Mechanism
 from .model import Model
 from .schema import model_schema
 from .sympy_method import from_sympy
-from .yaml_file import load, load_yaml
+from .yaml_file import load_yaml
 
 __all__ = [
     "FORCE_FIELDS",
@@ -18,7 +18,6 @@ __all__ = [
     "Mechanism",
     "Model",
     "from_sympy",
-    "load",
     "load_yaml",
     "model_schema",
 ]

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..errors import ModelError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from ..graph.operations import FOLD
+from ..graph.substitute import symbols_of
+from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
 from .build_equations import build_equations, check_energies, declare_equations
+from .build_events import build_events
 from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
@@ -19,7 +24,7 @@ from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, Description, Entry, Faults, items
-from .fields import BODY, INPUT, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
 from .joint_data import check_display
@@ -60,6 +65,7 @@ def build(description: Description) -> Mechanism:
         faults.add("name", *fault)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
     build_functions(reader, sections["functions"])
     specs = declare_coordinates(reader, sections["joints"])
     contacts = declare_contacts(reader, sections["constraints"])
@@ -70,6 +76,7 @@ def build(description: Description) -> Mechanism:
         reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
     )
 
+    inputs = tuple(_with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
     forces = build_forces(reader, sections["forces"], specs, bodies, parameters)
@@ -78,6 +85,7 @@ def build(description: Description) -> Mechanism:
     constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
+    events = build_events(reader, sections["events"])
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
@@ -87,7 +95,6 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    numbers = {p.name: p.value for p in parameters if p.value is not None}
     check_bodies(bodies, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
@@ -106,6 +113,7 @@ def build(description: Description) -> Mechanism:
         joints=joints,
         forces=forces,
         outputs=outputs,
+        events=events,
         quantities=dict(reader.quantities),
         initial=initial,
         guess=guess,
@@ -140,6 +148,22 @@ def _input(reader: Reader, entry: Entry) -> Input:
     given = entry.values.get("value")
     value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
     return Input(str(entry.name), value or 0.0, unit, doc)
+
+
+def _with_signal(reader: Reader, given: Input, entry: Entry) -> Input:
+    """The input with its expression over time, read when all coordinates are known."""
+    if entry.values.get("signal") is None:
+        return given
+    path = f"{entry.path}.signal"
+    expression = reader.expression(path, entry.values["signal"], MOTION)
+    for name in sorted(symbols_of([expression])):
+        if reader.names.kinds.get(name) == "input":
+            reader.faults.add(
+                path, f"the input {name!r} cannot stand here", "t, coordinates, velocities, parameters can"
+            )
+    if any(reader.graph.nodes[i][0] not in (*FOLD, *LEAVES) for i in reachable(reader.graph, [expression.id])):
+        reader.faults.add(path, "a function that the model declares cannot stand here", "write the expression out")
+    return replace(given, signal=expression)
 
 
 def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:

@@ -21,6 +21,17 @@ def cam(e: Element) -> CamLift | None:
     if turning.name == follower.name:
         e.faults.add(f"{e.path}.follower", f"{follower.name!r} is the cam's own coordinate", "name another")
         return None
+    for key, found in (("cam", turning), ("follower", follower)):
+        if found.kind not in ("angle", "length"):
+            what = f"the coordinate {found.name!r} is neither an angle nor a length"
+            e.faults.add(f"{e.path}.{key}", what, "name one that is; rotation: euler_angles has angles")
+    if e.values.get("periodic") is True and turning.kind == "length":
+        what = f"the cam slides: {turning.name!r} is a length, and its law repeats no turn"
+        e.faults.add(
+            f"{e.path}.periodic", what, "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)"
+        )
+    if e.faults.under(e.path):
+        return None
     lift = _profile(e, "lift", turning.kind == "angle")
     return CamLift(e.name, e.symbol(turning), e.symbol(follower), lift, e.law("phase"), follower.kind)
 

@@ -144,7 +144,10 @@ def _wheels(e: Element, key: str) -> dict[str, Expr] | None:
             e.faults.add(f"{path}.{wheel}", "unknown key", nearest(str(wheel), WHEELS, "allowed"))
     sizes = {wheel: e.size(f"{path}.{wheel}", value) for wheel, value in given.items() if wheel in WHEELS}
     numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
-    if len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > 1e-9 * numbers["ring"]:
+    if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
+        message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
+        e.faults.add(path, message, "the sun stands inside the ring")
+    elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > 1e-9 * numbers["ring"]:
         message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
         e.faults.add(path, message, "the wheels of a planetary set fit into each other; leave one out")
     return sizes

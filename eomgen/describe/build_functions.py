@@ -8,13 +8,13 @@ import numpy as np
 
 from ..graph.functions import Function
 from ..numeric.functions import Curve, Surface, Twin
+from ..numeric.splines import curve_coefficients, slopes, surface_nodes
 from .build_native import build_native
 from .checks import check_keys
 from .description import Entry, items
 from .fields import FUNCTION, function_fields
 from .names import QUANTITIES, nearest
 from .reading import Reader, is_number
-from .splines import curve_coefficients, slopes, surface_nodes
 
 POINTS = 20_000  #: of a table, those of a grid together
 CLOSED = 1e-12  #: relative difference of the first and the last value of a periodic table that counts as rounding

@@ -187,6 +187,8 @@ def _with_expressions(reader: Reader, declared: Declared) -> Joint:
         found[option] = reader.expression(path, entry.values[option])
         if found[option].is_zero:
             reader.faults.add(path, "is 0", f"{JOINT_OPTIONS[option].doc}; {_NOTHING[option]}")
+        elif option == "length" and (found[option].value or 0.0) < 0.0:
+            reader.faults.add(path, f"is {found[option].value:g}", "give a length greater than 0")
     return replace(joint, **found)
 
 

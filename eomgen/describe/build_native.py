@@ -18,6 +18,7 @@ from ..graph.functions import Function, NativeCode
 from ..numeric.functions import Orders, Twin, up_to
 from .description import Entry, items
 from .names import fault_of_name
+from .native_signature import find_signature
 from .reading import Reader
 
 ARGUMENTS = 16  #: of one function
@@ -50,13 +51,30 @@ def build_native(reader: Reader, entry: Entry) -> Function | None:
     if not arity or names is None or source is None:
         return None
     for _, name in names:
-        if not re.search(rf"\b{name}\b", source[1]):
-            faults.add(f"{path}.source", f"{source[0]} has no function {name!r}", "a C function double f(double, ...)")
+        _check_signature(reader, path, name, arity, source)
     twin, text = _twin(reader, entry, arity, names)
     if faults.under(path):
         return None
     code = NativeCode(source[0], source[1], tuple(names), text)
     return Function(entry.name, arity, twin, code, reader.description.place(path))
+
+
+def _check_signature(reader: Reader, path: str, name: str, arity: int, source: tuple[str, str]) -> None:
+    """Note a C function that is not there, or not one of so many doubles."""
+    file, text = source
+    found = find_signature(text, name)
+    one = "double " + name + "(" + ", ".join(["double"] * arity) + ")"
+    if found is None:
+        if not re.search(rf"\b{name}\b", text):
+            reader.faults.add(
+                f"{path}.source", f"{file} has no function {name!r}", "a C function double f(double, ...)"
+            )
+    elif found.foreign:
+        message = f"{name} in {file}:{found.line} has {found.foreign!r}, which is no double"
+        reader.faults.add(f"{path}.source", message, f"write {one}")
+    elif found.arguments != arity:
+        message = f"{name} in {file}:{found.line} takes {found.arguments} arguments, not the {arity} declared"
+        reader.faults.add(f"{path}.arguments", message, f"give arguments: {found.arguments}, or write {one}")
 
 
 def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:

@@ -16,7 +16,7 @@ from ..errors import Problem
 GROUND_NAME = "ground"
 
 #: Sections made of named entries, in the order of a model file.
-SECTIONS = ("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "outputs")
+SECTIONS = ("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "outputs", "events")
 
 Values = dict[str, Any]
 

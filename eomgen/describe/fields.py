@@ -8,6 +8,7 @@ from __future__ import annotations
 from itertools import product
 
 from ..joints import JOINTS
+from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
 from .field import CONSTANT as CONSTANT
 from .field import MOTION as MOTION
@@ -19,7 +20,6 @@ from .force_fields import FORCE as FORCE
 from .force_fields import ONE_OF as ONE_OF
 from .force_fields import force_fields as force_fields
 from .mechanism import Simulation
-from .splines import KINDS as TABLES
 
 #: kind -> how a message describes it
 KINDS = {
@@ -62,6 +62,8 @@ KINDS = {
     "radii": "two numbers or expressions",
     "matrix": "a list of rows, each a list of numbers or expressions",
     "rates": "a mapping of names to expressions",
+    "times": "true, false or a whole number greater than 0",
+    "sign": "1, -1 or 0",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -78,12 +80,32 @@ PARAMETER: Fields = {
     "unit": _UNIT,
     "doc": _DOC,
 }
-INPUT: Fields = {"value": Field("number", "value while none is given", default=0.0), "unit": _UNIT, "doc": _DOC}
+INPUT: Fields = {
+    "value": Field("number", "value while none is given", default=0.0),
+    "signal": Field(
+        "expression", "value over time of runs that give none; t, coordinates, velocities, parameters", level=MOTION
+    ),
+    "unit": _UNIT,
+    "doc": _DOC,
+}
 OUTPUT_FIELDS: Fields = {
     "expression": Field(
         "expression", "t, parameters, inputs, coordinates, their rates, motion of markers", required=True, level=OUTPUT
     ),
     "unit": _UNIT,
+    "doc": _DOC,
+}
+EVENT: Fields = {
+    "expression": Field(
+        "expression",
+        "its zeros are the event; t, parameters, inputs, coordinates, their rates, position and velocity of markers",
+        required=True,
+        level=OUTPUT,
+    ),
+    "terminal": Field("times", "whether the run ends there, or at which time it happens", default=False),
+    "direction": Field("sign", "1: only where it rises, -1: where it falls, 0: both", default=0),
+    "reset": Field("rates", "new values of coordinates and velocities, from those before", default=(), level=OUTPUT),
+    "restitution": Field("number", "an impact: the expression is a gap that opens again this much slower (0 .. 1)"),
     "doc": _DOC,
 }
 FUNCTION: dict[str, Fields] = {
@@ -239,6 +261,7 @@ MODEL: Fields = {
     "forces": Field("table", "force elements"),
     "constraints": Field("table", "equations between coordinates or markers"),
     "outputs": Field("table", "named results"),
+    "events": Field("table", "zeros of expressions to find during a run, and what happens there"),
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
     "equations": Field("table", "equations of motion M v' = f as they are, instead of bodies and joints"),
     "independent": Field("names", "coordinates to integrate, when loops leave a choice", default=()),
@@ -249,7 +272,7 @@ MODEL: Fields = {
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
-SHORT = {"parameters": "value", "inputs": "value", "outputs": "expression"}
+SHORT = {"parameters": "value", "inputs": "value", "outputs": "expression", "events": "expression"}
 
 
 def joint_fields(type_name: str) -> Fields:

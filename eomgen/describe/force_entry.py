@@ -50,6 +50,8 @@ class ForceEntry:
             message = "is missing" if given is None else f"no force of type {given!r}"
             faults.add(f"{path}.type", message, nearest(str(given), FORCE, "types"))
             return None
+        if given == "force" and self._on_a_joint():
+            return None
         self.fields = force_fields(given)
         check_keys(path, self.values, self.fields, faults)
         present = [key for key in ONE_OF.get(given, ()) if key in self.values]
@@ -58,6 +60,17 @@ class ForceEntry:
             faults.add(path, message, f"give {' or '.join(ONE_OF[given])}")
             return None
         return given
+
+    def _on_a_joint(self) -> bool:
+        """Note a force that names a joint instead of a point."""
+        names = {name for joint in self.joints for name in (joint.entry.name, *joint.coordinates)}
+        key = "joint" if "joint" in self.values else "marker"
+        named = self.values.get(key)
+        wrong = key == "joint" or (isinstance(named, str) and named in names and named not in self.reader.markers)
+        if wrong:
+            remedy = "along a joint's coordinate take torque or actuator, in N where it is a length and N m on an angle"
+            self.fault(key, f"a force acts at a marker, and {named!r} is not one", remedy)
+        return wrong
 
     def fault(self, key: str, message: str, remedy: str = "") -> None:
         """Note a fault of one key."""

@@ -46,7 +46,12 @@ FORCE: dict[str, Fields] = {
     "torque": {
         "joint": _ON_JOINT,
         "body": Field("marker", "a body"),
-        "value": Field("value", "torque (N m): one on a joint, three on a body", required=True, level=MOTION),
+        "value": Field(
+            "value",
+            "torque (N m): one on a joint (N where its coordinate is a length), three on a body",
+            required=True,
+            level=MOTION,
+        ),
         "axes": _AXES,
     },
     "spring": {

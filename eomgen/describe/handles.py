@@ -208,8 +208,10 @@ class JointHandle:
 class Settings(dict[str, Any]):
     """A mapping that can also be called with keywords to add to it: ``model.initial(theta=0.3)``."""
 
-    def __call__(self, **values: Any) -> None:
+    def __call__(self, *unnamed: Any, **values: Any) -> None:
         """Set the given entries and keep the others."""
+        if unnamed:
+            raise UsageError(f"values are given by name, as in initial(theta=0.3), not as {unnamed[0]!r} alone")
         self.update(values)
 
 

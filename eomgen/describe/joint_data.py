@@ -86,7 +86,12 @@ def check_display(reader: Reader, path: str, given: Any) -> None:
             if field.kind == "choice":
                 reader.choice(f"{place}.{key}", value, field)
             elif field.kind == "vector":
-                reader.vector(f"{place}.{key}", value)
+                factors = reader.vector(f"{place}.{key}", value)
+                if key == "scale" and any(x.is_zero for x in factors):
+                    what = "leaves nothing of the mesh"
+                    reader.faults.add(
+                        f"{place}.{key}", f"a scale of 0 {what}", "give three numbers; negative ones mirror"
+                    )
             elif field.kind == "number":
                 reader.number(f"{place}.{key}", value)
             else:

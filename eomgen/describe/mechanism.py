@@ -42,6 +42,7 @@ class Input:
     value: float = 0.0
     unit: str = ""
     doc: str = ""
+    signal: Expr | None = None  #: of runs that give none
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,19 @@ class GivenEquations:
 
 
 @dataclass(frozen=True)
+class Event:
+    """A zero of an expression, and what happens there."""
+
+    name: str
+    expression: Expr
+    terminal: int = 0  #: the run ends when it has happened so often; 0: never
+    direction: int = 0  #: 1 rising, -1 falling, 0 both
+    reset: tuple[tuple[str, Expr], ...] = ()  #: new values of coordinates and velocities
+    restitution: float | None = None  #: of an impact
+    doc: str = ""
+
+
+@dataclass(frozen=True)
 class Simulation:
     """Defaults of ``simulate`` and ``eomgen run``."""
 
@@ -181,6 +195,7 @@ class Mechanism:
     joints: tuple[JointSpec, ...]
     forces: tuple[Force, ...]
     outputs: tuple[Output, ...]
+    events: tuple[Event, ...] = ()
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     initial: Mapping[str, Expr] = field(default_factory=dict)  #: by coordinate or ``<coordinate>_dot``
     guess: Mapping[str, Expr] = field(default_factory=dict)  #: rough coordinates, where assembly starts

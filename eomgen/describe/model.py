@@ -127,14 +127,19 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         self._quantity("parameters", name, value, unit, doc)
         return symbol(name)
 
-    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "") -> Any:
+    def input(self, name: str, value: Value = 0.0, unit: str = "", doc: str = "", signal: Value | None = None) -> Any:
         """Declare a quantity given from outside over time; ``value`` holds while none is given.
+
+        ``signal``, an expression of t, coordinates, velocities and parameters, is what runs take that give none;
+        calls of the module's own functions still take ``value``.
 
         Returns
         -------
         sympy.Symbol
         """
         self._quantity("inputs", name, value, unit, doc)
+        if signal is not None:
+            self._description.sections["inputs"][-1].values["signal"] = signal
         return symbol(name)
 
     def output(self, name: str, expression: Value, unit: str = "", doc: str = "") -> None:
@@ -150,6 +155,42 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
             For display.
         """
         self._quantity("outputs", name, expression, unit, doc, key="expression")
+
+    def event(
+        self,
+        name: str,
+        expression: Value,
+        terminal: bool | int = False,
+        direction: int = 0,
+        reset: Mapping[Any, Value] | None = None,
+        restitution: Value | None = None,
+        doc: str = "",
+    ) -> None:
+        """Declare an event: a zero of an expression that runs find, and what happens there.
+
+        Parameters
+        ----------
+        name : str
+            Identifier, for ``Trajectory.t_events[name]``.
+        expression : number, str or SymPy expression
+            In t, parameters, inputs, coordinates, velocities, and the position and velocity of markers.
+        terminal : bool or int
+            End the run there; a number: when it has happened so often.
+        direction : {0, 1, -1}
+            Both ways, only where it rises, only where it falls.
+        reset : mapping of coordinates and velocities to expressions, optional
+            New values, all from the state right before.  Positions and velocities are brought back onto the
+            constraints afterwards.
+        restitution : float, optional
+            The expression is a gap between bodies; where it closes an impact opens it again, this much slower (0 to
+            1; Newton's law), with impulses that obey all joints.
+        doc : str, optional
+        """
+        given = {"expression": expression, "terminal": terminal, "direction": direction, "reset": reset or None}
+        given |= {"restitution": restitution, "doc": doc}
+        defaults = {"terminal": False, "direction": 0, "doc": ""}
+        kept = {k: v for k, v in given.items() if v is not None and (k not in defaults or v != defaults[k])}
+        self._description.add("events", name, kept)
 
     def _quantity(self, section: str, name: str, value: Value, unit: str, doc: str, key: str = "value") -> None:
         given = {key: value, "unit": unit, "doc": doc}
@@ -311,9 +352,10 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         return yaml_text(self._description)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the model as a model file."""
+        """Write the model as a model file; one that is there already stays as it is where that fails."""
+        text = self.to_yaml()
         with open(path, "w", encoding="utf-8") as file:
-            file.write(self.to_yaml())
+            file.write(text)
 
     # -- display --------------------------------------------------------------------------------------------------
     def __getattr__(self, name: str) -> Any:

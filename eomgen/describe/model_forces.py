@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..errors import UsageError
 from .description import items
 from .handles import JointHandle, MarkerHandle
 from .keywords import names_keywords
@@ -35,6 +36,9 @@ class ForceMethods(LawMethods, ContactMethods):
         axes : {"ground", "body"}, optional
             Axes of the value: ground's, or the marker's own.
         """
+        if isinstance(marker, JointHandle):
+            remedy = "along the coordinate of a joint take torque or actuator (N on a length, N m on an angle)"
+            raise UsageError(f"force {name!r} acts at a marker, which {marker!r} is not; {remedy}")
         self._force("force", name, marker=self._marker(marker), value=value, axes=axes)
 
     def torque(self, name: str, on: Any, value: Value | Sequence[Value], axes: str | None = None) -> None:

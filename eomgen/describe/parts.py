@@ -103,7 +103,8 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
             lengths[key] = reader.vector(place, values[key])
         else:
             lengths[key] = (reader.expression(place, values[key]),) * 3
-        if any(x.value is not None and x.value < 0.0 for x in lengths[key]):
+        known = [reader.known(x) for x in lengths[key]]
+        if any(x is not None and x < 0.0 for x in known):
             reader.faults.add(place, f"{values[key]!r} is negative", "lengths are 0 or positive")
     inner, outer = (lengths[key][0].value if key in lengths else None for key in ("inner_radius", "outer_radius"))
     if inner is not None and outer is not None and inner > outer:
@@ -123,6 +124,11 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
         reader.wrong(place, file, "file")
         return None
     graph = reader.graph
+    size = None if scale is None else reader.known(scale)
+    if size is not None and size <= 0.0:
+        why = "is negative, which would mirror the mesh" if size < 0.0 else "leaves nothing of the mesh"
+        reader.faults.add(f"{path}.scale", f"{size:g} {why}", "give a scale greater than 0; mirror the file itself")
+        return None
     try:
         found = measure_mesh(_locate(reader, os.fspath(file)))
     except UsageError as error:

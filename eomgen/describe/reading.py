@@ -15,6 +15,8 @@ from ..errors import ExpressionError
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from ..graph.evaluate import evaluate
+from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
@@ -52,6 +54,14 @@ class Reader:
         self.markers: dict[str, Marker] = {}
         self.quantities: dict[str, Quantity] = {}
         self.stand_in = graph.symbol("?")
+        self.numbers: dict[str, float] = {}  # declared values of parameters
+
+    def known(self, expression: Expr) -> float | None:
+        """The value of an expression at the declared values of parameters, None if they do not tell."""
+        if expression.value is None and not symbols_of([expression]) <= self.numbers.keys():
+            return None
+        value = float(evaluate([expression], self.numbers)[0])
+        return value if math.isfinite(value) else None
 
     def wrong(self, path: str, value: object, kind: str) -> None:
         """Note that a value is not of a kind."""

@@ -19,6 +19,7 @@ LEVELS = {"parameter": CONSTANT, "time": MOTION, "input": MOTION, "coordinate": 
 LEVELS |= {"rate": MOTION, "rate of rate": OUTPUT}  # of Euler parameters, which no velocity is
 LEVELS |= {"multiplier": OUTPUT}  # of the constraints of given equations
 LEVELS |= {"acceleration": OUTPUT, "output": OUTPUT + 1}  # an output is for reading results only
+LEVELS |= {"event": OUTPUT + 1}
 LEVELS |= {"function": OUTPUT + 1}  # by itself; calls are not looked up here
 
 _LEVEL_REMEDY = {
@@ -78,8 +79,8 @@ class Namespace:
             self.faults.add(
                 path,
                 f"the name {clash!r} is taken by the {other}{own}",
-                "parameters, inputs, functions, coordinates and outputs share one namespace, with the _dot and _ddot "
-                "of coordinates; rename one",
+                "parameters, inputs, functions, coordinates, outputs and events share one namespace, with the _dot "
+                "and _ddot of coordinates; rename one",
             )
             return False
         return True

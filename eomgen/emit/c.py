@@ -7,11 +7,15 @@ from typing import Any
 
 from ..program import KERNELS, Block, Program
 from .c_functions import declarations, function_files, used_calls
+from .c_lanes import lane_blocks, lane_files
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
+
+#: Headers of the numbers that functions compute with.
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h")
 
 
 def emit_c(program: Program) -> SourceSet:
@@ -20,7 +24,8 @@ def emit_c(program: Program) -> SourceSet:
     Returns
     -------
     SourceSet
-        ``<name>.c``, ``<name>.h``, ``eomgen.h``, ``model.json``; C99, no dependency but libm.  A large model has
+        ``<name>.c``, ``<name>.h``, ``eomgen.h`` and other headers that are the same for all models, ``model.json``;
+        C99, no dependency but libm; ``<name>_lanes2.c`` and so on for several states at a time.  A large model has
         further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
@@ -29,16 +34,20 @@ def emit_c(program: Program) -> SourceSet:
     calls = used_calls(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
     further = {
-        f"{program.name}_part{k}.c": render("c/part.c.j2", {**context, "functions": functions})
-        for k, functions in enumerate(parts, 1)
+        f"{program.name}_part{k}.c": render(
+            "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
+            {**context, "part_names": [name for name, _ in part], "functions": [text for _, text in part]},
+        )
+        for k, part in enumerate(parts, 1)
     }
     return SourceSet(
         {
             f"{program.name}.c": render("c/model.c.j2", context),
             **further,
+            **lane_files(program, context),
             **function_files(program, calls),
             f"{program.name}.h": render("c/model.h.j2", context),
-            "eomgen.h": read_template("c/eomgen.h"),
+            **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS)},
             "model.json": metadata_json(program),
         }
     )
@@ -51,12 +60,12 @@ def _print(program: Program) -> list[Printed]:
 
 
 def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
-    twins = program.twins
+    twins, in_lanes = program.twins, lane_blocks(program)
     areas, n_work = work_areas(program, max((p.work for p in printed[1:]), default=0))
     n_const = len(program.parameters) + len(program.hoisted) + printed[0].work
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
-    numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work}
+    numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
     others = [i for i in range(sizes.n_v) if i not in program.preferred]
     roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
     return {
@@ -69,6 +78,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "n_const": n_const,
         "n_work": n_work,
         "hoisted": len(program.hoisted),
+        "closed_at": closed_at(program, areas),
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
         "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
@@ -86,6 +96,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
             {
                 "name": k.name,
                 "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
+                "lanes": twins.get(k.name, k.name) in in_lanes,
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],
@@ -93,9 +104,17 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
             }
             for k in program.kernels
         ],
+        "lanes": in_lanes,
+        "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
         "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
+
+
+def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
+    """Where in the work array the right-hand side leaves its state [q; v] on the constraints; 0 where it does not."""
+    closes = any(d.name == "rhs" for d in program.drivers) and program.has_loops and program.projects
+    return next(start for name, start, _ in areas if name == "X") if closes else 0
 
 
 def _literal_lines(text: str, width: int = 100) -> list[str]:

@@ -36,6 +36,21 @@ def c_name(program: str, function: str, orders: Sequence[int]) -> str:
     return f"{program}_call_{function}_{'_'.join(map(str, orders))}"
 
 
+def each_name(function: str, orders: Sequence[int]) -> str:
+    """Name of the function that blocks call: the C function of one call, in every lane."""
+    return f"each_{function}_{'_'.join(map(str, orders))}"
+
+
+def _each(program: str, function: Function, orders: Sequence[int]) -> str:
+    """Its definition."""
+    arity = range(function.arity)
+    lanes = ", ".join(f"EOMGEN_LANE(x{k}, k)" for k in arity)
+    head = f"static inline real {each_name(function.name, orders)}({', '.join(f'real x{k}' for k in arity)})"
+    call = f"{c_name(program, function.name, orders)}({lanes})"
+    loop = f"for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {call}; }}"
+    return f"{head}\n{{\n    real y = same(0.0);\n    {loop}\n    return y;\n}}\n"
+
+
 def _head(name: str, arity: int) -> str:
     return f"double {name}({', '.join(f'double x{k}' for k in range(arity))})"
 
@@ -43,7 +58,7 @@ def _head(name: str, arity: int) -> str:
 def declarations(program: Program, calls: Calls) -> list[str]:
     """Declarations of all calls, for the files that make them; none if there are no calls."""
     lines = [
-        f"EOMGEN_PIECE {_head(c_name(program.name, f.name, orders), f.arity)};\n"
+        f"EOMGEN_PIECE {_head(c_name(program.name, f.name, orders), f.arity)};\n{_each(program.name, f, orders)}"
         for f, used in calls.values()
         for orders in used
     ]

@@ -6,11 +6,12 @@ from ..program import Program
 from ..program.blocks import SHIFTS
 
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "residual_sizes", "project", "close", "project_drive"),
+    "project": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "project_drive"),
     "rhs": (
         "scaled",
         "cholesky",
         "residual_sizes",
+        "correct",
         "project",
         "close",
         "eliminate",
@@ -22,7 +23,7 @@ LOOPS: dict[str, tuple[str, ...]] = {
     ),
     "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
     "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
-    "outputs": ("scaled", "cholesky", "residual_sizes", "project", "close", "outputs_closed"),
+    "outputs": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "outputs_closed"),
 }
 ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
 
@@ -45,7 +46,7 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return ("shift_columns", name)
     if not program.has_loops:
         return ("tree", "shift_tree", name)
-    return (*LOOPS["rhs"][:-1], "multipliers", direct, "shift_loops", name)
+    return (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
 
 
 def driver_files(program: Program) -> list[str]:
@@ -64,14 +65,17 @@ def driver_files(program: Program) -> list[str]:
             needed = shift_files(program, driver.name, direct)
         elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
-        elif program.by_columns:
+        elif program.by_columns and "terms" not in driver.blocks:
             needed = COLUMNS[driver.name]
+        elif not program.has_loops and driver.name == "jacobian":
+            along = (direct, "tree_jacobian_along") if direct == "residuals_along" else ("tree_jacobian",)
+            needed = ("tree", *along)
         elif not program.has_loops:
-            needed = TREES.get(driver.name, ("tree", direct, "tree_jacobian"))
+            needed = TREES[driver.name]
         elif driver.name == "rhs" and "dynamics" in driver.blocks:
             needed = (*LOOPS["rhs"][:-1], "rhs_direct")
         elif driver.name == "jacobian":
-            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "jacobian")
+            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
         elif driver.name == "outputs" and "terms" in driver.blocks:
             needed = ACCELERATED
         else:
@@ -82,7 +86,7 @@ def driver_files(program: Program) -> list[str]:
 
 def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """Files of a driver that solves the linear system of a method."""
-    solve = ("system_balance", "system_factor", "system_solve")
+    solve = ("system_balance", "system_factor", "system_substitute", "system_solve")
     if name == "jacobian":
         return (*solve, direct, "system_jacobian")
     if program.has_loops and (program.projects or name == "outputs"):
@@ -131,7 +135,7 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("J", m * n),
             ("G", m * m),
             ("GH", m * m if h < m else 0),  # of the holonomic rows alone
-            ("E", m),
+            ("E", 2 * m),
             ("STEP", n),
             ("ROWS", m * (n + 1 + m)),
             ("B", n * f),
@@ -146,13 +150,12 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
         ]
     if "system" in names and program.system is not None:
         size, places = len(program.system.unknowns), len(program.system.places)
-        relaxed = len(program.system.relaxed)
         lengths += [
-            ("SYSTEM", places + size + relaxed),  # entries of K, r, sizes of constraints
+            ("SYSTEM", places + 3 * size),  # entries of K, r, sizes of equations and of unknowns
             ("LU", size * size),
             ("ROW", size),  # scales
             ("COLUMN", size),
-            ("DEFECT", size),
+            ("DEFECT", 2 * size),
             ("MOTION", n_q + n + size),  # q, v, z
         ]
     if "dae_tangent" in names:

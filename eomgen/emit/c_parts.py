@@ -8,7 +8,7 @@ from ..program import Program
 from .c_text import Printed
 
 #: Pieces that take more text than this (bytes) go into files of their own, of about this length each.
-LENGTH = 400_000
+LENGTH = 150_000
 
 
 def part_names(printed: Sequence[Printed]) -> list[str]:
@@ -16,17 +16,17 @@ def part_names(printed: Sequence[Printed]) -> list[str]:
     return [name for p in printed for name, _ in p.pieces]
 
 
-def distribute(program: Program, printed: Sequence[Printed]) -> list[list[str]]:
-    """The texts of the pieces by file; none if the model is small enough for one file."""
-    texts = [text for p in printed for _, text in p.pieces]
-    total = sum(map(len, texts))
+def distribute(program: Program, printed: Sequence[Printed]) -> list[list[tuple[str, str]]]:
+    """The pieces, name and text, by file; none if the model is small enough for one file."""
+    pieces = [piece for p in printed for piece in p.pieces]
+    total = sum(len(text) for _, text in pieces)
     if total <= LENGTH:
         return []
     files = -(-total // LENGTH)
     share = total / files
-    parts: list[list[str]] = [[] for _ in range(files)]
+    parts: list[list[tuple[str, str]]] = [[] for _ in range(files)]
     done = 0
-    for text in texts:
-        parts[min(int(done / share), files - 1)].append(text)
+    for name, text in pieces:
+        parts[min(int(done / share), files - 1)].append((name, text))
         done += len(text)
     return [part for part in parts if part]

@@ -1,6 +1,7 @@
 """Stage emit: a straight-line block -> C99 functions in static single assignment.
 
-Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.
+Every operation means what :mod:`eomgen.graph.evaluate` makes of it, NaN included.  The text is written over the type
+``real`` of eomgen_real.h, so that it serves for one state and for several side by side (lanes).
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..graph.core import Expr
+from ..graph.nodes import Node
 from ..graph.traverse import reachable
 from ..program import Block, Program
-from .c_functions import c_name
+from .angles import CIRCULAR, gather_angles, print_angles
+from .c_functions import each_name
 from .straight import CONDITIONS, Piece, Pieces, cut, references
 
 PATTERNS: dict[str, str] = {
@@ -20,36 +23,44 @@ PATTERNS: dict[str, str] = {
     "mul": "{}*{}",
     "div": "{}/{}",
     "neg": "-{}",
-    "pow": "pow({}, {})",
-    "atan2": "atan2({}, {})",
-    "abs": "fabs({})",
+    "abs": "abs_of({})",
     "sign": "sign_of({})",
     "min": "smaller({}, {})",
     "max": "larger({}, {})",
-    **{name: f"{name}({{}})" for name in
-       ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")},
-}  # fmt: skip
+    "sin": "sine_of({})",
+    "cos": "cosine_of({})",
+    **dict.fromkeys(("pow", "atan2"), "each_{}({{}}, {{}})"),
+    **dict.fromkeys(("sqrt", "exp", "log", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), "each_{}({{}})"),
+}
+PATTERNS.update({name: text.format(name) for name, text in PATTERNS.items() if text.startswith("each_")})
 
 CONDITION_PATTERNS: dict[str, str] = {
-    "lt": "{} < {}",
-    "le": "{} <= {}",
-    "eq": "{} == {}",
-    "not": "{} == 0.0",
-    "and": "{} != 0.0 && {} != 0.0",
-    "or": "{} != 0.0 || {} != 0.0",
+    "lt": "({} < {})",
+    "le": "({} <= {})",
+    "eq": "({} == {})",
+    "not": "({} == 0.0)",
+    "and": "(({} != 0.0) & ({} != 0.0))",
+    "or": "(({} != 0.0) | ({} != 0.0))",
 }
+#: Operations in which a constant may stand beside a value as it is; elsewhere it must become a ``real``.
+ARITHMETIC = frozenset({"add", "sub", "mul", "div", "lt", "le", "eq"})
 
 #: operation -> definition it needs; NaN wins in smaller and larger, as in numpy.minimum.
 HELPERS: dict[str, str] = {
-    "sign": "static inline double sign_of(double a)\n"
-    "{\n    return a > 0.0 ? 1.0 : a < 0.0 ? -1.0 : a == 0.0 ? 0.0 : a;\n}\n",
-    "min": "static inline double smaller(double a, double b)\n{\n    return a <= b || a != a ? a : b;\n}\n",
-    "max": "static inline double larger(double a, double b)\n{\n    return a >= b || a != a ? a : b;\n}\n",
+    "sign": "static inline real sign_of(real a)\n{\n"
+    "    return choose(a > 0.0, same(1.0), choose(a < 0.0, same(-1.0), choose(a == 0.0, same(0.0), a)));\n}\n",
+    "min": "static inline real smaller(real a, real b)\n{\n    return choose((a <= b) | (a != a), a, b);\n}\n",
+    "max": "static inline real larger(real a, real b)\n{\n    return choose((a >= b) | (a != a), a, b);\n}\n",
+    **{
+        name: f"EOMGEN_EACH{'_PAIR' if name in ('pow', 'atan2') else ''}(each_{name}, {name})\n"
+        for name, text in PATTERNS.items()
+        if text.startswith("each_")
+    },
 }
 
 SIGNATURE = (
-    "double t, const double *restrict x, const double *restrict u,\n"
-    "    const double *restrict c, double *restrict out, double *restrict w"
+    "real t, const real *restrict x, const real *restrict u,\n"
+    "    const real *restrict c, real *restrict out, real *restrict w"
 )
 ARGUMENTS = ("t", "x", "u", "c", "out", "w")
 #: A row of at least so many zero results is filled by a loop.
@@ -66,7 +77,8 @@ class _Printer:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str]) -> None:
-        self._nodes, self._calls, self._program = program.graph.nodes, program.graph.calls, program.name
+        self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
+        self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
         self._fixed = references
         self._variables: dict[int, str] = {}
         self.used: set[str] = set()  #: arguments read or written since last emptied
@@ -84,65 +96,97 @@ class _Printer:
         node = self._nodes[i]
         return literal(node[1]) if node[0] == "const" else self._name(i)
 
+    def real(self, i: int) -> str:
+        """An operand as a ``real`` even if it is a number."""
+        node = self._nodes[i]
+        return f"same({literal(node[1])})" if node[0] == "const" else self.operand(i)
+
+    def operands(self, node: Node) -> list[str]:
+        """The operands of an operation; beside a value, arithmetic takes a number as it is."""
+        if node[0] in ARITHMETIC and not all(self._nodes[k][0] == "const" for k in node[1:]):
+            return [self.operand(k) for k in node[1:]]
+        return [self.real(k) for k in node[1:]]
+
     def condition(self, i: int, piece: Piece) -> str:
         if i in piece.inlined:
             node = self._nodes[i]
-            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:]))
-        return f"{self.operand(i)} != 0.0"
+            return CONDITION_PATTERNS[node[0]].format(*self.operands(node))
+        return f"({self.real(i)} != 0.0)"
 
     def failed(self, i: int, piece: Piece | None) -> str:
         """The text of a check that is not passed; NaN passes, and is found in the result."""
         node = self._nodes[i]
         if piece is not None and i in piece.inlined and node[0] == "lt":
-            return f"{self.operand(node[1])} >= {self.operand(node[2])}"
-        return f"{self.operand(i)} <= 0.0"
+            return "{} >= {}".format(*self.operands(node))
+        return f"{self.real(i)} <= 0.0"
 
     def _value(self, i: int, piece: Piece) -> str:
         node = self._nodes[i]
         kind = node[0]
         if kind == "select":
-            return f"{self.condition(node[1], piece)} ? {self.operand(node[2])} : {self.operand(node[3])}"
+            return f"choose({self.condition(node[1], piece)}, {self.real(node[2])}, {self.real(node[3])})"
         if kind in CONDITIONS:
-            return CONDITION_PATTERNS[kind].format(*map(self.operand, node[1:])) + " ? 1.0 : 0.0"
+            return f"choose({CONDITION_PATTERNS[kind].format(*self.operands(node))}, same(1.0), same(0.0))"
         if kind in self._calls:
             function, orders = self._calls[kind]
-            return f"{c_name(self._program, function.name, orders)}({', '.join(map(self.operand, node[1:]))})"
-        return PATTERNS[kind].format(*map(self.operand, node[1:]))
+            return f"{each_name(function.name, orders)}({', '.join(map(self.real, node[1:]))})"
+        if kind in CIRCULAR and node[1] in self._angles:
+            return f"{'sines' if kind == 'sin' else 'cosines'}[{self._angles[node[1]]}]"
+        return PATTERNS[kind].format(*self.operands(node))
 
     def lines(self, piece: Piece) -> list[str]:
         result: list[str] = []
         loaded: set[int] = set()
+        angles = gather_angles(self._graph, piece)
+        self._angles = {}
+        first = frozenset(angles.first)
+        for i in angles.first:
+            self._statement(i, piece, loaded, result)
+        if angles.arguments:
+            for i in angles.arguments:
+                self._read(i, piece, loaded, result)
+            result += print_angles([self.real(i) for i in angles.arguments])
+            self._angles = {i: k for k, i in enumerate(angles.arguments)}
         for i in piece.statements:
-            if i not in piece.inlined:
-                self._load(i, piece, loaded, result)
-                result.append(f"const double {self._name(i)} = {self._value(i, piece)};")
-            if i in piece.checks:
-                if i in piece.inlined:
-                    self._load(i, piece, loaded, result)
-                result.append(f"if ({self.failed(i, piece)}) {{ return 2; }}")
-            if i in piece.results:
-                self.used.add("out")
-                result += [f"out[{k}] = {self._name(i)};" for k in piece.results[i]]
-            if i in piece.stores:
-                self.used.add("w")
-                result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
+            if i not in first:
+                self._statement(i, piece, loaded, result)
         return result
+
+    def _statement(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+        if i not in piece.inlined:
+            self._load(i, piece, loaded, result)
+            result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
+        if i in piece.checks:
+            if i in piece.inlined:
+                self._load(i, piece, loaded, result)
+            result.append(f"EOMGEN_REJECT({self.failed(i, piece)})")
+        if i in piece.results:
+            self.used.add("out")
+            result += [f"out[{k}] = {self._name(i)};" for k in piece.results[i]]
+        if i in piece.stores:
+            self.used.add("w")
+            result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
 
     def _load(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
         """Read values of earlier pieces just before their first use."""
         for k in self._nodes[i][1:]:
             if k in piece.inlined:
                 self._load(k, piece, loaded, result)
-            elif k in piece.loads and k not in loaded:
-                loaded.add(k)
-                self.used.add("w")
-                result.append(f"const double {self._name(k)} = w[{piece.loads[k]}];")
+            else:
+                self._read(k, piece, loaded, result)
+
+    def _read(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+        """Read a value of an earlier piece, if it is one."""
+        if i in piece.loads and i not in loaded:
+            loaded.add(i)
+            self.used.add("w")
+            result.append(f"const real {self._name(i)} = w[{piece.loads[i]}];")
 
 
 def _function(head: str, used: set[str], lines: Sequence[str]) -> str:
     unused = [f"(void){a};" for a in ARGUMENTS if a not in used]
     text = "\n".join(f"    {line}" for line in ([" ".join(unused)] if unused else []) + list(lines))
-    return f"{head}({SIGNATURE})\n{{\n{text}\n}}\n"
+    return f"{head}({SIGNATURE})\n{{\n    EOMGEN_BEGIN\n{text}\n    EOMGEN_RETURN\n}}\n"
 
 
 class Printed(NamedTuple):
@@ -162,7 +206,7 @@ def print_block(program: Program, block: Block) -> Printed:
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
     printer = _Printer(program, texts)
-    main = _direct(printer, pieces) + [f"if ({printer.failed(i, None)}) {{ return 2; }}" for i in pieces.checks]
+    main = _direct(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
     if len(pieces.pieces) == 1:
@@ -174,19 +218,19 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
             printer.used.clear()
             lines = printer.lines(piece)
             part = f"{program.name}_{name}_{k}"
-            functions.append((part, _function(f"int {part}", printer.used, [*lines, "return 0;"])))
-            main.append(f"if ({part}(t, x, u, c, out, w) != 0) {{ return 2; }}")
-    return Printed(_function(f"static int {name}", used, [*main, "return 0;"]), tuple(functions), pieces.work)
+            functions.append((part, _function(f"flag {part}", printer.used, lines)))
+            main.append(f"EOMGEN_REJECT({part}(t, x, u, c, out, w))")
+    return Printed(_function(f"static flag {name}", used, main), tuple(functions), pieces.work)
 
 
 def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
-    texts = [(k, printer.operand(i)) for k, i in pieces.direct]
-    zeros = [k for k, text in texts if text == "0.0"]
+    texts = [(k, printer.real(i)) for k, i in pieces.direct]
+    zeros = [k for k, text in texts if text == "same(0.0)"]
     lines = []
     if len(zeros) >= FILLED:
-        lines.append(f"for (int i = {zeros[0]}; i <= {zeros[-1]}; i++) {{ out[i] = 0.0; }}")
-        texts = [(k, text) for k, text in texts if text != "0.0"]
+        lines.append(f"for (int i = {zeros[0]}; i <= {zeros[-1]}; i++) {{ out[i] = same(0.0); }}")
+        texts = [(k, text) for k, text in texts if text != "same(0.0)"]
     return lines + [f"out[{k}] = {text};" for k, text in texts]
 
 

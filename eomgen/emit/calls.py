@@ -51,6 +51,7 @@ def describe_calls(program: Program) -> list[Call]:
         ),
         Call("kinematic_analysis(t, **led)", "KinematicAnalysis", "a range of time or of coordinates, without forces"),
         Call("motion_range(name)", "MotionRange", "the limits between which a coordinate can move"),
+        Call("workspace(over, of)", "Workspace", "what outputs reach over a grid of coordinates"),
         Call("poses(q)", _shape(s.n_bodies, 4, 4), "body frames to ground, homogeneous"),
         Call("outputs(t, x)", _shape(s.n_y), "the outputs of the model at the projected state"),
         Call("minimal.rhs(t, x_min)", _shape(2 * s.n_dof), "x_min' of the independent x_min = [q_i; v_i]"),

@@ -32,9 +32,9 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
           "simulate_impacts", "consistent")  # fmt: skip
-MOTIONS = ("kinematic_analysis", "motion_range")
+MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", *ANALYSES)
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", *ANALYSES)
 
 
 def emit_package(program: Program, target: str) -> SourceSet:
@@ -64,7 +64,11 @@ def emit_package(program: Program, target: str) -> SourceSet:
 
 def _cython(program: Program) -> dict[str, str]:
     sources = emit_c(program)
-    context = _context(program) | {"c_files": [name for name in (*sources, *read_layer()) if name.endswith(".c")]}
+    written = (*sources, *read_layer())
+    context = _context(program) | {
+        "c_files": [name for name in written if name.endswith(".c")],
+        "headers": [name for name in written if name.endswith((".h", ".pxi"))],
+    }
     return {
         **sources,
         **read_layer(),
@@ -96,10 +100,10 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, numeric/, runtime/ and analysis/ as they are in eomgen itself."""
+    """errors.py, numeric/, runtime/, analysis/ and ensembles/ as they are in eomgen itself."""
     root = files("eomgen")
     found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
-    for folder in ("numeric", "runtime", "analysis"):
+    for folder in ("numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")

@@ -62,7 +62,7 @@ def cut(
     skipped : frozenset of int
         Operations that are not evaluated here (hoisted values and what they are made of).
     statements : int
-        Most statements in one piece.
+        Most statements in one piece; what is longer is cut into pieces of at most half of that, which compile faster.
     """
     nodes = graph.nodes
     places: dict[int, list[int]] = {}
@@ -70,7 +70,7 @@ def cut(
         places.setdefault(y.id, []).append(k)
     wanted = [*outputs, *checks]
     sequence = _pair(graph, [i for i in order(wanted) if i not in skipped])
-    chunks = chunk(sequence, wanted, statements)
+    chunks = chunk(sequence, wanted, statements if len(sequence) <= statements else max(1, statements // 2))
     last_use = {i: k for k, c in enumerate(chunks) for i in c.imports}
     slots: dict[int, int] = {}
     free: list[int] = []

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..graph.core import Expr
 from ..kinematics import Kinematics
+from ..kinematics.units import Units
 from .equations import LinearSystem, TreeEquations
 from .free_bodies import FreeBodies, cut_joints, scaled, sub
 from .free_body_system import Forces, Unknowns, free_body_equations
@@ -21,18 +22,25 @@ def derive(kinematics: Kinematics) -> TreeEquations:
 
 
 def _system(kinematics: Kinematics) -> LinearSystem:
-    bodies, unknowns = FreeBodies(kinematics), Unknowns(kinematics)
-    parts = [(unknowns.six(), unknowns.take(len(link.columns)), unknowns.six()) for link in kinematics.links]
+    bodies, unknowns, units = FreeBodies(kinematics), Unknowns(kinematics), Units(kinematics)
+    along = [range(link.first, link.first + len(link.columns)) for link in kinematics.links]
+    rates = [units.of(kind) for kind in kinematics.velocity_kinds]
+    parts = [
+        (unknowns.six(units.motion), unknowns.take([rates[j] for j in joint]), unknowns.six(units.wrench))
+        for joint in along
+    ]
     motions, reactions = [m for m, _, _ in parts], [f for _, _, f in parts]
-    a = [x for _, rates, _ in parts for x in rates]
-    forces = Forces(bodies, cut_joints(bodies), unknowns)
+    a = [x for _, own, _ in parts for x in own]
+    forces = Forces(bodies, cut_joints(bodies), unknowns, units)
     balances = bodies.balances(motions, reactions)
     closing = forces.close(balances, motions, a)
     residuals: list[Expr] = []
+    sizes: list[Expr] = []
     for k, (link, balance) in enumerate(zip(kinematics.links, balances, strict=True)):
         joint = bodies.relative(k, motions)
         for c, column in enumerate(link.columns):
             joint = sub(joint, scaled(a[link.first + c], column))
         residuals += [*joint[0], *joint[1], *bodies.powers(k, reactions[k], a, forces.pulls)]
         residuals += [*balance[0], *balance[1]]
-    return forces.solve(residuals, closing, a)
+        sizes += [*units.motion, *(units.force[j] for j in along[k]), *units.wrench]
+    return forces.solve(residuals, sizes, closing, a)

@@ -24,7 +24,7 @@ def with_armature(method: Method) -> Method:
 def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
     """Add J y_q^T y_q to M, and its part to bias, inverse dynamics and kinetic energy.
 
-    Accelerations that a method has without M must hold the inertia of drives already.
+    Accelerations that a method has without M, and a turned system, must hold the inertia of drives already.
     """
     drives = [(s.coordinates[0], s.armature) for s in kinematics.mechanism.joints if s.armature is not None]
     if not drives:
@@ -70,4 +70,5 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
         pivots=tree.pivots,
         system=tree.system,
         canonical=tree.canonical,
+        turned=tree.turned,
     )

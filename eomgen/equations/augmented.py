@@ -13,6 +13,7 @@ from dataclasses import replace
 from ..graph.core import Expr
 from ..kinematics import Kinematics
 from ..kinematics.loops import Constraints
+from ..kinematics.units import Units
 from . import embedding, lagrange
 from .armature import with_armature
 from .equations import LinearSystem, TreeEquations
@@ -37,13 +38,15 @@ def _system(kinematics: Kinematics, tree: TreeEquations) -> LinearSystem:
         entries |= {(j, n + i): entry for j, entry in enumerate(row)}
     places = tuple(sorted(place for place, entry in entries.items() if not entry.is_zero))
     symbols = [graph.symbol(f"z[{k}]") for k in range(n + m)]
+    units = Units(kinematics)
+    rates, rows = [units.of(kind) for kind in kinematics.velocity_kinds], [units.of(kind) for kind in c.kinds]
     return LinearSystem(
         unknowns=tuple(f"z[{k}]" for k in range(n + m)),
         places=places,
         entries=tuple(entries[place] for place in places),
         right=(*(-h for h in tree.bias), *(-g for g in c.gamma)),
         relaxed=tuple((n + i, n + i) for i in range(m)),
-        sizes=tuple(kinematics.length_scale if kind == "length" else graph.one for kind in c.kinds),
+        sizes=(*units.force, *rows, *rates, *(units.energy / size for size in rows)),
         accelerations=tuple(symbols[:n]),
     )
 

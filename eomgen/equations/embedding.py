@@ -10,6 +10,8 @@ operations and minimum parameters of the dynamic models of tree structure robots
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -18,31 +20,58 @@ from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.inertia import SpatialInertia, Wrench
-from ..kinematics.loads import applied_wrenches, coordinate_forces
-from ..kinematics.rates import JointRates, joint_rates, slide_accelerations
+from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
+from ..kinematics.parallel import Resolved, resolve_parallel
+from ..kinematics.rates import joint_rates, slide_accelerations
 from ..kinematics.regroup import regroup
+from ..kinematics.turned import Block, Rows, Turned, falling, turn_forces, turn_links
 from .equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Equations of the spanning tree by the embedding technique."""
-    graph = kinematics.graph
-    rates = joint_rates(kinematics)
+    graph, a = kinematics.graph, kinematics.a
+    rates, applied = joint_rates(kinematics), applied_wrenches(kinematics)
+    rest = tuple(graph.zero for _ in kinematics.v)
+    own = Resolved.in_own_axes(kinematics.links, kinematics.twists, rates, applied)
     given = [link.spatial for link in kinematics.links]
     inertias = regroup(graph, kinematics.links)
-    inverse = _sweep(kinematics, inertias, rates, kinematics.a)
-    plain = _sweep(kinematics, given, rates, kinematics.a)
+    inverse = _sweep(kinematics, own, inertias, a)
+    plain = _sweep(kinematics, own, given, a)
     if count(plain).total < count(inverse).total:  # grouping symbols is work too
         inertias, inverse = given, plain
-    rest = tuple(graph.zero for _ in kinematics.v)
+    chosen, mass, bias = own, _composite_mass_matrix(own, inertias), _sweep(kinematics, own, inertias, rest)
+    common = resolve_parallel(graph, kinematics.links, kinematics.v, rates, applied)
+    if any(axes is not None for axes in common.axes):
+        turned_inertias = common.inertias(inertias)
+        other = _composite_mass_matrix(common, turned_inertias), _sweep(kinematics, common, turned_inertias, rest)
+        if _cost(*other) < _cost(mass, bias):
+            chosen, inertias, (mass, bias) = common, turned_inertias, other
+            inverse = _sweep(kinematics, chosen, inertias, a)
+    own_axes, blocks = turn_links(kinematics)
+
+    def turned() -> tuple[Rows, tuple[Expr, ...]]:
+        resolved = chosen.with_columns(own_axes.links)
+        matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
+        for k, drive in drive_inertias(kinematics).items():
+            matrix[k][k] = matrix[k][k] + drive
+        return tuple(map(tuple, matrix)), _sweep(kinematics, resolved, inertias, rest, blocks)
+
     return TreeEquations(
         method="embedding",
-        mass_matrix=_composite_mass_matrix(kinematics, inertias),
-        bias=_sweep(kinematics, inertias, rates, rest),
+        mass_matrix=mass,
+        bias=bias,
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),
         potential_energy=potential_energy(kinematics),
+        turned=Turned(turned, blocks) if blocks else None,
     )
+
+
+def _cost(mass: Rows, bias: Sequence[Expr]) -> int:
+    """Operations of the lower triangle and the bias, sines and cosines as many as they last."""
+    found = count([*(x for i, row in enumerate(mass) for x in row[: i + 1]), *bias])
+    return found.total + 12 * (found.functions.get("sin", 0) + found.functions.get("cos", 0))
 
 
 def _add(a: Twist, b: Twist) -> Twist:
@@ -83,22 +112,27 @@ def _moment(inertia: Mat3, omega: Vec3, alpha: Vec3, turning: Mat3) -> Vec3:
 
 
 def _sweep(
-    kinematics: Kinematics, inertias: list[SpatialInertia], rates: list[JointRates], a: tuple[Expr, ...]
+    kinematics: Kinematics,
+    resolved: Resolved,
+    inertias: list[SpatialInertia],
+    a: tuple[Expr, ...],
+    blocks: Sequence[Block] = (),
 ) -> tuple[Expr, ...]:
-    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints."""
-    graph, links = kinematics.graph, kinematics.links
+    """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
+    graph, links, twists = kinematics.graph, resolved.links, resolved.twists
     still = vec.zero(graph)
     lifted = vec.neg(kinematics.mechanism.gravity)  # gravity as an acceleration of ground
     two = graph.constant(2.0)
     motions: list[tuple[Vec3, Mat3, Vec3]] = []  # alpha, U, A of each link
     wrenches: list[Wrench] = []
-    applied = applied_wrenches(kinematics)
-    slides = slide_accelerations(kinematics, rates, a)
+    applied = resolved.applied
+    slides = slide_accelerations(kinematics, resolved.rates, a)
+    afloat = falling(blocks)
     for k, link in enumerate(links):
-        rate, omega = rates[k], kinematics.twists[k][0]
-        above, base = still, (still, (still, still, still), lifted)
+        rate, omega = resolved.rates[k], twists[k][0]
+        above, base = still, (still, (still, still, still), still if k in afloat else lifted)
         if link.parent != GROUND:
-            above, base = kinematics.twists[link.parent][0], motions[link.parent]
+            above, base = twists[link.parent][0], motions[link.parent]
         relative = vec.add(rate.slide_rate, slides[k])
         coriolis = vec.scale(two, vec.cross(above, rate.slide))
         linear = link.down(vec.add(vec.add(base[2], vec.times(base[1], link.position)), vec.add(relative, coriolis)))
@@ -111,7 +145,7 @@ def _sweep(
         push = vec.add(vec.scale(inertia.mass, linear), vec.times(turning, inertia.moment))
         turn = vec.add(_moment(inertia.inertia, omega, alpha, turning), vec.cross(inertia.moment, linear))
         wrenches.append((vec.sub(turn, applied[k][0]), vec.sub(push, applied[k][1])))
-    result = [-f for f in coordinate_forces(kinematics)]
+    result = [-f for f in turn_forces(blocks, coordinate_forces(kinematics))]
     for k in reversed(range(len(links))):
         link = links[k]
         for c, column in enumerate(link.columns):
@@ -121,16 +155,16 @@ def _sweep(
     return tuple(result)
 
 
-def _composite_mass_matrix(kinematics: Kinematics, inertias: list[SpatialInertia]) -> tuple[tuple[Expr, ...], ...]:
+def _composite_mass_matrix(resolved: Resolved, inertias: list[SpatialInertia]) -> Rows:
     """M_ij = s_i . I^c_max(i,j) s_j along each branch, composite inertias summed inwards."""
-    graph, links, n = kinematics.graph, kinematics.links, len(kinematics.v)
+    links, n = resolved.links, sum(len(link.columns) for link in resolved.links)
     composite = list(inertias)
+    graph = links[0].mass.graph
     rows = [[graph.zero] * n for _ in range(n)]
     for k in reversed(range(len(links))):
         link = links[k]
         if link.parent != GROUND:
-            part = composite[k].turned(link.joint_rotation).turned(link.turn).shifted(link.position)
-            composite[link.parent] = composite[link.parent].plus(part)
+            composite[link.parent] = composite[link.parent].plus(link.up_inertia(composite[k]))
         for c, column in enumerate(link.columns):
             i = link.first + c
             wrench = composite[k].times(*column)

@@ -9,6 +9,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
+from ..kinematics.turned import Turned
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -25,8 +26,9 @@ class LinearSystem:
     right : r
     relaxed : (row, column) of constraint equations and their reactions.  Where constraints are redundant, K is
         singular; solvers subtract a small number there and refine the result until K z = r holds.
-    sizes : per place in ``relaxed`` the typical size of the constraint, of parameters only.  Entries of a redundant
-        equation may be nothing but rounding, so that these equations are not scaled by the size of their entries.
+    sizes : of each equation, then of each unknown, its unit made of a length, a mass and 1 s, of parameters only: what
+        K is balanced from, so that results do not depend on units.  Entries of a redundant equation may be nothing but
+        rounding, so that those of constraints are not scaled by the size of their entries at all.
     accelerations : (n_v,) a in terms of z and the state
     """
 
@@ -77,6 +79,7 @@ class TreeEquations:
     pivots : (n_v,) with ``accelerations``: all positive exactly where M is positive definite
     system : the linear system that the method solves for its accelerations; None where M and h are enough
     canonical : (2 n_v,) of a method in canonical variables: p = dT/dv, then -dH/dq + Q; else empty
+    turned : the same system in velocities in which it is shorter, where there are free joints; else None
     """
 
     def __init__(
@@ -91,6 +94,7 @@ class TreeEquations:
         pivots: tuple[Expr, ...] = (),
         system: LinearSystem | None = None,
         canonical: tuple[Expr, ...] = (),
+        turned: Turned | None = None,
     ) -> None:
         self.method = method
         self._mass_matrix = mass_matrix
@@ -102,6 +106,7 @@ class TreeEquations:
         self.pivots = pivots
         self.system = system
         self.canonical = canonical
+        self.turned = turned
 
     @property
     def mass_matrix(self) -> Rows:

@@ -14,6 +14,7 @@ from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics, Twist
 from ..kinematics.inertia import Wrench
+from ..kinematics.units import Units
 from .equations import LinearSystem, TreeEquations, linear_system
 from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
 
@@ -69,33 +70,38 @@ def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
 
 
 class Unknowns:
-    """Symbols z[0], z[1], ..., handed out in order."""
+    """Symbols z[0], z[1], ..., handed out in order, and their sizes."""
 
     def __init__(self, kinematics: Kinematics) -> None:
         self.graph = kinematics.graph
         self.symbols: list[Expr] = []
+        self.sizes: list[Expr] = []
 
-    def take(self, count: int) -> list[Expr]:
-        """The next symbols."""
+    def take(self, sizes: Sequence[Expr]) -> list[Expr]:
+        """The next symbols, one of each size."""
         first = len(self.symbols)
-        self.symbols += [self.graph.symbol(f"z[{first + k}]") for k in range(count)]
+        self.symbols += [self.graph.symbol(f"z[{first + k}]") for k in range(len(sizes))]
+        self.sizes += sizes
         return self.symbols[first:]
 
-    def six(self) -> Twist:
+    def six(self, sizes: Sequence[Expr]) -> Twist:
         """The next six, as a twist or wrench."""
-        x = self.take(6)
+        x = self.take(sizes)
         return (x[0], x[1], x[2]), (x[3], x[4], x[5])
 
 
 class Forces:
     """Multipliers of cut joints and couplings, their equations, and what they do to bodies and joints."""
 
-    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns) -> None:
+    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns, units: Units) -> None:
         self.bodies, self.cuts, self.unknowns = bodies, cuts, unknowns
         self.first = len(unknowns.symbols)
-        self.multipliers = [unknowns.take(cut.closing) for cut in cuts]
         self.rows = bodies.couplings
-        self.along = unknowns.take(len(self.rows))
+        kinds = [[units.of(kind) for kind in cut.kinds] for cut in cuts]
+        coupled = [units.of(bodies.kinematics.constraints.kinds[i]) for i in self.rows]
+        self.sizes = [*(size for sizes in kinds for size in sizes), *coupled]  #: of the constraints
+        self.multipliers = [unknowns.take([units.energy / size for size in sizes]) for sizes in kinds]
+        self.along = unknowns.take([units.energy / size for size in coupled])
         constraints = bodies.kinematics.constraints
         self.pulls = [bodies.graph.zero] * len(bodies.kinematics.v)  # C_q^T l of the couplings
         for i, l in zip(self.rows, self.along, strict=True):
@@ -116,11 +122,10 @@ class Forces:
             residuals.append(total)
         return residuals
 
-    def solve(self, residuals: Sequence[Expr], closing: Sequence[Expr], a: Sequence[Expr]) -> LinearSystem:
+    def solve(
+        self, residuals: Sequence[Expr], sizes: Sequence[Expr], closing: Sequence[Expr], a: Sequence[Expr]
+    ) -> LinearSystem:
         """The system of all equations, the constraints last."""
         relaxed = [(len(residuals) + k, self.first + k) for k in range(len(closing))]
-        kinematics = self.bodies.kinematics
-        kinds = [kind for cut in self.cuts for kind in cut.kinds]
-        kinds += [kinematics.constraints.kinds[i] for i in self.rows]
-        sizes = [kinematics.length_scale if kind == "length" else self.bodies.graph.one for kind in kinds]
+        sizes = [*sizes, *self.sizes, *self.unknowns.sizes]
         return linear_system([*residuals, *closing], self.unknowns.symbols, relaxed, sizes, a)

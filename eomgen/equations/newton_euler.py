@@ -10,6 +10,7 @@ from __future__ import annotations
 from ..graph.core import Expr
 from ..graph.symmetric import solve_symmetric
 from ..kinematics import Kinematics
+from ..kinematics.units import Units
 from .equations import LinearSystem, TreeEquations
 from .free_bodies import FreeBodies, add, cut_joints, dot, scaled, sub
 from .free_body_system import Forces, Unknowns, free_body_equations
@@ -21,8 +22,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
 
 
 def _system(kinematics: Kinematics) -> LinearSystem:
-    bodies, unknowns = FreeBodies(kinematics), Unknowns(kinematics)
-    pairs = [(unknowns.six(), unknowns.six()) for _ in kinematics.links]
+    bodies, unknowns, units = FreeBodies(kinematics), Unknowns(kinematics), Units(kinematics)
+    pairs = [(unknowns.six(units.motion), unknowns.six(units.wrench)) for _ in kinematics.links]
     motions, reactions = [m for m, _ in pairs], [f for _, f in pairs]
     relative = [bodies.relative(k, motions) for k in range(len(pairs))]
     a: list[Expr] = []
@@ -30,9 +31,10 @@ def _system(kinematics: Kinematics) -> LinearSystem:
         gram = [[dot(x, y) for y in link.columns] for x in link.columns]
         a += solve_symmetric(gram, [dot(column, motion) for column in link.columns])
     cuts = cut_joints(bodies)
-    forces = Forces(bodies, cuts, unknowns)
+    forces = Forces(bodies, cuts, unknowns, units)
     pulls = forces.pulls
     residuals: list[Expr] = []
+    sizes: list[Expr] = []
     balances = bodies.balances(motions, reactions)
     closing = forces.close(balances, motions, a)
     for k, (link, balance) in enumerate(zip(kinematics.links, balances, strict=True)):
@@ -40,7 +42,10 @@ def _system(kinematics: Kinematics) -> LinearSystem:
         joint = relative[k]
         for c, column in enumerate(link.columns):
             joint = sub(joint, scaled(a[link.first + c], column))
-        for column, power in zip(link.columns, bodies.powers(k, reactions[k], a, pulls), strict=True):
-            joint = add(joint, scaled(power, column))
+        for c, power in enumerate(bodies.powers(k, reactions[k], a, pulls)):
+            column = link.columns[c]
+            size = units.of(kinematics.velocity_kinds[link.first + c])
+            joint = add(joint, scaled(power * (size * size / units.energy), column))  # in the unit of accelerations
         residuals += [*joint[0], *joint[1], *balance[0], *balance[1]]
-    return forces.solve(residuals, closing, a)
+        sizes += [*units.motion, *units.wrench]
+    return forces.solve(residuals, sizes, closing, a)

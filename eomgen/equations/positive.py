@@ -11,6 +11,7 @@ from ..kinematics.mobility import ConstraintFunctions, Mobility
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
 from .equations import TreeEquations
+from .idle import IdleMotion
 
 LEAST = 1e-12  #: smallest eigenvalue of the mass matrix with its diagonal scaled to 1
 
@@ -46,7 +47,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
     mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
     scales = functions.scales.q
     independent = [names.index(name) for name in mobility.independent]
-    worst: tuple[float, np.ndarray] | None = None
+    worst: tuple[float, np.ndarray, IdleMotion | None] | None = None
     for sample in mobility.samples:
         q = np.array(sample)
         M = np.array(mass([*sample, *numbers.values(), 0.0]), dtype=float).reshape(n, n) * np.outer(scales, scales)
@@ -62,11 +63,18 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
             return
         if worst is None:  # the reference is what the message speaks of
             unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), 1e-300))
-            motion = np.abs(B @ (modes[:, 0] * unit / unit.max()))
-            worst = float(sizes[0]), motion
+            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=1e-300))
+            motion = B @ (modes[:, 0] * unit / unit.max())
+            idle = None
+            if not alone.size:
+                what = "negative inertia" if sizes[0] < -LEAST else "no inertia"
+                idle = IdleMotion(q, motion * scales, what, numbers)
+            worst = float(sizes[0]), np.abs(motion), idle
     if worst is None:
         raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
-    size, motion = worst
+    size, motion, idle = worst
+    if idle is not None:
+        raise ModelError([idle.problem(kinematics)])
     problems = []
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():

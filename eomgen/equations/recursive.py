@@ -22,6 +22,7 @@ from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, r
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
+from ..kinematics.turned import Block, falling, turn_back, turn_forces, turn_links
 from .equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
@@ -110,7 +111,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         inertias, loads, inverse = grouped, lighter, shorter
     rest = tuple(kinematics.graph.zero for _ in a)
     tree = not kinematics.constraints.labels and not drives_cut_joint(kinematics)
-    accelerations, pivots = _articulated(kinematics, inertias, products, loads) if tree else (None, ())
+    accelerations, pivots = _articulated(*turn_links(kinematics), inertias, products, loads) if tree else (None, ())
     return TreeEquations(
         method="recursive",
         mass_matrix=lambda: _mass_matrix(kinematics, inverse),
@@ -209,14 +210,19 @@ def _newton_euler(
 
 
 def _articulated(
-    kinematics: Kinematics, inertias: list[SpatialInertia], products: list[Twist], loads: list[Wrench]
+    kinematics: Kinematics,
+    blocks: Sequence[Block],
+    inertias: list[SpatialInertia],
+    products: list[Twist],
+    loads: list[Wrench],
 ) -> tuple[tuple[Expr, ...], tuple[Expr, ...]]:
-    """v' and the pivots D (Featherstone, RBDA, table 7.1)."""
+    """v' and the pivots D (Featherstone, RBDA, table 7.1), found in velocities of which some are turned."""
     graph, links = kinematics.graph, kinematics.links
     still = vec.zero(graph)
     bodies = [Articulated(i.inertia, skew(i.moment), _uniform(i.mass)) for i in inertias]
     wrenches = list(loads)
-    forces = coordinate_forces(kinematics)
+    forces = turn_forces(blocks, coordinate_forces(kinematics))
+    afloat = falling(blocks)
     drives = drive_inertias(kinematics)
     releases: list[list[Release]] = [[] for _ in links]
     for k in reversed(range(len(links))):
@@ -238,14 +244,15 @@ def _articulated(
     accelerations = [graph.zero] * len(kinematics.v)
     pivots = [graph.zero] * len(kinematics.v)
     for k, link in enumerate(links):
-        above = motions[link.parent] if link.parent != GROUND else (still, _base(kinematics)[1])
+        lifted = still if k in afloat else _base(kinematics)[1]
+        above = motions[link.parent] if link.parent != GROUND else (still, lifted)
         motion = _add(_carried(link, above), products[k])
         for release in reversed(releases[k]):
             rate = (release.force - _dot(release.wrench, motion)) * release.reciprocal
             accelerations[release.index], pivots[release.index] = rate, release.pivot
             motion = _add(motion, _scaled(rate, release.column))
         motions.append(motion)
-    return tuple(accelerations), tuple(pivots)
+    return tuple(turn_back(blocks, accelerations)), tuple(pivots)
 
 
 def _uniform(mass: Expr) -> Mat3:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -31,9 +32,9 @@ class Guide(Joint):
     has_axis: ClassVar[bool] = False
 
     @property
+    @abstractmethod
     def shape(self) -> Shape:
         """The point r and its parameters."""
-        raise NotImplementedError
 
     def turn(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, list[Vec3]]:
         """Rotation of S in P and the columns of its angular velocity for the coordinates behind the parameters."""

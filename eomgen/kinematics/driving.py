@@ -170,6 +170,7 @@ def _contradiction(
     functions.set_time(t)
     C = functions.position(q)[0]
     functions.set_time(0.0)
+    deaf = [row for row in spare if not _felt(functions, drivers, row, q)]
     others = [name for row, name in drivers.items() if row not in spare]
     freedoms = len(others)
     problems = []
@@ -177,13 +178,40 @@ def _contradiction(
         gap = f"{abs(C[row]):.3g} {_unit(functions, row)} at t = {t:.4g} s"
         verb = "moves" if freedoms == 1 else "move"
         who = f"{' and '.join(others)} {verb} it already" if others else "it cannot move"
+        if row in deaf:
+            problems.append(
+                mechanism.problem(
+                    f"constraints.{drivers[row]}",
+                    "the driver cannot act: no motion of the mechanism changes what it prescribes, "
+                    f"and it is off by {gap}",
+                    "drive a coordinate or markers that move against each other (not twice the same point or body)",
+                )
+            )
+            continue
         message = (
             f"the mechanism is over-driven: it has {freedoms} degree{'s' if freedoms != 1 else ''} of freedom and "
-            f"{len(drivers)} drivers; {who}, and {drivers[row]} is off by {gap}"
+            f"{len(drivers)} driver{'s' if len(drivers) != 1 else ''}; {who}, and {drivers[row]} is off by {gap}"
         )
         remedy = f"remove one of {', '.join(drivers.values())}, or give them values that agree"
         problems.append(mechanism.problem(f"constraints.{drivers[row]}", message, remedy))
     return ModelError(problems)
+
+
+def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, q: Array) -> bool:
+    """Whether a motion that the loops allow changes what a driver prescribes: here, or beside a dead centre."""
+    loops = _others(functions, list(drivers))
+    free = functions.with_rows(loops)
+    random = np.random.default_rng(1)
+    for moved in (0.0, 0.1, 0.3, 0.3):
+        step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
+        try:
+            here = free.close({}, _guess(functions, functions.scales.move(q, step)), restarts=0).q if moved else q
+        except AssemblyError:
+            continue
+        J = functions.scaled_jacobian(here)
+        if rank(J[[*loops, row]]).rank > rank(J[loops]).rank:
+            return True
+    return False
 
 
 def _unit(functions: ConstraintFunctions, row: int) -> str:

@@ -17,6 +17,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from ..joints.rods import Distance, RevoluteSpherical
 from .couplings import couple
+from .flaws import find_flaws
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
@@ -262,7 +263,7 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Seq
     ------
     ModelError
     """
-    problems = []
+    problems = find_flaws(mechanism, motion)
     for force in mechanism.forces:
         used = symbols_of(_expressions(force))
         path = getattr(force, "path", None)

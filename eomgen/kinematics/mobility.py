@@ -28,6 +28,7 @@ from ..numeric.scales import Space
 from ..numeric.space import settle
 from .candidates import rate_candidates
 from .driving import close_driven, follow_drivers
+from .flaws import require_finite
 from .kinematics import Kinematics
 from .row_scales import row_scales
 
@@ -255,6 +256,7 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
     positions = {n: x for n, x in given.items() if n in known}
     found = close_driven(functions, positions, guess)
+    require_finite(functions, found.q)
     later = follow_drivers(functions, found.q)
     judged = _partition(functions, [found.q, *_probe(functions, found.q), *later], wanted)
     return replace(judged, residual=found.residual, restarts=found.restarts)
@@ -338,17 +340,14 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     n = len(names)
     q = configurations[0]
     jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
-    if not np.isfinite(jacobians[0]).all():
-        place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(kinematics.names, q, strict=True))
-        raise AssemblyError(f"the constraints are not finite at the initial configuration {place}; give another one")
+    require_finite(functions, q)
     jacobians = [J for J in jacobians if np.isfinite(J).all()]
     ranks = tuple(rank(J).rank for J in jacobians)
     r = max(ranks)
     n_dof = n - r
     if len(wanted) > n_dof:
-        message = (
-            f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {n_dof} degrees of freedom"
-        )
+        has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"
+        message = f"{len(wanted)} coordinates chosen ({', '.join(wanted)}), the mechanism has {has}"
         raise ModelError(
             [kinematics.mechanism.problem("independent", message, f"choose {n_dof} of {', '.join(names)}")]
         )

@@ -19,11 +19,17 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
             "take a constraint away, or free a joint"
         )
     if mobility.redundant and not mobility.assumed:
-        joints = _few([*dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)])
+        owners = [*dict.fromkeys(label.partition(".")[0] for label in mobility.redundant)]
+        elements = {constraint.name for constraint in kinematics.mechanism.constraints}
+        remedies = []
+        if joints := [name for name in owners if name not in elements]:
+            remedies.append(f"give {_few(joints)} more freedom (a cylindrical or spherical joint)")
+        if spare := [name for name in owners if name in elements]:
+            remedies.append(f"leave {_few(spare)} out")
         notes.append(
             f"overconstrained: {_few(mobility.redundant)} follow{'s' if len(mobility.redundant) == 1 else ''} from the "
             f"other constraints; motion is not affected, reactions there are not unique; "
-            f"give {joints} more freedom (a cylindrical or spherical joint) if they matter"
+            f"{' and '.join(remedies)} if they matter"
         )
     if mobility.instantaneous > mobility.n_dof and not mobility.assumed:
         notes.append(

@@ -143,7 +143,8 @@ class MechanismReport:
         if len(self.candidates) > len(self.independent):
             say("can be independent", _list([f"{name} {value:.2g}" for name, value in self.candidates.items()]))
         if self.loop_joints and not self.assumed:
-            away = f"after {self.assembly_restarts} restarts: one of several ways to close it; a guess says which"
+            tries = f"{self.assembly_restarts} restart{'s' * (self.assembly_restarts != 1)}"
+            away = f"after {tries}: one of several ways to close it; a guess says which"
             say("assembled", away if self.assembly_restarts else "on the branch next to the initial values and guess")
         if self.assumed:
             lines.append("  some parameters have no value: the rank was judged with made-up ones")

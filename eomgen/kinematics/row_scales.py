@@ -1,14 +1,15 @@
 """Stage kinematics: constraint rows -> the typical size of each one's residual.
 
 A gap of a joint or contact changes by about as much as the coordinates that make it: its size is that of its kind, the
-length scale of the mechanism or 1.  A relation written by a user may be multiplied by anything, areas in m^2 or numbers
-of teeth; its size is the length of its scaled gradient, so that a factor does not matter (row equilibration: A. van der
-Sluis, Numerische Mathematik 14, 1969).  Factors that are parameters stay symbols.
+length scale of the mechanism or 1.  That of a loop far smaller than the mechanism, a thousandth or less, is the length
+of its own scaled gradient, or its rows would be lost beside the others.  A relation written by a user may be multiplied
+by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
+matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  Factors that are parameters stay symbols.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..graph.substitute import substitute, symbols_of
 from .kinematics import Kinematics
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
+SMALL = 1e-3  #: a gap whose gradient is below this part of its kind's size is of a loop that small
 LEAST = 1e-3  #: gradients at the initial values that are this part of those beside them vanish there by chance
 TINY = 1e-150  #: stands for the size of a row whose factors are all 0
 
@@ -28,10 +30,12 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     sizes = {"length": kinematics.length_scale, "angle": graph.one}
     found = [sizes[kind] for kind in c.kinds]
     places: list[dict[Expr, Expr]] | None = None
+    gaps: dict[int, list[Expr]] = {}
     for i, row in enumerate(c.jacobian):
-        if not c.written[i]:
-            continue
         gradient = [x * sizes[kind] for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if not x.is_zero]
+        if not c.written[i]:
+            gaps |= {i: gradient} if c.kinds[i] == "length" and gradient else {}
+            continue
         if _is_plain([x / found[i] for x in gradient]):
             continue
         if not _moves(kinematics, row):
@@ -42,7 +46,26 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         values = [x if np.isfinite(x) and x > TINY else 0.0 for x in _values(kinematics, there)]
         if max(values) > 0.0:
             found[i] = there[0] if values[0] >= LEAST * values[1] else there[1]
+    if gaps:
+        for i, size in _small_gaps(kinematics, gaps, places or _places(kinematics)).items():
+            found[i] = size
     return tuple(found)
+
+
+def _small_gaps(
+    kinematics: Kinematics, gaps: Mapping[int, list[Expr]], places: Sequence[dict[Expr, Expr]]
+) -> dict[int, Expr]:
+    """The own sizes of the rows, with their gradients, that are far below the size of their kind."""
+    every = [x for gradient in gaps.values() for x in gradient]
+    there = [iter(substitute(every, place)) for place in places]
+    sizes = [_length([next(values) for _ in gradient]) for gradient in gaps.values() for values in there]
+    *numbers, usual = (x if np.isfinite(x) else np.inf for x in _values(kinematics, [*sizes, kinematics.length_scale]))
+    found = {}
+    for k, i in enumerate(gaps):
+        first, second = numbers[2 * k : 2 * k + 2]
+        if TINY < max(first, second) < SMALL * usual:
+            found[i] = sizes[2 * k + (first < LEAST * second)]
+    return found
 
 
 def coefficient_rows(kinematics: Kinematics) -> tuple[int, ...]:

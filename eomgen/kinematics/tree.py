@@ -49,6 +49,10 @@ class Link:
         """Link axes to parent link axes."""
         return vec.times(self.turn, vec.times(self.joint_rotation, x))
 
+    def up_inertia(self, inertia: SpatialInertia) -> SpatialInertia:
+        """Inertia of the link, about the parent's origin in parent link axes."""
+        return inertia.turned(self.joint_rotation).turned(self.turn).shifted(self.position)
+
     def down_twist(self, twist: Twist) -> Twist:
         """A twist of the parent, seen in this link's frame."""
         angular, linear = twist

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .gram import TIKHONOV
 from .projection import ACCEPTED, SETTLED, largest, within
 from .scales import Array, Position, Scales
 
-TIKHONOV = 1e-12  #: relative to the largest diagonal entry of J J^T
 EXACT = 1e-14  #: scaled residual at which to stop at once
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first

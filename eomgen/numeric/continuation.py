@@ -87,7 +87,11 @@ def follow(
         else:
             step *= 0.5
             if step < SMALLEST * usual:
-                raise AssemblyError(f"the way is blocked after {100 * done:.0f} % of it")
+                raise AssemblyError(
+                    f"the way is blocked after {100 * done:.0f} % of it: there the loops stay open by "
+                    f"{residual:.2g} (scaled), or the mechanism jumps, as at a dead centre of what is led; "
+                    "lead another coordinate, or give a position on the other side"
+                )
     return q
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import NonFiniteError, SingularMassMatrixError
 from .definite import safely_positive
 from .partitions import Partition, partition
-from .projection import minimum_norm, project, tangent_projector
+from .projection import largest, minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
 
 
@@ -78,10 +78,12 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     return Embedded(scaled, matrix, factor, split)
 
 
-def accelerate(terms: Terms, scales: Scales, system: Embedded) -> Array:
-    """Accelerations a (n,) at a state on the manifold."""
+def accelerate(terms: Terms, v: Array, scales: Scales, system: Embedded) -> Array:
+    """Accelerations a (n,) at a state on the manifold with velocities v (n,)."""
     s = scales.q
-    a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales)[:, 0] / s if len(terms.gamma) else np.zeros(len(s))
+    a_p = np.zeros(len(s))
+    if len(terms.gamma):
+        a_p = minimum_norm(terms.C_q, -terms.gamma[:, None], scales, largest(v / s) ** 2, 2)[:, 0] / s
     a = s * (a_p - system.solve(s * terms.h + system.M @ a_p))
     if not np.isfinite(a).all():
         raise NonFiniteError("the accelerations are not finite")
@@ -105,7 +107,7 @@ def rhs(
     return np.concatenate(
         [
             scales.rates(q, v) if given is None else given.rates(q, v),
-            accelerate(here, scales, embed(here.M, here.C_q, scales, rank, independent)),
+            accelerate(here, v, scales, embed(here.M, here.C_q, scales, rank, independent)),
         ]
     )
 
@@ -146,7 +148,7 @@ def jacobian(
     here = terms(q, v)
     system = embed(here.M, here.C_q, scales, rank, independent)
     split = system.split
-    a = accelerate(here, scales, system)
+    a = accelerate(here, v, scales, system)
     multipliers = np.zeros(len(here.gamma))
     # dependent rows of C_q^T l = -(M a + h); redundant rows carry nothing
     multipliers[split.rows] = split.multipliers(-s * (here.M @ a + here.h)) / scales.c[split.rows]

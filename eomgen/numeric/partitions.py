@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import PartitionError
+from .rank_limits import CHOSEN as STRICT
+from .rank_limits import STATE as RANK
 from .scales import Array, Indices
 
 PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best
-RANK = 1e-10  #: smallest pivot, relative to the largest entry of J
-STRICT = 1e-8  #: the same when the set of independent coordinates is fixed
 
 
 class Partition(NamedTuple):
@@ -84,7 +84,8 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
                 row, column, best = row_any, column_any, best_any
         if not best > (STRICT if strict else RANK) * size:
             raise PartitionError(
-                "the chosen independent coordinates cannot move the mechanism here"
+                "the chosen independent coordinates cannot move the mechanism here (a dead centre of theirs): "
+                f"{step} of {rank} others follow from them; choose other independent coordinates"
                 if strict
                 else f"the constraints have rank {step} here and {rank} elsewhere"
             )

@@ -2,24 +2,23 @@
 
 The correction is the minimum-norm Newton step ``-J^T (J J^T)^-1 e`` in scaled coordinates.  It does not depend on any
 partition of the coordinates, so a partition that goes bad at a dead centre costs no digits.  A relative Tikhonov term
-in ``J J^T`` carries redundant rows and configurations where the rank drops.  In position steps it is as large as the
-mean scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of the size of the
-distance, whose Newton step would run along the motion.  It vanishes on convergence, which stays quadratic.
+in ``J J^T`` carries redundant rows and configurations where the rank drops; see :mod:`.gram`.  In position steps it is
+as large as the mean scaled residual: rows that depend on each other on the manifold only gain a false rank off it, of
+the size of the distance, whose Newton step would run along the motion.  Near convergence, where steps are far shorter
+than the distance to lost rank, it goes below the weakest row that something is left of.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
+from .gram import EXACT, GENTLE, gram_solver, least, smaller, weakness
 from .scales import Array, GivenRates, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
-TIKHONOV = 1e-8  #: relative to the largest diagonal entry of J J^T
-PASSES = 5  #: of linear corrections, so that the Tikhonov term leaves no trace
-EXACT = 1e-15  #: scaled residual at which to stop
+HINDERED = 0.1  #: part of the scaled residual that a step may leave because of the Tikhonov term
+NEAR = 0.01  #: residuals below this part of the square of a singular value are steps far shorter than it
 SHORT = 1e-8  #: scaled Newton step whose square is nothing
 SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
 ACCEPTED = 1e-10  #: largest scaled residual of a projected state
@@ -34,18 +33,6 @@ def largest(values: Array) -> float:
 def within(e: Array, limit: float, rounded: Array) -> bool:
     """Whether each scaled residual (m,) is at most the limit, or what rounding leaves of it (m,)."""
     return bool((np.abs(e) <= np.maximum(limit, rounded)).all())
-
-
-def gram_solver(J: Array, relative: float = TIKHONOV) -> Callable[[Array], Array]:
-    """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k)."""
-    G = J @ J.T
-    size = G.diagonal().max()
-    G.flat[:: len(G) + 1] += relative * size
-    try:
-        L = np.linalg.cholesky(G)
-    except np.linalg.LinAlgError:
-        raise ProjectionError("the constraint Jacobian vanishes, so no correction is defined") from None
-    return lambda e: np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
 
 
 def correct_position(
@@ -90,7 +77,12 @@ def correct_position(
             return q, C_q
         if step == STEPS:
             break
-        dz = J.T @ gram_solver(J, max(TIKHONOV, float(np.abs(e).mean())))(e)
+        z = gram_solver(J, max(GENTLE, float(np.abs(e).mean())))(e)
+        dz = J.T @ z
+        if largest(e - J @ dz) > HINDERED * size and not within(e, EXACT, 0.0625 * rounded):
+            weak = weakness(J, z)
+            if size < NEAR * weak:
+                dz = J.T @ gram_solver(J, smaller(weak))(e)
         longest = largest(dz)
         # one step at least: near configurations where rows depend on each other a small residual is no small distance
         last = longest <= SHORT and largest(e - J @ dz) <= EXACT
@@ -105,11 +97,8 @@ def correct_position(
 
 def correct_velocity(C_q: Array, C_t: Array, v: Array, scales: Scales) -> Array:
     """The nearest v (n,) with C_q v + C_t = 0."""
-    J = scales.jacobian(C_q)
-    solve = gram_solver(J)
-    for _ in range(PASSES):
-        v = v - scales.q * (J.T @ solve(scales.residual(C_q @ v + C_t)))
-    return v
+    x, y = v / scales.q, -scales.residual(C_t)
+    return np.asarray(scales.q * least(scales.jacobian(C_q), y, x, max(largest(x), largest(y))))
 
 
 def project(
@@ -146,18 +135,15 @@ def project(
     return q, correct_velocity(C_q, rate(q), v, scales)
 
 
-def minimum_norm(C_q: Array, y: Array, scales: Scales) -> Array:
+def minimum_norm(C_q: Array, y: Array, scales: Scales, noise: float | None = None, order: int = 1) -> Array:
     """The smallest scaled x (n, k) with C_q x = y (m, k); y must be consistent, as rates of redundant rows are.
 
     Never form the pseudo-inverse by y = I: with redundant rows its parts outside the range are 1e12 times as large as
-    the result, and leave four digits of it.
+    the result, and leave four digits of it.  Noise and order are those of :func:`~.gram.least`.
     """
-    J = scales.jacobian(C_q)
     z = y / scales.c[: len(y), None]
-    solve = gram_solver(J)
-    x = J.T @ solve(z)
-    for _ in range(PASSES - 1):
-        x += J.T @ solve(z - J @ x)
+    x = np.zeros((C_q.shape[1], y.shape[1]))
+    x = least(scales.jacobian(C_q), z, x, largest(z) if noise is None else noise, order)
     return np.asarray(scales.q[:, None] * x)
 
 

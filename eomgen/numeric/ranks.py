@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .partitions import PREFERENCE
+from .rank_limits import STRUCTURE as TOLERANCE
 from .scales import Array, Indices
 
-TOLERANCE = 1e-8  #: a singular value below this part of the largest counts as zero
 ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one
 
 

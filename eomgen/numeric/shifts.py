@@ -52,7 +52,7 @@ def shift_jacobian(
     here = terms(q, v)
     system = embed(here.M, here.C_q, scales, rank, independent)
     split = system.split
-    a = accelerate(here, scales, system)
+    a = accelerate(here, v, scales, system)
     multipliers = np.zeros(len(here.gamma))
     multipliers[split.rows] = split.multipliers(-s * (here.M @ a + here.h)) / scales.c[split.rows]
     shift = shifts(q, v, a, multipliers)

@@ -2,8 +2,9 @@
 
 Where constraints are redundant, K is singular and their reactions are not determined, though accelerations are.  The
 proximal point method then finds the reactions of least size: K less a small number at the places of the constraints is
-factored once, and its steps repeated until K z = r holds (R. T. Rockafellar, Monotone operators and the proximal point
-algorithm, SIAM J. Control Optim. 14 (1976), 877-898).  The same steps refine away rounding.
+solved for, again and again until K z = r holds (R. T. Rockafellar, Monotone operators and the proximal point
+algorithm, SIAM J. Control Optim. 14 (1976), 877-898).  The same steps refine away rounding; what is left at the end is
+held against it.
 """
 
 from __future__ import annotations
@@ -13,12 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NonFiniteError, SingularMassMatrixError
-from .scales import Array
+from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
+from .scales import Array, Indices
 
 RELAXATION = 1e-10  #: subtracted from the balanced K at the places of constraints
-PIVOT = 1e-14  #: the balanced, relaxed K counts as singular where its inverse has an entry above 1 / PIVOT
+PIVOT = 1e-14  #: the balanced, relaxed K counts as singular where it answers more than 1 / PIVOT times what is asked
 STEPS = 30
+BALANCES = 40  #: of rows and columns in turn, at most
+BALANCED = 2.0  #: a largest entry up to this factor from 1 is balanced
+LEFT = 1e-11  #: most that may be left of an equation, relative to the sum of its terms
+ROUNDED = 1e-14  #: the same relative to the largest sum of terms of any equation (balanced)
+FAINT = 1e-15  #: the same of constraints, over the square of the singular value of weak ones: see :mod:`.gram`
+WEAKEST = 1e-13  #: such a square, at least
 
 
 class Pattern:
@@ -36,18 +43,18 @@ class Pattern:
         relaxed = np.array(described["relaxed"], dtype=np.intp).reshape(-1, 2)
         self.relaxed = relaxed[:, 0], relaxed[:, 1]
 
-    def factor(self, entries: Array, sizes: Array) -> Factored:
-        """Balance and invert K.
+    def balance(self, entries: Array, sizes: Array) -> Balanced:
+        """Scale K.
 
-        Rows and columns are scaled until their largest entries are about 1; those of constraints by one common factor
-        beside their sizes, since a redundant constraint may have no entries but rounding.
+        From the units of rows and columns, until their largest entries are about 1; those of constraints by one common
+        factor beside their units, since a redundant constraint may have no entries but rounding.
 
         Parameters
         ----------
         entries : array
             At the places of the pattern.
-        sizes : array
-            Typical sizes of the constraints, one per relaxed place.
+        sizes : (2 n,) array
+            Units of the equations, then of the unknowns.
 
         Raises
         ------
@@ -57,43 +64,68 @@ class Pattern:
         K[self.places] = entries
         if not np.isfinite(K).all():
             raise NonFiniteError("the equations of motion are not finite")
-        scales = np.ones(self.size), np.ones(self.size)
-        for scale, constraints in zip(scales, self.relaxed, strict=True):
-            scale[constraints] /= sizes
-        row, column = scales
-        for k in range(8):  # D. Ruiz, RAL-TR-2001-034
-            largest = np.abs(row[:, None] * K * column).max(axis=1 - k % 2)
+        row, column = 1.0 / sizes[: self.size], np.array(sizes[self.size :])
+        balanced, calm = row[:, None] * K * column, 0
+        for k in range(BALANCES):  # D. Ruiz, RAL-TR-2001-034
+            largest = np.abs(balanced).max(axis=1 - k % 2)
             constraints = self.relaxed[k % 2]
             largest[constraints] = largest[constraints].max(initial=0.0)
-            scales[k % 2][:] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
-        balanced = row[:, None] * K * column
-        balanced[self.relaxed] -= RELAXATION
-        try:
-            inverse: Array = np.asarray(np.linalg.inv(balanced), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            inverse = np.full((1, 1), np.inf)
-        if not np.abs(inverse).max(initial=0.0) <= 1.0 / PIVOT:
+            factor = 1.0 / np.sqrt(np.where(largest > 0.0, largest, 1.0))
+            calm = calm + 1 if np.abs(np.log2(factor)).max() <= 0.5 * np.log2(BALANCED) else 0
+            (column if k % 2 else row)[:] *= factor
+            balanced = row[:, None] * K * column
+            if calm == 2:
+                break
+        relaxed = np.array(balanced)
+        relaxed[self.relaxed] -= RELAXATION
+        return Balanced(balanced, relaxed, row, column, self.relaxed[0])
+
+
+class Balanced:
+    """K with the scales of rows and columns that bring its entries to about 1, and its relaxed form.
+
+    Raises
+    ------
+    SingularMassMatrixError
+    """
+
+    def __init__(self, K: Array, relaxed: Array, row: Array, column: Array, constraints: Indices) -> None:
+        self.K, self.relaxed, self.row, self.column, self.constraints = K, relaxed, row, column, constraints
+        probe = np.cos(np.arange(1.0, len(K) + 1.0))[:, None]  # along no axis and no plane
+        answer = self._step(probe)
+        if not np.abs(answer).max(initial=0.0) <= 1.0 / PIVOT:
             raise SingularMassMatrixError("the equations of motion are singular: no inertia is behind some motion")
-        return Factored(K, inverse, row, column)
 
-
-class Factored:
-    """K with the inverse of its balanced and relaxed form."""
-
-    def __init__(self, K: Array, inverse: Array, row: Array, column: Array) -> None:
-        self.K, self.inverse, self.row, self.column = K, inverse, row, column
+    def _step(self, right: Array) -> Array:
+        try:
+            return np.asarray(np.linalg.solve(self.relaxed, right), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return np.full(right.shape, np.inf)
 
     def solve(self, r: Array) -> Array:
-        """z (n,) with K z = r (n,)."""
-        z = np.zeros(len(r))
+        """z with K z = r, both (n,) or (n, k).
+
+        Raises
+        ------
+        NonFiniteError, UnsolvedError
+        """
+        right = (self.row * r.T).T.reshape(len(r), -1)
+        z = np.zeros(right.shape)
         before = np.inf
-        for count in range(STEPS):
-            defect = self.row * (r - self.K @ z)
+        for count in range(STEPS + 1):
+            defect = right - self.K @ z
             size = float(np.abs(defect).max(initial=0.0))
             if not np.isfinite(size):
                 raise NonFiniteError("the accelerations are not finite")
-            if size == 0.0 or (count > 1 and size > 0.5 * before):
+            if size == 0.0 or count == STEPS or (count > 1 and size > 0.5 * before):
                 break
             before = size
-            z = z + self.column * (self.inverse @ defect)
-        return z
+            z = z + self._step(defect)
+        # a step leaves 1e-10 / (s^2 + 1e-10) along constraints of singular value s
+        weak = max(WEAKEST, RELAXATION * (before / size - 1.0)) if size else 1.0
+        limit = np.full((len(r), 1), LEFT)
+        limit[self.constraints] = max(LEFT, FAINT / weak)
+        terms = np.abs(right) + np.abs(self.K) @ np.abs(z)
+        if not (np.abs(defect) <= limit * terms + ROUNDED * terms.max(axis=0, initial=0.0)).all():
+            raise UnsolvedError("the equations of motion are left unsolved by rounding")
+        return np.asarray((self.column * z.T).T.reshape(r.shape))

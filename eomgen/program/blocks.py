@@ -10,10 +10,11 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from .factor import exceeding, factorize, outward, positivity, solve
+from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
+from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
@@ -44,8 +45,9 @@ class BlockMaker:
     @property
     def unrolled(self) -> bool:
         """Whether the right-hand side is straight-line code."""
-        small = self.sizes.n_v <= self.limits.unrolled
-        return not self.has_loops and self.terms.system is None and (small or self.terms.accelerations is not None)
+        if self.has_loops or self.terms.system is not None:
+            return False
+        return self.terms.accelerations is not None or is_unrolled(self.terms.parent, self.limits.unrolled)
 
     @cached_property
     def _loops(self) -> LoopBlocks | None:
@@ -66,9 +68,16 @@ class BlockMaker:
     @cached_property
     def by_direction(self) -> bool:
         """Whether the Jacobian of the residuals is too large to be written out."""
+        if not self.has_loops and self.slopes.recursive and self.slopes.operations <= self.limits.jacobian_recursive:
+            return False
         residuals = [*self._force_residual, *self._acceleration_residual, *self.terms.velocity_constraints]
         nodes = len(reachable(self.terms.graph, (r.id for r in residuals)))
         return self.sizes.n_x * nodes > self.limits.jacobian_nodes
+
+    @cached_property
+    def slopes(self) -> ResidualSlopes:
+        """The derivatives of the residuals."""
+        return ResidualSlopes(self.terms, self.limits)
 
     # -- shared expressions ---------------------------------------------------------------------------------------
     @cached_property
@@ -81,9 +90,11 @@ class BlockMaker:
             one = [terms.graph.apply("lt", zero, d) for d in pivots]
             checks = one if len(pivots) == 1 else exceeding(pivots, outward(pivots, terms.parent))
             return list(terms.accelerations), [*self._turned, *checks]
-        factor = factorize(terms.mass_matrix, terms.parent)
-        checks = positivity(terms.mass_matrix, factor, terms.coordinate_scales)
-        return solve(factor, [-h for h in terms.bias]), [*self._turned, *checks]
+        mass, bias = terms.turned.system if terms.turned else (terms.mass_matrix, terms.bias)
+        factor = factorize(mass, terms.parent)
+        checks = positivity(mass, factor, terms.coordinate_scales)
+        solution = solve(factor, [-h for h in bias])
+        return (terms.turned.accelerations(solution) if terms.turned else solution), [*self._turned, *checks]
 
     def _symbols(self, names: Sequence[str]) -> list[Expr]:
         return [self.terms.graph.symbol(name) for name in names]
@@ -203,6 +214,9 @@ class BlockMaker:
             "canonical": lambda: terms.canonical,
             "dae_residual": lambda: self._dae_residual,
             "finite_forces": lambda: terms.finite_forces,
+            "events": lambda: terms.events,
+            "resets": lambda: terms.resets,
+            "event_slopes": self._event_slopes,
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
@@ -225,6 +239,8 @@ class BlockMaker:
         elif name == "rhs" and self.unrolled:
             accelerations, checks = self._accelerations
             outputs = [*(terms.rates or self._symbols(terms.v)), *accelerations]
+        elif (found := self._unrolled_derivative(name)) is not None:
+            outputs, checks = found[0], [*self._turned, *found[1]]
         elif name == "outputs" and not self.has_loops and not self.outputs_need_accelerations:
             outputs = terms.outputs
         elif name == "outputs" and self.unrolled:
@@ -251,7 +267,9 @@ class BlockMaker:
         if shift:
             return ("scales", "position", "rate", "terms", residual, f"{shift}_shift")
         if self.terms.by_columns:
-            return ("acceleration_tangent",) if name == "jacobian" else ("mass_times",)
+            if name != "jacobian":
+                return ("mass_times",)
+            return ("acceleration_tangent",) if self.by_direction else ("terms", "scales", "residual_jacobian")
         if self.terms.system and (name in ("rhs", "outputs") or (name == "jacobian" and not self.terms.projects)):
             return self._system_needs(name, residual)
         if not self.has_loops:  # their terms are put together from two blocks, which share next to nothing
@@ -287,7 +305,8 @@ class BlockMaker:
         terms, n = self.terms, self.sizes.n_v
         match name:
             case "terms":  # M lower packed, h, C_q, gamma
-                lower = [terms.mass_matrix[i][k] for i in range(n) for k in range(i + 1)]
+                mass = self.slopes.mass_matrix if terms.by_columns else terms.mass_matrix
+                lower = [mass[i][k] for i in range(n) for k in range(i + 1)]
                 every = [*lower, *terms.bias, *flat(terms.constraint_jacobian), *terms.gamma]
                 return self._internal(name, "q v", every, self._turned)
             case "position":  # C, C_q
@@ -301,7 +320,7 @@ class BlockMaker:
                 return self._internal(name, "q v", outputs, [*self._turned, *checks])
             case "rate":  # C_t
                 return self._internal(name, "q", terms.constraint_rate)
-            case "system":  # entries of K, then r, then sizes of the constraints
+            case "system":  # entries of K, then r, then sizes of equations and of unknowns
                 assert terms.system is not None
                 system = terms.system
                 return self._internal(name, "q v", [*system.entries, *system.right, *system.sizes])
@@ -311,7 +330,7 @@ class BlockMaker:
             case "accelerated_outputs":
                 return self._internal(name, "q v a", terms.outputs)
             case "residual_jacobian":  # r1_q, r1_v, r2_q, r2_v, r3_q
-                return self._internal(name, "q v a multipliers", self._residual_jacobian())
+                return self._internal(name, "q v a multipliers", self.slopes.packed())
             case "dae_tangent":  # dF along (dy, dy')
                 return self._dae_tangent()
             case "mass_times":  # M a
@@ -345,6 +364,15 @@ class BlockMaker:
         port, names = ("du", self.terms.u) if what == "input" else ("dp", self.terms.p)
         return port, dict(zip(self._symbols(names), self._symbols(self.port(port).symbols), strict=True))
 
+    def _unrolled_derivative(self, name: str) -> tuple[list[Expr], list[Expr]] | None:
+        """A derivative of the right-hand side of a small tree, and checks of its mass matrix."""
+        if not self.unrolled or name not in ("jacobian", *SHIFTS):
+            return None
+        if name == "jacobian":
+            return unrolled_jacobian(self.terms, self.slopes)
+        names = self.terms.u if SHIFTS[name] == "input" else self.terms.p
+        return unrolled_shift(self.terms, self.slopes, names)
+
     def _derivatives(self, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
         """All derivatives of rows by symbols, row-major."""
         entries, zero = jacobian(rows, self._symbols(names)), self.terms.graph.zero
@@ -356,6 +384,9 @@ class BlockMaker:
         rows = [*terms.constraints, *terms.velocity_constraints, *held]
         return self._derivatives(rows, (*terms.q, *terms.v, *terms.u, *terms.p))
 
+    def _event_slopes(self) -> list[Expr]:
+        return self._derivatives(self.terms.events, (*self.terms.q, *self.terms.v))
+
     def _output_derivatives(self) -> list[Expr]:
         terms = self.terms
         return self._derivatives(terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
@@ -365,15 +396,3 @@ class BlockMaker:
         """q and v -> the symbols of their changes."""
         seeds = [*self.port("dq").symbols, *self.port("dv").symbols]
         return dict(zip(self._symbols((*self.terms.q, *self.terms.v)), self._symbols(seeds), strict=True))
-
-    def _residual_jacobian(self) -> list[Expr]:
-        terms, n, m, zero = self.terms, self.sizes.n_v, self.sizes.n_c, self.terms.graph.zero
-        n_q = self.sizes.n_q
-        residuals = [*self._force_residual, *self._acceleration_residual, *terms.velocity_constraints]
-        entries = jacobian(residuals, self._symbols((*terms.q, *terms.v)))
-        result = []
-        for first, size, columns in ((0, n, "qv"), (n, m, "qv"), (n + m, m, "q")):
-            for column in columns:
-                start, width = (0, n_q) if column == "q" else (n_q, n)
-                result += [entries.get((first + i, start + k), zero) for i in range(size) for k in range(width)]
-        return result

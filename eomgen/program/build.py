@@ -1,8 +1,8 @@
 """Stage program: SystemTerms -> Program: what functions to generate, hoisted, counted.
 
 Public kernels that can be are straight-line blocks; the rest are drivers that the target's own code computes from
-blocks (Newton iterations, factorisations of the embedded system).  Trees up to :attr:`Limits.unrolled` velocities have
-their right-hand side wholly on the graph.
+blocks (Newton iterations, factorisations of the embedded system).  Trees that do not exceed
+:attr:`Limits.unrolled` have their right-hand side wholly on the graph.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
+from .slopes import sparsity
 from .terms import SystemTerms
 
 #: Version of the generated functions' signatures and of the table that describes them.
 ABI = 1
+#: Kernels whose metadata tell the places of entries that are not identically zero, where they are straight-line code.
+SPARSE = ("jacobian", "input_jacobian", "parameter_jacobian", "mass_matrix", "constraint_jacobian")
 
 
 def build_program(
@@ -39,7 +42,8 @@ def build_program(
         The equations.
     metadata : dict
         JSON-able; ``name`` is the prefix of all functions.  A copy is completed with ``abi``, the sizes,
-        ``kernels`` (shapes by name) and ``operations`` (counts per block; hoisted work under ``precompute``).
+        ``kernels`` (shapes by name), ``sparsity`` (of derivatives: places, row by row, of entries that do not
+        vanish identically) and ``operations`` (counts per block; hoisted work under ``precompute``).
     kernels : sequence of str, optional
         Public kernels wanted; all by default.
     limits : Limits, optional
@@ -62,6 +66,7 @@ def build_program(
     maker = BlockMaker(terms, sizes, limits)
     has = {"kinematics": terms.has_minimal_form, "coordinate_slopes": bool(terms.coordinate_slopes)}
     has["energy"] = bool(metadata.get("energy_known", True))
+    has |= {"events": bool(terms.events), "resets": bool(terms.resets)}
     if terms.given_rates or not terms.projects:  # their derivatives by inputs and parameters are not derived
         has |= dict.fromkeys(SHIFTS, False)
     if terms.given_rates:
@@ -96,6 +101,7 @@ def build_program(
         **asdict(sizes),
         "output_accelerations": maker.outputs_need_accelerations,
         "kernels": kernel_shapes,
+        "sparsity": {b.name: sparsity(b.outputs) for b in blocks.values() if b.outputs and b.name in SPARSE},
         "operations": {key: value.as_dict() for key, value in counts.items()},
     }
     _check_symbols(terms, blocks.values())
@@ -145,6 +151,8 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_s=terms.wrenches.needed_size if terms.wrenches else 0,
         n_w=terms.wrenches.size if terms.wrenches else 0,
         n_m=len(terms.canonical) // 2,
+        n_events=len(terms.events),
+        n_resets=len(terms.resets),
         n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
 

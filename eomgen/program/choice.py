@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
 from ..kinematics import Kinematics
-from .factor import factorize, solve
+from .factor import factoring_operations, factorize, is_unrolled, solve
 from .program import Limits
 
 
@@ -41,30 +41,19 @@ def choose(kinematics: Kinematics) -> tuple[TreeEquations, Choice]:
     recursive = METHODS["recursive"](kinematics)
     assert recursive.accelerations is not None
     operations = {"recursive": count(list(recursive.accelerations)).total}
-    large = len(kinematics.v) > Limits().unrolled
-    if large:
-        factoring = factoring_operations(kinematics.parent)
-        if factoring >= operations["recursive"]:
-            return recursive, Choice("recursive", {"embedding": factoring, **operations})
+    factoring = factoring_operations(kinematics.parent)
+    large = not is_unrolled(kinematics.parent, Limits().unrolled)
+    if large and factoring >= operations["recursive"]:
+        return recursive, Choice("recursive", {"embedding": factoring, **operations})
     embedding = METHODS["embedding"](kinematics)
     if large:
         lower = [x for i, row in enumerate(embedding.mass_matrix) for x in row[: i + 1]]
         total = factoring + count([*lower, *embedding.bias]).total
     else:
-        factor = factorize(embedding.mass_matrix, kinematics.parent)
-        total = count(solve(factor, [-h for h in embedding.bias])).total
+        turned = embedding.turned
+        mass, bias = turned.system if turned else (embedding.mass_matrix, embedding.bias)
+        solution = solve(factorize(mass, kinematics.parent), [-h for h in bias])
+        total = count(turned.accelerations(solution) if turned else solution).total
     operations = {"embedding": total, **operations}
     chosen = recursive if operations["recursive"] < total else embedding
     return chosen, Choice(chosen.method, operations)
-
-
-def factoring_operations(parent: Sequence[int]) -> int:
-    """Operations of L^T D L and one solution, in loops over the paths to ground (Featherstone, RBDA, table 6.5)."""
-    depths: list[int] = []
-    total = 0
-    for above in parent:
-        depth = depths[above] + 1 if above >= 0 else 0
-        depths.append(depth)
-        total += depth + depth * (depth + 1)  # ratios; products and differences
-        total += 4 * depth + 1  # two substitutions, division by the pivot
-    return total

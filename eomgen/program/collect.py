@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
+from ..equations.slopes import ForceSlopes, can_differentiate
+from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute
+from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import coefficient_rows, row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
+from .discs import describe_discs
 from .given_multipliers import multiplier_values
 from .program import Limits
 from .soundness import flag_forces
@@ -70,8 +75,12 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         pivots=equations.pivots,
         wrenches=find_wrenches(kinematics),
         system=equations.system,
+        turned=equations.turned,
+        events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
+        resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
         projects=c.stabilised is None,
         canonical=equations.canonical,
+        slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
     )
 
 
@@ -113,7 +122,27 @@ def _poses(kinematics: Kinematics) -> list[Expr]:
 
 def resolved_outputs(kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
     """Outputs in terms of the tree's q, v, a."""
-    expressions = kinematics.resolve([o.expression for o in kinematics.mechanism.outputs])
+    return resolved([o.expression for o in kinematics.mechanism.outputs], kinematics, equations)
+
+
+def _resets(kinematics: Kinematics) -> list[tuple[int, int, Expr]]:
+    """Event, state and its new value, of all resets."""
+    places = {name: k for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
+    found: list[tuple[int, int, Expr]] = []
+    for i, event in enumerate(kinematics.mechanism.events):
+        for name, value in event.reset:
+            if name not in places:
+                raise UsageError(
+                    f"events.{event.name}.reset: {name!r} belongs to a joint that is cut and follows from the others; "
+                    f"reset {', '.join(places)}"
+                )
+            found.append((i, places[name], value))
+    return found
+
+
+def resolved(given: list[Expr], kinematics: Kinematics, equations: TreeEquations) -> list[Expr]:
+    """Expressions in terms of the tree's q, v, a."""
+    expressions = kinematics.resolve(given)
     graph = kinematics.graph
     energies = {
         graph.symbol("kinetic_energy()"): equations.kinetic_energy,
@@ -161,6 +190,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "masses": dict(_mass_parameters(kinematics)),
         "joint_names": [j.name for j in m.joints],
         "euler_angles": _euler_angles(kinematics),
+        "rolling_discs": describe_discs(kinematics),
         "wrenches": wrenches.metadata() if (wrenches := find_wrenches(kinematics)) else None,
         "loop_joint_names": [m.joints[k].name for k in kinematics.topology.cut],
         "loop_names": list(loop.names),
@@ -196,6 +226,25 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "system": _system(equations),
         "baumgarte": None if c.stabilised is None else list(c.stabilised),
         "dry_friction": {j.coordinates[0]: j.dry_friction for j in m.joints if j.dry_friction},
+        **(
+            {
+                "events": [
+                    {
+                        "name": e.name,
+                        "terminal": e.terminal,
+                        "direction": e.direction,
+                        "resets": bool(e.reset),
+                        "restitution": e.restitution,
+                        "doc": e.doc,
+                    }
+                    for e in m.events
+                ],
+                "resets": [[i, k] for i, k, _ in _resets(kinematics)],
+            }
+            if m.events
+            else {}
+        ),
+        **({"signals": signals} if (signals := _signals(kinematics, equations)) else {}),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,
@@ -203,6 +252,15 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "atol": m.simulation.atol,
         },
     }
+
+
+def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
+    """Inputs over time as tapes, by name."""
+    places = {name: ("x", k) for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
+    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
+    found = zip(given, resolved(list(given.values()), kinematics, equations), strict=True)
+    return {name: list(record_tape([x], places.__getitem__)) for name, x in found}
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:

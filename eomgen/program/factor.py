@@ -120,3 +120,20 @@ def outward(pivots: Sequence[Expr], parent: Sequence[int]) -> list[Expr]:
 def _larger(a: Expr, b: Expr) -> Expr:
     """Plain comparison, not "max": NaN is caught with the result, and this is one instruction."""
     return a.graph.apply("select", a.graph.apply("lt", a, b), b, a)
+
+
+def factoring_operations(parent: Sequence[int]) -> int:
+    """Operations of L^T D L and one solution, in loops over the paths to ground (Featherstone, RBDA, table 6.5)."""
+    depths: list[int] = []
+    total = 0
+    for above in parent:
+        depth = depths[above] + 1 if above >= 0 else 0
+        depths.append(depth)
+        total += depth + depth * (depth + 1)  # ratios; products and differences
+        total += 4 * depth + 1  # two substitutions, division by the pivot
+    return total
+
+
+def is_unrolled(parent: Sequence[int], limit: int) -> bool:
+    """Whether factoring the mass matrix takes no more operations than that of a chain of ``limit`` velocities does."""
+    return factoring_operations(parent) <= factoring_operations(range(-1, limit - 1))

@@ -28,6 +28,8 @@ class Sizes:
     n_s: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
     n_w: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
     n_m: int = 0  #: momenta: n_v by method hamilton, else 0
+    n_events: int = 0
+    n_resets: int = 0  #: states that events give new values
     n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
@@ -77,6 +79,11 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
     Kernel("outputs", ("q", "v"), lambda s: (s.n_y,), "the outputs of the model at the projected state"),
+    Kernel("events", ("q", "v"), lambda s: (s.n_events,), "values whose zeros are the model's events"),
+    Kernel(
+        "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
+    ),
+    Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
     ),

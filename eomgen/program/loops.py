@@ -13,18 +13,20 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
+from ..numeric.gram import GENTLE, TIKHONOV
 from .factor import exceeding
 from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
 
-TIKHONOV = 1e-12  #: of velocities and accelerations, relative to the largest diagonal entry of J J^T
-GENTLE = 1e-8  #: of positions, so that rounding of C is not blown up where rows come to depend on each other
-PASSES = 5  #: of linear corrections with GENTLE, so that it leaves no trace
+PASSES = 5  #: of linear corrections with GENTLE; where weak rows keep something, drivers take more
+LEFT = 1e-12  #: most that the last pass may leave, relative to all of what was corrected
+NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
 LOST = 1e-5  #: least square of the sine between a column and those before it
 VANISHED = 1e-20  #: the same of large mechanisms
+ROUNDED = 2.0**-51  #: of the terms of a constraint row, what rounding may leave of their sum
 
 
 def largest(values: Sequence[Expr]) -> Expr:
@@ -42,6 +44,21 @@ def total_magnitude(values: Sequence[Expr]) -> Expr:
     for x in values:
         total = total + graph.apply("abs", x)
     return total
+
+
+def summands(x: Expr) -> list[Expr]:
+    """The terms of a sum of sums, each once."""
+    found: list[Expr] = []
+    waiting, seen = [x], {x}
+    while waiting:
+        y = waiting.pop()
+        operation, *ids = y.node
+        operands = [] if operation not in ("add", "sub", "neg") else [Expr(x.graph, i) for i in ids]
+        if not operands:
+            found.append(y)
+        waiting += [y for y in operands if y not in seen]
+        seen.update(operands)
+    return found
 
 
 class LoopBlocks:
@@ -101,6 +118,9 @@ class LoopBlocks:
         if not self.h:
             return [graph.zero] * (3 + self.terms.n_v)
         e = [x * i for x, i in zip(self.terms.constraints, self.inverse, strict=False)]
+        if self.gentle:
+            closed = self._closed()
+            e = [graph.apply("select", closed, graph.zero, x) for x in e]
         rows = self.J[: self.h]
         size = total_magnitude(e) * (self.unit / float(self.h))
         factor, term = self._regularised(rows, graph.apply("max", graph.constant(GENTLE), size))
@@ -108,6 +128,12 @@ class LoopBlocks:
         dz = times(transpose(rows, self.terms.n_v), z)
         left = total_magnitude(z) * term * self.unit
         return [size, left, total_magnitude(dz), *(-s * d for s, d in zip(self.s, dz, strict=True))]
+
+    def _closed(self) -> Expr:
+        """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
+        graph = self.terms.graph
+        beyond = [graph.apply("abs", row) - ROUNDED * total_magnitude(summands(row)) for row in self.terms.constraints]
+        return graph.apply("lt", largest(beyond), graph.zero)
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property
@@ -119,14 +145,19 @@ class LoopBlocks:
             return self._regularised(self.J, TIKHONOV)[0], 2
         return factorize(gram(self.J)), 1
 
-    def _corrected(self, x: list[Expr], r: Sequence[Expr]) -> list[Expr]:
-        """The nearest x with C_q x + r = 0."""
+    def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr]) -> list[Expr]:
+        """The nearest x with C_q x + r = 0; where configurations may lose rank, that nothing is left is a condition."""
         factor, passes = self._factor
         columns = transpose(self.J, self.terms.n_v)
         for _ in range(passes):
             e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
             dz = times(columns, factor.solve(e))
             x = [a - s * b for a, s, b in zip(x, self.s, dz, strict=True)]
+        if self.gentle:
+            graph = self.terms.graph
+            left = total_magnitude([a + b for a, b in zip(r, times(self.rows, x), strict=True)]) * self.unit
+            size = total_magnitude([a * (1.0 / s) for a, s in zip(x, self.s, strict=True)])
+            conditions.append(graph.apply("lt", left, size * LEFT + NOTHING))
         return x
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
@@ -134,12 +165,15 @@ class LoopBlocks:
         terms, graph, f = self.terms, self.terms.graph, range(self.terms.n_dof)
         v = [graph.symbol(name) for name in terms.v]
         rate = [x * i for x, i in zip(terms.constraint_rate, self.inverse, strict=True)]
-        moved = self._corrected(v, rate)
+        conditions: list[Expr] = []
+        moved = self._corrected(v, rate, conditions)
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
-        B, a, sound = self._partition(None if self.gentle else [-x for x in gamma])
         if self.gentle:
-            a = self._corrected([graph.zero] * terms.n_v, gamma)
+            a = self._corrected([graph.zero] * terms.n_v, gamma, conditions)
+            B, _, sound = self._partition(None, conditions)
+        else:
+            B, a, sound = self._partition([-x for x in gamma], conditions)
         M = rows_of(terms.mass_matrix)
         force = [x + y for x, y in zip(here[: terms.n_v], times(M, a), strict=True)]
         columns = transpose(B, terms.n_dof)
@@ -158,10 +192,10 @@ class LoopBlocks:
         return [*moved, *a, sound], checks
 
     # -- partition ------------------------------------------------------------------------------------------------
-    def _partition(self, y: list[Expr] | None) -> tuple[list[Row], list[Expr], Expr]:
-        """B (n rows of f) with C_q B = 0, the x (n,) with C_q x = y and no independent part, whether both are sound.
+    def _partition(self, y: list[Expr] | None, conditions: list[Expr]) -> tuple[list[Row], list[Expr], Expr]:
+        """B (n rows of f) with C_q B = 0, the x (n,) with C_q x = y and no independent part, whether all is sound.
 
-        No y counts as zero.
+        No y counts as zero.  Conditions of soundness may be given, and are added to.
         """
         terms, graph = self.terms, self.terms.graph
         dependent = [k for k in range(terms.n_v) if k not in terms.preferred]
@@ -172,7 +206,6 @@ class LoopBlocks:
             *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
         ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
-        conditions: list[Expr] = []
         if blocks is None or any(len(b.rows) > 2 for b in blocks):
             first, *found = self._least_squares(left, right, conditions)
         else:

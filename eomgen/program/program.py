@@ -20,9 +20,12 @@ BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "param
 class Limits:
     """Sizes at which the generated code changes its form; every field changes the sources."""
 
-    unrolled: int = 24  #: trees with at most so many velocities get a straight-line rhs, larger ones loops
+    #: trees whose mass matrix takes no more to factor than that of a chain of so many velocities get a straight-line
+    #: rhs, larger ones loops
+    unrolled: int = 24
     unrolled_loops: int = 4_000  #: loops get a straight-line rhs where factors take at most so many multiplications
     jacobian_nodes: int = 10_000  #: above so many estimated operations the Jacobian is made direction by direction
+    jacobian_recursive: int = 40_000  #: the same of one made by recursion over composite bodies
     statements: int = 1500  #: statements in one generated function at most
 
 
@@ -140,11 +143,6 @@ class Program:
     def has_loops(self) -> bool:
         """Whether there are constraint rows, so that states are projected."""
         return self.sizes.n_c > 0
-
-    @property
-    def large(self) -> bool:
-        """Whether the tree is too large for a straight-line rhs."""
-        return self.sizes.n_v > self.limits.unrolled
 
     @property
     def block_names(self) -> frozenset[str]:

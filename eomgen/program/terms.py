@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..equations.equations import LinearSystem
+from ..equations.slopes import ForceSlopes
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
+from ..kinematics.turned import Turned
 from ..kinematics.wrenches import JointWrenches
 
 Row = tuple[Expr, ...]
@@ -68,7 +71,11 @@ class SystemTerms:
     wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
     pivots: Row = ()  #: (n,) of q, with ``accelerations``: positive where M is positive definite
     system: LinearSystem | None = None  #: of a method that solves it for the accelerations
+    slopes: Callable[[], ForceSlopes] | None = None  #: derivatives of the inverse dynamics by recursion
     canonical: Row = ()  #: (2n,) of (q, v), by method hamilton: momenta and their rates
+    turned: Turned | None = None  #: the tree's system in other velocities, in which it is solved; else None
+    events: Row = ()  #: of (q, v): their zeros are the events of the model
+    resets: Row = ()  #: of (q, v): new values of states after events
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 
     @property

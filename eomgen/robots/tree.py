@@ -11,6 +11,7 @@ import numpy as np
 
 from ..describe.names import nearest
 from ..errors import ModelError
+from ..numeric.inertia import fault_of_inertia
 from .placement import IDENTITY, Inertia, Placement, about, moved, sum_inertias
 from .robot import Joint, Link, Options, Robot
 
@@ -53,6 +54,7 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
         if options.mimic != "independent":
             _check_mimic(robot, joint)
     if robot.problems:
+        _check_inertias(robot)
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     carried: dict[str, list[Joint]] = {}
     for joint in robot.joints.values():
@@ -177,6 +179,21 @@ def _check_mimic(robot: Robot, joint: Joint) -> None:
         robot.problem(path, f"no joint {joint.mimic.joint!r}", remedy, joint.place)
     elif other is joint:
         robot.problem(path, "the joint mimics itself", "name another joint", joint.place)
+
+
+def _check_inertias(robot: Robot) -> None:
+    """Note inertias that no link can have, of a robot with other faults, whose bodies are not known.
+
+    Links welded to others are left out: the body they make may be sound.
+    """
+    faulty = {problem.line for problem in robot.problems}
+    sound = [joint for joint in robot.joints.values() if joint.place[1] not in faulty]
+    welded = {end for joint in sound if joint.type == "weld" for end in (joint.parent, joint.child)}
+    moved_links = {joint.child for joint in robot.joints.values()}
+    for link in robot.links.values():
+        fault = fault_of_inertia(link.inertia.tensor)
+        if fault and link.name in moved_links - welded and link.place[1] not in faulty:
+            robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
 
 
 def _check_masses(robot: Robot, found: Bodies) -> None:

@@ -172,7 +172,8 @@ class _Reader:
             shape["file"] = given.attributes.get("filename", "")
             scale = given.attributes.get("scale", "").split()
             if len(scale) == 3:  # some files give four, which no reader of theirs minds
-                shape["scale"] = [self._finite(given, f"{where}.scale", part) for part in scale]
+                shape["scale"] = factors = [self._finite(given, f"{where}.scale", part) for part in scale]
+                self._check_scale(given, f"{where}.scale", factors)
         elif given.tag == "box":
             shape["size"] = list(self.triple(given, "size", where, (0.0, 0.0, 0.0)))
         elif given.tag in ("cylinder", "capsule"):
@@ -182,6 +183,12 @@ class _Reader:
         else:
             return None
         return self.origin(element, path), shape
+
+    def _check_scale(self, element: Element, path: str, factors: list[float]) -> None:
+        if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
+            self.fault(element, path, "a scale of 0 leaves nothing of the mesh", "negative factors mirror it")
+        elif min(factors) < 0.0:
+            self.robot.notes.append(f"{path}: negative factors mirror the mesh")
 
     def _joint(self, element: Element) -> None:
         name = self.name(element)

@@ -8,7 +8,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from .scalars import Scalar, atan2, combine, cos, dot, entries, half, rows, shaped, sin, sqrt, where_less
+from .scalars import (
+    Scalar,
+    atan2,
+    combine,
+    cos,
+    dot,
+    entries,
+    half,
+    require_rotation,
+    rows,
+    shaped,
+    sin,
+    sqrt,
+    where_less,
+)
 
 SMALL = 1e-4  #: squares below which series replace quotients 0/0; the terms left out are below rounding
 
@@ -51,8 +65,14 @@ def euler_parameters_from_matrix(rotation: Any) -> Any:
 
     The matrix 4 e e^T is linear in R; its row with the largest diagonal entry is normalized (Shepperd, J. Guid. Control
     1 (1978) 223).
+
+    Raises
+    ------
+    ValueError
+        Numbers that are no rotation: the message gives the determinant.
     """
     R = rows(rotation)
+    require_rotation(R)
     trace = R[0][0] + R[1][1] + R[2][2]
     w = (R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     outer = [[1 + trace, *w]]

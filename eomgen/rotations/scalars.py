@@ -115,8 +115,21 @@ def rows(given: Any) -> list[list[Scalar]]:
     """A 3 x 3 matrix as rows; raises ValueError if it has another shape."""
     listed = given.tolist() if hasattr(given, "tolist") else [list(row) for row in given]
     if len(listed) != 3 or any(len(row) != 3 for row in listed):
-        raise ValueError("a 3 x 3 matrix is expected")
+        raise ValueError(f"a 3 x 3 matrix is expected, not one of shape {np.shape(given)}")
     return listed
+
+
+def require_rotation(R: list[list[Scalar]]) -> None:
+    """Raise ValueError for numbers that are no rotation, to 1e-6; symbols and expressions are taken as they are."""
+    if not all(isinstance(x, int | float) for row in R for x in row):
+        return
+    numbers = np.array(R, dtype=float)
+    determinant = float(np.linalg.det(numbers))
+    if not (np.abs(numbers @ numbers.T - np.eye(3)).max() < 1e-6 and determinant > 0.0):
+        raise ValueError(
+            f"the matrix is not a rotation: its rows must be orthonormal and its determinant "
+            f"1, which is {determinant:.6g}"
+        )
 
 
 def shaped(result: Any) -> Any:

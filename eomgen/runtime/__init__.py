@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .minimal import Minimal
     from .numpy_core import NumpyCore
     from .protocols import Core
+    from .signals import Signal
     from .storage import load_trajectory
     from .trajectory import Trajectory
 
@@ -21,11 +22,12 @@ _HOMES = {
     "Core": "protocols",
     "Minimal": "minimal",
     "NumpyCore": "numpy_core",
+    "Signal": "signals",
     "Trajectory": "trajectory",
     "load_trajectory": "storage",
 }
 
-__all__ = ["Core", "Minimal", "Module", "NumpyCore", "Trajectory", "load_trajectory"]
+__all__ = ["Core", "Minimal", "Module", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]
 
 
 def __getattr__(name: str) -> Any:

@@ -32,7 +32,7 @@ def require_velocities(layout: Layout) -> None:
     if getattr(layout, "given_rates", False):
         raise UsageError(
             f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
-            "analyses are not derived; rhs, jacobian and simulate are there"
+            "other analyses are not derived; rhs, jacobian, simulate and linearise are there"
         )
 
 
@@ -117,7 +117,8 @@ class Analyses(ForceAnalyses):
             ``minimal``: states are the independent displacements and velocities along the constraints, nonholonomic
             ones included, so that constraints add no eigenvalues.  ``full``: A is ``jacobian(t, x)``.
         independent : sequence of str, optional
-            Coordinates of the tree to take as the n_dof independent ones.
+            Coordinates of the tree to take as the n_dof independent ones; where rates of coordinates are given, all
+            independent coordinates, all independent velocities or both.
 
         Returns
         -------

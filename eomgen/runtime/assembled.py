@@ -55,6 +55,8 @@ class Assembled:
         UsageError
             An unknown name.
         """
+        if values is not None and not isinstance(values, Mapping):
+            raise UsageError(f"x0 takes values by name, as in x0({self.x_names[0]}=0.3), not {values!r}")
         initial = self._initial(t, p, u)
         given = initial.sort(_numbers(values, named))
         q = initial.assembled(given.positions)

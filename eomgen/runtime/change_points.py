@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..numeric.rank_limits import PASSED as SINGULAR
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .module import Module
 
 DIP = 0.5  #: a smallest singular value that falls below this part of its largest over the run is looked at
-SINGULAR = 1e-4  #: relative to the largest singular value: rank is lost
 SUBSTEPS = 24  #: between stored states
 LEVELS = 3  #: times that the neighbourhood of the smallest value is looked at more closely
 
@@ -32,7 +32,8 @@ class ChangePoint(NamedTuple):
     def __str__(self) -> str:
         shown = ", ".join(f"{name} = {value:.4g}" for name, value in list(self.coordinates.items())[:6])
         more = ", ..." if len(self.coordinates) > 6 else ""
-        return f"t = {self.time:.6g} s, {self.degrees_of_freedom} degrees of freedom at {shown}{more}"
+        freedoms = f"{self.degrees_of_freedom} degree{'s' * (self.degrees_of_freedom != 1)} of freedom"
+        return f"t = {self.time:.6g} s, {freedoms} at {shown}{more}"
 
 
 def singular_values(module: Module, t: Array, x: Array) -> Array:
@@ -109,6 +110,8 @@ def _closest(module: Module, times: Array, states: Array) -> ChangePoint | None:
         values = singular_values(module, times, states)
         k = int(np.argmin(values[:, rank - 1]))
         first, last = max(k - 1, 0), min(k + 1, len(times) - 1)
+        if np.unique(times[first : last + 1]).size < last - first + 1:
+            break  # as near as times can be told apart
         part = np.linspace(0.0, 1.0, 4 * SUBSTEPS + 1)
         between = times[first] + (times[last] - times[first]) * part
         states = np.array([np.interp(between, times, row) for row in states]) if last - first < 2 else _parabola(

@@ -39,7 +39,7 @@ def integrate_dae(
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
+    forcing.attach(bound)
     form, n_x = bound.dae, bound.n_x
     x0 = find_state(bound, initial, start)
     y, yp = form.initial(x0, start, forcing(start, x0))

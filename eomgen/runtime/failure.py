@@ -11,6 +11,7 @@ from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
 LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
+FLAT = 1e-3  #: sine of the angle between a disc's axle and its plane's normal below which it counts as flat
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
@@ -27,6 +28,10 @@ WORDS = {
         "the independent coordinates cannot move the mechanism here (dead centre or singular position)",
         "choose other independent coordinates, or start a little away from a change point",
     ),
+    5: (
+        "rounding leaves the linear system of the equations of motion unsolved",
+        "compile with method='embedding', or look for bodies or lengths of very different sizes",
+    ),
 }
 
 
@@ -38,11 +43,23 @@ class Fail:
     layout : Layout
     culprit : callable, optional
         (status, t, x) -> words that name what is to blame, or an empty string.
+    poses : callable, optional
+        (q, t=) -> (n_bodies, 4, 4), to tell which discs lie flat.
     """
 
-    def __init__(self, layout: Layout, culprit: Callable[[int, float, Array], str] | None = None) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        culprit: Callable[[int, float, Array], str] | None = None,
+        poses: Callable[..., Array] | None = None,
+    ) -> None:
         self.layout = layout
         self.culprit = culprit
+        self.poses = poses
+
+    def trouble(self, x: Array, t: float = 0.0) -> tuple[str, str] | None:
+        """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
+        return flat_disc(self.layout, x, t, self.poses) or rotation_trouble(self.layout, x)
 
     def __call__(self, name: str, status: int, t: float, x: Array) -> None:
         raise self.exception(name, status, t, x)
@@ -61,7 +78,7 @@ class Fail:
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
-        elif status in (1, 2) and names and (trouble := rotation_trouble(self.layout, x)):
+        elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif self.culprit is not None and names:
             found = self.culprit(status, t, x)
@@ -80,6 +97,20 @@ def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
         if not np.abs(x[i : i + 4]).max() > 1e-150:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
             return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
+    return None
+
+
+def flat_disc(layout: Layout, x: Array, t: float, poses: Callable[..., Array] | None) -> tuple[str, str] | None:
+    """A rolling disc that lies flat at a state, and the remedy; None if none does."""
+    discs = layout.metadata.get("rolling_discs", ())
+    if not discs or poses is None or len(x) < layout.n_q:
+        return None
+    turns = np.concatenate([poses(x[: layout.n_q], t=t)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
+    for name, wheel, axle, plane, normal in discs:
+        across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)
+        if np.linalg.norm(across) < FLAT:
+            what = f"constraint {name!r}: the disc lies flat (axle along the plane's normal)"
+            return what, "it has fallen, or nearly so; end the run before, with an event for example"
     return None
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 if TYPE_CHECKING:
     from ..analysis.drive import ActuatorForces
     from ..analysis.impact import Impact
-    from ..analysis.impact_run import ImpactRun
+    from ..analysis.impact_trajectory import ImpactRun
     from ..numeric.scales import Array
     from .kernels import Kernels
 
@@ -158,6 +158,7 @@ class ForceAnalyses:
         gaps: Mapping[str, float] | None = None,
         *,
         lock: Sequence[str] = (),
+        closed: bool = False,
         p: Any = None,
         u: Any = None,
     ) -> Impact:
@@ -173,6 +174,8 @@ class ForceAnalyses:
             of restitution, 0 to 1.  Gaps that open are left alone.
         lock : sequence of str
             Coordinates that stop (plastic, whatever the sign of the impulse).
+        closed : bool
+            Take the gaps as closed whatever their values, as at a stop that is put where a coordinate is now.
         p, u : optional
             As for ``bind``.
 
@@ -185,21 +188,26 @@ class ForceAnalyses:
         Raises
         ------
         UsageError
-            An unknown name, or impulses that cannot do it.
+            An unknown name; a gap that is not 0 (within 1e-6 lengths of the model, or rad); impulses that cannot do
+            it; a gap that drivers close.
 
         Notes
         -----
-        Newton's law of restitution at each gap, several at once as a complementarity problem (Moreau; Pfeiffer and
-        Glocker, Multibody Dynamics with Unilateral Contacts, ch. 8).  Springs, dampers and other finite forces have no
-        part in it; a gap that itself moves in time counts as at rest.
+        Newton's law of restitution with complementarity, for all gaps at once that close or are at rest: each impulse
+        is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and Glocker,
+        Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
+        opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
+        from gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after
+        the impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice:
+        momentum and energy alone do not determine what several bodies that touch do.
         """
         from ..analysis.impact import strike
 
-        return strike(self, t, x, gaps, lock=lock, p=p, u=u)  # type: ignore[arg-type]
+        return strike(self, t, x, gaps, lock=lock, closed=closed, p=p, u=u)  # type: ignore[arg-type]
 
     def simulate_impacts(
         self,
-        span: float | tuple[float, float],
+        span: float | tuple[float, float] | None,
         gaps: Mapping[str, float],
         initial: Mapping[str, float] | ArrayLike | None = None,
         parameters: Any = None,
@@ -213,7 +221,7 @@ class ForceAnalyses:
         Parameters
         ----------
         span : (float, float) or float
-            Start and end (s).
+            Start and end (s), forward in time.
         gaps : mapping of str to float
             As for :meth:`impact`.
         initial, parameters, inputs : optional
@@ -226,15 +234,16 @@ class ForceAnalyses:
         Returns
         -------
         ImpactRun
-            ``t``, ``x`` (n_x, n_t) with both states at each impact, ``run["theta"]``, ``impacts`` (time, Impact),
-            ``pieces``, the trajectories between impacts, and ``ended``: 'end', 'impacts' or 'rest'.
+            A trajectory (``run["theta"]``, ``run.at(t)``, ``run.save(path)`` ...) with both states at each impact, and
+            ``impacts`` (time, Impact), ``pieces``, the trajectories between impacts, and ``ended``: 'end'; 'rest', a
+            closed gap is pressed together; 'impacts', there were ``most``; 'event', an event of the model.
 
         Raises
         ------
         UsageError
-            A gap is open by a negative amount at the start, or an unknown name.
+            A gap is negative at the start, an unknown name, or a mechanism without freedom.
         SimulationError, AssemblyError, MissingDependencyError
-            As for ``simulate``.
+            As for ``simulate``; also where a gap is found negative without an impact before.
         """
         from ..analysis.impact_run import run_with_impacts
 

@@ -12,7 +12,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .events import CROWD, CROWDED, GO_ON, WAIT, Event, Events
 from .names import require, unknown
+from .pace import Pace, watch_steps
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -29,21 +31,6 @@ class Solution(NamedTuple):
     message: str
     counts: dict[str, int]
     ends: tuple[float, float]  #: first and last time reached
-
-
-class Event:
-    """A user's event with the number of times it may still happen."""
-
-    def __init__(self, function: Any) -> None:
-        if not callable(function):
-            raise UsageError(f"an event must be a function f(t, x), not {function!r}")
-        self.function = function
-        self.terminal = getattr(function, "terminal", None) or 0
-        self.direction = getattr(function, "direction", 0)
-
-    def __call__(self, t: float, x: Array) -> float:
-        """The user's function."""
-        return float(self.function(t, x))
 
 
 class Joined:
@@ -118,8 +105,16 @@ def integrate(
     events: Sequence[Event],
     dense: bool,
     options: dict[str, Any],
+    pace: Pace,
+    reset: Callable[[float, Array, list[int]], Array] | None = None,
 ) -> Solution:
-    """Integrate over the parts between `nodes` (start, corners, end)."""
+    """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
+
+    Raises
+    ------
+    Crawling
+        The steps lead nowhere, as `pace` judges.
+    """
     scipy = require("scipy.integrate", "scipy", "simulate")
     times: list[Array] = []
     states: list[Array] = []
@@ -127,18 +122,24 @@ def integrate(
     x_events: list[list[Array]] = [[] for _ in events]
     pieces: list[Any] = []
     counts = {"nfev": 0, "njev": 0, "nlu": 0}
-    x = x0
-    for k in range(len(nodes) - 1):
-        span, last = (nodes[k], nodes[k + 1]), k == len(nodes) - 2
+    x, k, start, jumped = x0, 0, nodes[0], True
+    last_reset, crowded, resets = np.inf, 0, 0
+    while True:
+        span, last = (start, nodes[k + 1]), k == len(nodes) - 2
         asked = None if t_eval is None else _between(t_eval, span, last)
+        if asked is not None and resets and asked.size and asked[0] == start:  # stored before the reset
+            asked = asked[1:]
         first = (
             {} if "first_step" not in options else {"first_step": min(options["first_step"], abs(span[1] - span[0]))}
         )
+        counted = [event.terminal for event in events]
+        for event in events:
+            event.terminal = event.terminal if event.action == GO_ON else 1
         part = scipy.solve_ivp(
             rhs,
             span,
             x,
-            method=solver,
+            method=watch_steps(solver, pace),
             t_eval=asked,
             events=list(events) or None,
             dense_output=dense,
@@ -147,26 +148,54 @@ def integrate(
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)
         t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
-        for e in range(len(events)):
+        fired: list[int] = []
+        for e, event in enumerate(events):
             t_events[e].append(np.asarray(part.t_events[e]))
             x_events[e].append(np.asarray(part.y_events[e]).reshape(len(part.t_events[e]), len(x0)).T)
-            if events[e].terminal:
-                events[e].terminal = max(events[e].terminal - len(part.t_events[e]), 1)
+            event.terminal, happened = counted[e], len(part.t_events[e])
+            if event.action != GO_ON and part.status == 1 and happened:
+                fired.append(e)
+            if event.terminal:
+                over = happened >= event.terminal
+                event.terminal = max(event.terminal - happened, 1)
+                fired = [] if over else fired
         if dense and part.sol is not None:
             pieces.append(part.sol)
-        done = last or part.status != 0
+        ended = float(part.t_events[fired[0]][-1]) if fired else float(span[1])
+        done = (last and not fired) or part.status == -1 or (part.status == 1 and not fired)
         if t_eval is None:
-            skip = 1 if k else 0  # a part starts where the last one ended
+            skip = 0 if jumped else 1  # a part starts where the last one ended
             times.append(t[skip:])
             states.append(y[:, skip:])
         else:
-            keep = len(t) if done else len(t) - 1  # the corner was asked for only to go on from
+            keep = len(t) if done or fired or last else len(t) - 1  # the corner was asked for only to go on from
             times.append(t[:keep])
             states.append(y[:, :keep])
         if done:
             break
-        x = y[:, -1]
-    joined = pieces[0] if len(pieces) == 1 else Joined(pieces, nodes[1 : len(pieces)]) if pieces else None
+        jumped = bool(fired)
+        if fired and reset is not None:
+            before = x_events[fired[0]][-1][:, -1]
+            x = reset(ended, before, fired)
+            resets += 1
+            crowded = crowded + 1 if abs(ended - last_reset) < CROWDED * abs(nodes[-1] - nodes[0]) else 0
+            last_reset, start = ended, ended
+            for e in fired:
+                came, goes = (_rate(events[e], rhs, ended, state, nodes[-1] - nodes[0]) for state in (before, x))
+                stuck = not abs(goes) > 1e-9 * abs(came) or (events[e].action == WAIT and goes < 0.0)
+                if stuck or events[e].direction * came < 0.0:  # the zero it just left, again
+                    crowded = CROWD
+                events[e].left = (ended, float(np.sign(goes)))
+            if crowded >= CROWD or start == nodes[-1]:
+                part.status = 0
+                break
+        else:
+            x, k, start = y[:, -1], k + 1, nodes[k + 1]
+    if crowded >= CROWD:
+        raise Events.crowded_near(start, resets, [event.name for event in events if event.action != GO_ON])
+    joined = (
+        pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
+    )
     all_times = np.concatenate(times)
     ends = (nodes[0], nodes[0])
     if pieces:
@@ -184,6 +213,13 @@ def integrate(
         counts,
         ends,
     )
+
+
+def _rate(event: Event, rhs: Callable[[float, Array], Array], t: float, x: Array, span: float) -> float:
+    """How fast an event's value changes along the motion, in the direction of the run."""
+    h = 1e-8 * span
+    event.left = None
+    return float((event(t + h, x + h * np.asarray(rhs(t, x))) - event(t, x)) / abs(h))
 
 
 def _between(t_eval: Array, span: tuple[float, float], last: bool) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..numeric.definite import correlated
+from ..numeric.definite import SINGULAR, correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
@@ -42,8 +42,11 @@ class Kernels:
     def __init__(self, core: Core, layout: Layout, p: Array | None = None, u: Array | None = None) -> None:
         self.core = core
         self.layout = layout
-        self.context = core.context(p, u, UsageError)
-        self.fail = Fail(layout, self._culprit)
+        try:
+            self.context = core.context(p, u, UsageError)
+        except UsageError as error:
+            raise UsageError(layout.explain_constants(str(error), p)) from None
+        self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
@@ -82,18 +85,27 @@ class Kernels:
             return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
+    def _poses(self, q: Array, t: float) -> Array:
+        return self.state("poses", nan=True)(q, t=t)
+
     def _culprit(self, status: int, t: float, x: Array) -> str:
         """Names what a failure at a state is due to, as far as it can be told."""
         layout, q = self.layout, x[: self.layout.n_q]
         if status == 1 and layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
             finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
             bad = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
-            return f"the loads of {bad} are not (ends that meet, or a law outside its domain)" if bad else ""
+            return (
+                f"the loads of {bad} are not (ends that meet or lie inside the cylinder, or a law outside its domain)"
+                if bad
+                else ""
+            )
         if status == 2:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            if values[0] > SINGULAR:
+                return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]

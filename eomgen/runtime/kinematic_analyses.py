@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 from .analyses import require_velocities
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
     from ..analysis.motions import KinematicAnalysis
     from ..analysis.reaching import MotionRange
+    from ..analysis.workspace import Workspace
 
 
 class KinematicAnalyses:
@@ -112,3 +113,59 @@ class KinematicAnalyses:
         if parameters is not None or inputs is not None:
             module = module.bind(parameters, inputs)
         return find_range(module, name, initial, t, within)
+
+    def workspace(
+        self,
+        over: Mapping[str, Any],
+        of: str | Sequence[str],
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Any = None,
+        *,
+        t: float = 0.0,
+        limits: bool | Mapping[str, tuple[float | None, float | None]] = False,
+        points: int = 100_000,
+    ) -> Workspace:
+        """What outputs can reach over a grid of independent coordinates, and how well conditioned it is there.
+
+        The grid is walked from the initial position, neighbour to neighbour, so that the mechanism stays on its branch.
+
+        Parameters
+        ----------
+        over : mapping of str to (float, float, int) or (n,) array
+            One to three coordinates, of the tree or of cut joints, each with (low, high, count) or rising or falling
+            values; ``t`` for drivers.  Coordinates not named, as far as they are free, stand still.
+        of : str or sequence of str
+            Outputs that are functions of position, such as coordinates of a marker, and coordinates.
+        initial : mapping or array, optional
+            Position to start from, as for :meth:`kinematic_analysis`.
+        parameters, inputs : optional
+            As for :meth:`bind`.
+        t : float
+            Time (s), unless it is varied.
+        limits : bool, or mapping of str to (lower, upper)
+            Whether to stay within the limits the joints declare, or limits of coordinates; None for none.
+        points : int
+            Most points a grid may have.
+
+        Returns
+        -------
+        Workspace
+            ``ws["tip_x"]``, ``status``, ``jacobian``, ``manipulability``, ``quality``, ``singularities``, ``area()``.
+
+        Raises
+        ------
+        PartitionError
+            No point of the grid can be reached, or the start is singular.
+        AssemblyError
+            The initial values do not fit the loops and drivers.
+        UsageError
+            Unknown names, too many coordinates, too many points, outputs that are not functions of position.
+        """
+        from ..analysis.workspace import find_workspace
+
+        module: Any = self
+        require_velocities(module.layout)
+        if parameters is not None or inputs is not None:
+            module = module.bind(parameters, inputs)
+        return find_workspace(module, over, of, initial, t, limits, points)

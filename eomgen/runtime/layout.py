@@ -69,6 +69,8 @@ class Layout:
         self.n_m: int = data.get("n_m", 0)
         self.n_dae: int = data.get("n_dae", 0)
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
+        self.n_events: int = data.get("n_events", 0)
+        self.n_resets: int = data.get("n_resets", 0)
         self.n_e = len(self.fragile_forces)
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
@@ -182,6 +184,19 @@ class Layout:
         self._check_masses(what, names, result)
         return result
 
+    def explain_constants(self, message: str, p: Any) -> str:
+        """The message that constants cannot be computed, with the names of the parameters; any other as it is."""
+        if "constants that follow" not in message:
+            return message
+        declared = self.metadata["p_values"]
+        given = declared if p is None else list(p)
+        named = list(zip(self.p, given, declared, strict=True))
+        changed = [f"{name} = {x:.6g}" for name, x, value in named if x != value]
+        shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
+        head = "the constants that follow from the parameters are not finite"
+        which = " (changed from their declared values)" if changed else ""
+        return f"{head} with {', '.join(shown)}{which}; look for a division by zero, a root or an overflow in a law"
+
     def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
         """Refuse a negative value of a parameter that is a body's mass."""
         for name, body in self.metadata.get("masses", {}).items() if what == "parameter" else ():
@@ -241,5 +256,8 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "canonical": ("x", (2, "n_m")),
     "dae_residual": ("dae", ("n_dae",)),
     "dae_jacobian": ("dae_cj", ("n_dae", "n_dae")),
+    "events": ("x", ("n_events",)),
+    "resets": ("x", ("n_resets",)),
+    "event_slopes": ("x", ("n_events", "n_x")),
     "scales": ("none", ("n_v+n_c",)),
 }

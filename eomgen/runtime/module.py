@@ -19,6 +19,7 @@ from .layout import Layout
 from .momenta import Momenta
 
 if TYPE_CHECKING:
+    from ..ensembles.ensemble import Ensemble
     from .minimal import Minimal
     from .paths import Path
     from .protocols import Core, Motion, State, Timed
@@ -257,6 +258,56 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
 
         return simulate(self, span, initial, parameters, inputs, method=method, **options)
 
+    def simulate_many(
+        self,
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, Any] | ArrayLike | None = None,
+        parameters: Mapping[str, Any] | ArrayLike | None = None,
+        inputs: Mapping[str, Any] | ArrayLike | None = None,
+        **options: Any,
+    ) -> Ensemble:
+        """Integrate many runs on all processors, or on a cluster; see
+        :func:`~..ensembles.simulate_many.simulate_many`.
+
+        Parameters
+        ----------
+        span : (float, float) or float, optional
+        initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
+        parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
+        **options
+            count, method, rtol, atol, t_eval, reduce, threads, cluster, store, block, max_steps, max_step, first_step,
+            progress.
+
+        Returns
+        -------
+        Ensemble
+        """
+        from ..ensembles.simulate_many import simulate_many
+
+        return simulate_many(self, span, initial, parameters, inputs, **options)
+
+    def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
+        """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
+
+        Parameters
+        ----------
+        t, h : float
+            Time and size of the step (s).
+        x : (n_x,) array
+        u : (n_u,) array, optional
+            Inputs, held over the step.
+        out : (n_x,) array, optional
+            Takes the result; it may be x.
+
+        Returns
+        -------
+        (n_x,) array
+            The state at t + h; loops drift at the order of the step, see :meth:`project`.
+        """
+        from .steppers import march
+
+        return march(self, t, x, h, u, out)
+
     def report(self) -> str:
         """What the model is made of, as text."""
         from .report import text
@@ -264,7 +315,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         return text(self)
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("DOP853", "RK45", "RK23"):
+        if name in ("DOP853", "RK45", "RK23", "Radau"):
             from .steppers import find_solver
 
             return find_solver(self, name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from types import ModuleType
+from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
 
@@ -51,3 +52,19 @@ def require(module: str, extra: str, purpose: str) -> ModuleType:
         if error.name is not None and error.name.partition(".")[0] != package:
             raise  # the package is there and something it needs is not
         raise MissingDependencyError(f"{purpose} needs {package}: pip install {extra}") from error
+
+
+def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
+    """Refuse a function that cannot be called as f(t, x); one that shows no signature is left to its first call."""
+    from inspect import signature
+
+    try:
+        taken = signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        taken.bind(0.0, None)
+    except TypeError:
+        given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
+        remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
+        raise UsageError(f"{label} is called as f(t, x), which {given} does not take; {remedy}") from None

@@ -152,7 +152,10 @@ class NumpyKernel:
         """One state or a batch."""
         layout = self.core.layout
         if x.shape[:1] != (self.n_in,) or x.ndim > 2:
-            raise self.error(f"x of {self.name} must have shape ({self.n_in},) or ({self.n_in}, k), not {x.shape}")
+            label = "q" if KERNELS.get(self.name, ("x",))[0] == "q" else "x"
+            raise self.error(
+                f"{label} of {self.name} must have shape ({self.n_in},) or ({self.n_in}, k), not {x.shape}"
+            )
         c = self.context.c
         if p is not None:
             c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
@@ -250,6 +253,8 @@ class NumpyMotion(NumpyKernel):
 
 
 def _real(value: object, label: str, error: Any) -> Array:
+    if isinstance(value, Mapping):
+        raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
     array = np.asarray(value)
     if array.dtype.kind not in "biufO":
         raise error(f"{label} must hold real numbers, not {array.dtype}")

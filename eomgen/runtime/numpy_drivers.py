@@ -18,7 +18,7 @@ from ..numeric.definite import SINGULAR, correlated
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian
-from ..numeric.system import Factored, Pattern
+from ..numeric.system import Balanced, Pattern
 from .layout import Layout
 
 #: driver -> blocks it is made from; a tree needs neither position nor rate
@@ -219,12 +219,12 @@ class Drivers:
             terms, residuals, shifts, position, rate, x[:n_q], x[n_q:], self.scales(c), layout.rank, layout.independent
         )
 
-    def _solve(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, Array, Factored]:
+    def _solve(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, Array, Balanced]:
         """Accelerations (n_v,) at a state by the method's linear system, all its unknowns, and its factors."""
         flat = np.asarray(self.blocks["system"](t, x, u, c), dtype=float)
         places = len(self.pattern.places[0])
         entries, r, sizes = np.split(flat, [places, places + self.pattern.size])
-        system = self.pattern.factor(entries, sizes)
+        system = self.pattern.balance(entries, sizes)
         z = system.solve(r)
         a = self.blocks["joint_accelerations"](t, np.concatenate([x, z]), u, c)
         return np.asarray(a, dtype=float), z, system
@@ -242,7 +242,7 @@ class Drivers:
         a, z, system = self._solve(t, x, u, c)
         r = self.residuals(t, u, c, q, v, a, z[n:])
         right = np.vstack([np.hstack([r.r1_q, r.r1_v]), np.hstack([r.r2_q, r.r2_v])])
-        da = np.array([system.solve(-column)[:n] for column in right.T]).T
+        da = system.solve(-right)[:n]
         dq, dv = np.eye(n_q, n_q + n), np.eye(n, n_q + n, n_q)
         return np.vstack([dv if space is None else space.change(q, dq, v[:, None], dv), da])
 

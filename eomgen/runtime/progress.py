@@ -20,9 +20,12 @@ class Progress:
         Simulated time.
     patience : float
         Seconds before it appears.
+    words : str
+        What is said of how far it is.
     """
 
-    def __init__(self, start: float, end: float, patience: float = PATIENCE) -> None:
+    def __init__(self, start: float, end: float, patience: float = PATIENCE, words: str = "t = {:.4g} s") -> None:
+        self.words = words
         self.start, self.length = start, end - start
         self.next = perf_counter() + patience
         self.calls = 0
@@ -46,10 +49,10 @@ class Progress:
         if self.bar is None and not self.plain:
             self._open()
         if self.plain:
-            sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  t = {t:.4g} s ")
+            sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  {self.words.format(t)} ")
             sys.stderr.flush()
         else:
-            self.bar.update(self.task, completed=part, description=f"t = {t:.4g} s")
+            self.bar.update(self.task, completed=part, description=self.words.format(t))
 
     def close(self) -> None:
         """Clean up."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .integrate import Solution
+from .layout import Layout
 from .signals import Forcing
 from .trajectory import Residuals, Trajectory
 
@@ -47,7 +48,7 @@ class Columns:
         ]
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
-        self.names = tuple(dict.fromkeys(name for names, _ in self._groups for name in names))
+        self.names = _names(layout)
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._known:
@@ -107,7 +108,14 @@ class Columns:
         return find_change_points(self.module, self.t, self.x, self.u)
 
 
-def record(module: Module, forcing: Forcing, solution: Solution, method: str, options: dict[str, Any]) -> Trajectory:
+def record(
+    module: Module,
+    forcing: Forcing,
+    solution: Solution,
+    method: str,
+    options: dict[str, Any],
+    event_names: Sequence[str] = (),
+) -> Trajectory:
     """Project the solution and put the trajectory together.
 
     Raises
@@ -126,9 +134,10 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
         "message": solution.message,
         **solution.counts,
         "residuals": residuals._asdict(),
+        "event_names": list(event_names),
     }
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
-    header["units"] = units_of(module, columns.names)
+    header["units"] = _units(module.layout)
     events = [project(module, t, found)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
@@ -142,18 +151,34 @@ def record(module: Module, forcing: Forcing, solution: Solution, method: str, op
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
 
 
+@lru_cache(maxsize=64)
+def _names(layout: Layout) -> tuple[str, ...]:
+    """All columns, each once."""
+    cut = layout.loops + layout.loop_rates + layout.loop_accelerations
+    energies = ("T", "V", "energy") if layout.energy_known else ()
+    return tuple(dict.fromkeys(layout.x + layout.a + layout.parameter_rates + cut + layout.y + layout.u + energies))
+
+
+@lru_cache(maxsize=64)
+def _units(layout: Layout) -> dict[str, str]:
+    return {name: layout.unit(name) for name in ("t", *_names(layout)) if layout.unit(name)}
+
+
 def describe(module: Module) -> dict[str, Any]:
     """What the columns of any run of a module are called, and its parameters."""
-    layout = module.layout
+    return _described(module.layout) | {"parameters": dict(zip(module.layout.p, module.p.tolist(), strict=True))}
+
+
+@lru_cache(maxsize=64)
+def _described(layout: Layout) -> dict[str, Any]:
     return {
-        "name": module.name,
+        "name": layout.name,
         "q_names": list(layout.q),
         "v_names": list(layout.v),
         "x_names": list(layout.x),
         "loop_names": list(layout.loops),
         "y_names": list(layout.y),
         "u_names": list(layout.u),
-        "parameters": dict(zip(layout.p, module.p.tolist(), strict=True)),
         "model_method": layout.metadata.get("method"),
         "docs": layout.metadata.get("docs", {}),
     }
@@ -189,4 +214,4 @@ def units_of(module: Module, names: Sequence[str]) -> dict[str, str]:
 
 
 def _plain(value: Any) -> Any:
-    return np.asarray(value).tolist() if value is not None else None
+    return value if value is None or type(value) is float else np.asarray(value).tolist()

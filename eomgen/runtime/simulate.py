@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, UsageError
+from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
-from .failure import rotation_trouble
-from .integrate import Event, Solution, check_options, choose_solver, integrate, takes_jacobian
+from .events import UNWATCHED, Events
+from .integrate import Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
+from .pace import Crawling, Pace, describe_crawl, steepest
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
-from .tolerances import check_tolerances
+from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
-OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress")
+OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
 
 
 def simulate(
@@ -45,6 +48,7 @@ def simulate(
     max_step: float | None = None,
     first_step: float | None = None,
     progress: bool | None = None,
+    step: float | None = None,
     **options: Any,
 ) -> Trajectory:
     """Integrate the equations of motion.
@@ -58,20 +62,28 @@ def simulate(
         Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints.
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
-    inputs : mapping of str to number, (times, values) or callable f(t, x), optional
-        Tables are linear in between and constant outside; their corners are stepped on exactly.
+    inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
+        Tables are linear in between (a :class:`~.signals.Signal` may hold the last value, or be a cubic spline) and
+        constant outside; their corners are stepped on exactly.  An expression is a text as in model files, of t,
+        coordinates, velocities and parameters.
     method : str or OdeSolver subclass, optional
-        A method of SciPy: RK23, RK45, DOP853 (default), Radau, BDF, LSODA.  The first three run in compiled code with
-        SciPy's steps unless there are events or inputs that are functions; implicit ones get the exact Jacobian.
+        A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
+        with SciPy's steps unless there are inputs that are functions; with loops each step of the first three starts on
+        the constraints where the last came near them.  Implicit ones get the exact Jacobian.  RK4 takes steps of one
+        size, in compiled code only.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
         Times to store; the solver's steps by default.
-    events : callable or list of callables f(t, x), optional
-        With SciPy's attributes ``terminal`` and ``direction``.
+    events : str, callable f(t, x), list of these, or mapping of names to them, optional
+        Names of the model's events (all by default; those that reset the state are watched in any case), expressions
+        as text, or functions with SciPy's attributes ``terminal`` and ``direction``.  In a mapping also
+        ``{"expression": text, "terminal": times, "direction": 1}``.
     dense_output : bool
         Keep a continuous solution for ``Trajectory.at``.
     max_step, first_step : float, optional
+    step : float, optional
+        Size of the steps of RK4 (s), and only of it.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
     **options
@@ -83,8 +95,13 @@ def simulate(
 
     Raises
     ------
+    ZenoError
+        Events that reset the state follow each other ever faster.
+    SimulationInterrupted
+        Ctrl-C; ``trajectory`` of the exception has the run up to there.
     SimulationError
-        The integration ended early or met a state that is not finite; its cause is the last failure of a kernel.
+        The integration ended early, met a state that is not finite, or took steps that lead nowhere; its cause is the
+        last failure of a kernel, or the singularity or jump at which it gave up.
     AssemblyError
         The initial values do not fit the loops.
     EvaluationError
@@ -102,11 +119,17 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+    if (method == "RK4") != (step is not None):
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    if step is not None:
+        max_step = first_step = step
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
-    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    watched = Events(module.layout, events)
     forcing = Forcing(module.layout, inputs)
-    compiled = can_run(module, method, forcing, listed)
+    compiled = can_run(module, method, forcing) and options.keys().isdisjoint(IMPLICIT)
+    if method == "RK4" and not compiled:
+        raise UsageError("method RK4 runs in compiled code only: target='cython', and no input that is a function")
     if compiled:
         solver, title = None, str(method)
         check_names("option of simulate", options, (), OPTIONS)
@@ -116,11 +139,14 @@ def simulate(
         check_options(solver, options, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
+    forcing.attach(bound)
     x0 = find_state(bound, initial, start)
-    u0 = forcing(start, x0)
-    forcing.require_finite()
-    bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
+    if forcing:
+        u0 = forcing(start, x0)
+        forcing.require_finite()
+        bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
+    else:
+        bound.rhs(start, x0)
     run = _Run(bound, forcing)
     tolerances = {
         "rtol": declared["rtol"] if rtol is None else rtol,
@@ -133,19 +159,30 @@ def simulate(
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    nodes = [start, *forcing.corners(start, end), end]
+    nodes = [start, *forcing.corners(start, end, compiled), end]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
         if compiled:
-            solution, failure = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch
+            solution, failure, raised = integrate_compiled(
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched
             )
             run.last = None if failure is None else ("rhs", *failure)
+            if isinstance(raised, KeyboardInterrupt):
+                raise SimulationInterrupted(
+                    f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
+                    lambda: record(bound, forcing, solution, title, options, watched.names),
+                ) from raised
+            if raised is not None:
+                raise raised
         else:
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, [Event(e) for e in listed], dense_output, options
-                )
+                    run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output,
+                    options, pace, partial(watched.reset, bound, forcing),
+                )  # fmt: skip
+    except Crawling as crawl:
+        raise run.gave_up(crawl, end, title, options) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         if run.last is None:
             raise
@@ -155,7 +192,7 @@ def simulate(
             watch.close()
     _check(run, solution, start, end, title)
     try:
-        return record(bound, forcing, solution, title, options)
+        return record(bound, forcing, solution, title, options, watched.names)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
@@ -177,11 +214,14 @@ def _follow_drivers(
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.base = bound.u
-    listed = [] if events is None else list(events) if isinstance(events, Sequence) else [events]
+    forcing.attach(bound)
+    watched = Events(module.layout, events)
+    if watched.resets:
+        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
+    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
-    return simulate_driven(bound, (start, end), initial, forcing, stored, [Event(e) for e in listed], given)
+    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
 
 
 class _Run:
@@ -190,9 +230,13 @@ class _Run:
     def __init__(self, module: Module, forcing: Forcing) -> None:
         self.module = module
         self.forcing = forcing
-        self.kernel: Timed = module.kernels.timed("rhs", nan=True)
         self.tangent: Timed | None = None
         self.last: tuple[str, int, float, Array] | None = None
+
+    @cached_property
+    def kernel(self) -> Timed:
+        """The right-hand side."""
+        return self.module.kernels.timed("rhs", nan=True)
 
     def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
         """f(t, x) for the solver."""
@@ -239,10 +283,22 @@ class _Run:
         """The last failure of a kernel as an exception."""
         return None if self.last is None else self.module.kernels.fail.exception(*self.last)
 
+    def troubled(self, t: float, x: Array) -> bool:
+        """Whether a state is at a singularity that can be named."""
+        return self.module.kernels.fail.trouble(x, t) is not None
+
+    def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
+        """The error for a run whose steps led nowhere."""
+        if self.troubled(crawl.t, crawl.x):
+            return self.ended(crawl.t, end, method, "", crawl.x)
+        with np.errstate(all="ignore"):
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
+
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
         """The error for a run that stopped at time t, at state x if that is known."""
         cause = self.cause()
-        trouble = None if x is None else rotation_trouble(self.module.layout, x)
+        trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
         if trouble is not None:
             return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
         if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):
@@ -257,8 +313,8 @@ class _Run:
 
 
 def _check(run: _Run, solution: Solution, start: float, end: float, method: str) -> None:
-    finite = np.isfinite(solution.x).all(axis=0)
-    if not finite.all():
+    if not np.isfinite(solution.x).all():
+        finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
         raise run.ended(float(solution.t[first]), end, method, "the state is not finite.") from run.cause()
     if solution.status < 0:
@@ -271,6 +327,8 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
+    if type(span) is tuple and len(span) == 2 and isfinite(span[0]) and isfinite(span[1]):
+        return float(span[0]), float(span[1])
     if np.ndim(span) == 0:
         return 0.0, number("the end of the span", span)
     pair = np.asarray(span, dtype=float)

@@ -11,6 +11,7 @@ from ..numeric.scales import Array
 from .compiled import stepper_options
 from .late import eager
 from .names import require
+from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
     from .module import Module
@@ -28,14 +29,14 @@ def find_solver(module: Module, name: str) -> Any:
 def solver_class(core: Any, name: str) -> Any:
     """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
 
-    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs`` it is
-    SciPy's own.  A failed evaluation shortens the step.
+    It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
+    Jacobian than the module's, it is SciPy's own.  A failed evaluation shortens the step.
 
     Parameters
     ----------
     core : Core
         Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'RK23'}
+    name : {'DOP853', 'RK45', 'RK23', 'Radau'}
 
     Raises
     ------
@@ -46,18 +47,13 @@ def solver_class(core: Any, name: str) -> Any:
     own: Any = getattr(scipy, name)
     rhs = core.timed
 
-    class Dense(scipy.DenseOutput):  # type: ignore[name-defined, misc]
-        """The solution within one step."""
-
-        def __init__(self, piece: Any) -> None:
-            super().__init__(piece.t_old, piece.t)
-            self._call_impl = piece
-
     class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
         """A compiled stepper."""
 
         def __new__(cls, fun: Any, *args: Any, **options: Any) -> Any:
-            if isinstance(fun, rhs) and fun.name == "rhs":
+            jac = options.get("jac")
+            known = jac is None or (isinstance(jac, rhs) and jac.name == "jacobian" and jac.context is fun.context)
+            if isinstance(fun, rhs) and fun.name == "rhs" and known and options.get("jac_sparsity") is None:
                 return super().__new__(cls)
             return own(fun, *args, **options)
 
@@ -75,24 +71,71 @@ def solver_class(core: Any, name: str) -> Any:
             **extraneous: Any,
         ) -> None:
             super().__init__(fun, t0, y0, t_bound, vectorized)
+            for key in IMPLICIT if name == "Radau" else ():  # the model's own Jacobian, or none
+                extraneous.pop(key, None)
             options = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **extraneous}
             settings = stepper_options(self.n, abs(t_bound - t0), options)
             self._stepper = core.stepper(name, fun.context, t0, np.asarray(y0, dtype=float), t_bound, **settings)
-            self.nfev = self._stepper.evaluations
+
+        @property
+        def nfev(self) -> int:
+            """Evaluations of the right-hand side so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.evaluations)
+
+        @nfev.setter
+        def nfev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def njev(self) -> int:
+            """Evaluations of the Jacobian so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.differentiations)
+
+        @njev.setter
+        def njev(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
+
+        @property
+        def nlu(self) -> int:
+            """Matrices factored so far."""
+            stepper = self.__dict__.get("_stepper")
+            return 0 if stepper is None else int(stepper.factorizations)
+
+        @nlu.setter
+        def nlu(self, value: int) -> None:
+            """OdeSolver sets it to 0 before there is a stepper."""
 
         def _step_impl(self) -> tuple[bool, str | None]:
             stepper = self._stepper
-            moved = stepper.step()
-            self.nfev = stepper.evaluations
-            if not moved:
+            if not stepper.step():
                 return False, self.TOO_SMALL_STEP
             self.t, self.y = stepper.t, stepper.state()
             return True, None
 
         def _dense_output_impl(self) -> Any:
-            piece = self._stepper.interpolant()
-            self.nfev = self._stepper.evaluations
-            return Dense(piece)
+            return self._stepper.interpolant()  # callable like a DenseOutput, with t_old, t, t_min, t_max
 
     Solver.__name__ = Solver.__qualname__ = name
     return Solver
+
+
+def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
+    """See :meth:`~.module.Module.step`."""
+    core = eager(module.core)
+    if hasattr(core, "march"):
+        context = module.kernels.context
+        status, result = core.march(context, t, h, x, u, out)
+        if status != 0:
+            module.kernels.fail("rhs", status, t, np.array(x, dtype=float))
+        return np.asarray(result)
+    start = np.array(x, dtype=float)
+    k = [module.rhs(t, start, u=u)]
+    for part in (0.5, 0.5, 1.0):
+        k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
+    after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    if out is None:
+        return np.asarray(after)
+    out[...] = after
+    return out

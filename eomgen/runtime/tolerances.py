@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from .layout import number
 
+IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 LEAST = 100.0 * np.finfo(float).eps  #: smallest relative tolerance, as in SciPy: nothing smaller can be kept
 
 
@@ -56,6 +57,8 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
 
 
 def _tolerance(name: str, given: Any, n: int) -> Any:
+    if type(given) is float and 0.0 <= given < np.inf:
+        return given
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):

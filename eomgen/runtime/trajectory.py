@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .events import Named
 from .names import require, unknown
 
 if TYPE_CHECKING:
@@ -63,8 +64,9 @@ class Trajectory:
     residuals : Residuals
         How well the loops were kept, raw and projected.
     t_events : list of (k,) arrays
+        Times of each event, also by name: ``t_events["floor"]``.
     x_events : list of (n_x, k) arrays
-        Projected states at the events.
+        Projected states at the events, before a reset.
     nfev, njev, nlu, status : int
         Calls of the right-hand side and the Jacobian, factorisations, SciPy's status (1: a terminal event).
     message : str
@@ -88,7 +90,8 @@ class Trajectory:
         self.names = columns.names
         self.units: dict[str, str] = header.get("units", {})
         self.residuals = Residuals(**header["residuals"])
-        self.t_events, self.x_events = list(t_events), list(x_events)
+        names = header.get("event_names") or [f"event_{k}" for k in range(len(t_events))]
+        self.t_events, self.x_events = Named(t_events, names), Named(x_events, names)
         self.nfev, self.njev, self.nlu = (int(header.get(key, 0)) for key in ("nfev", "njev", "nlu"))
         self.status, self.message = int(header.get("status", 0)), str(header.get("message", ""))
         self._sample = sample

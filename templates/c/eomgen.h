@@ -14,7 +14,8 @@ enum {
     EOMGEN_NON_FINITE = 1,           /* a result is NaN or infinite */
     EOMGEN_SINGULAR_MASS_MATRIX = 2, /* a motion has no inertia behind it */
     EOMGEN_PROJECTION_FAILED = 3,    /* the state could not be brought onto the constraints */
-    EOMGEN_PARTITION_BAD = 4         /* the independent coordinates cannot move the mechanism here */
+    EOMGEN_PARTITION_BAD = 4,        /* the independent coordinates cannot move the mechanism here */
+    EOMGEN_UNSOLVED = 5              /* rounding leaves the linear system of the accelerations unsolved */
 };
 
 /* t: time; x: the inputs one after the other; u: inputs over time; c: constants made by precompute;
@@ -28,6 +29,19 @@ typedef struct {
     int n_out; /* length of out */
 } eomgen_kernel;
 
+/* The same for several states at a time, number k of each in lane k: all arrays hold `width` doubles for every one of
+   eomgen_function's, side by side, and begin at a multiple of their 8*width bytes; c too may differ from lane to lane.
+   status: the status of every lane; what a lane with another than 0 has in out means nothing, the others are not
+   affected. Returns 0 if all are 0. A lane's results have the same bits whatever the others hold. */
+typedef int (*eomgen_lane_function)(const double *t, const double *x, const double *u, const double *c, double *out,
+    double *w, int *status);
+
+typedef struct {
+    int width;                           /* states at a time */
+    int (*usable)(void);                 /* whether this processor has the instructions */
+    const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
+} eomgen_lanes;
+
 typedef struct {
     int abi;
     const char *name;
@@ -39,6 +53,8 @@ typedef struct {
     const eomgen_kernel *kernels;
     int (*precompute)(const double *p, double *c);
     const char *metadata; /* JSON: names, units, values */
+    const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
+    int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
 } eomgen_model;
 
 /* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */
@@ -46,6 +62,17 @@ const eomgen_model *eomgen_model_table(void);
 
 #ifdef __cplusplus
 }
+#endif
+
+/* Widths to compile, added up: 2 for any processor, 4 and 8 for those with AVX2 and AVX-512. */
+#ifndef EOMGEN_LANES
+#if !defined(__GNUC__) || defined(EOMGEN_PORTABLE)
+#define EOMGEN_LANES 0
+#elif defined(__x86_64__)
+#define EOMGEN_LANES 14
+#else
+#define EOMGEN_LANES 2
+#endif
 #endif
 
 /* APART keeps pieces of very long code apart, so that compile time stays proportional to its length;

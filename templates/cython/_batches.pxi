@@ -7,9 +7,10 @@ cdef struct Piece:  # one input of a kernel: n numbers `row` bytes apart, states
 
 cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u belong to this call
     eomgen_function call
+    eomgen_lane_function lanes  # NULL: column by column
     Piece[3] pieces
     Piece time, inputs
-    int n_pieces, n_out
+    int n_pieces, n_in, n_out
     cnp.npy_intp columns
     bint nan
     const double *c
@@ -17,6 +18,7 @@ cdef struct Batch:  # one call of a kernel for `columns` states; w, x, y and u b
     double *x
     double *y
     double *u
+    double *side  # room of lanes, aligned
 
 
 cdef inline void gather(const Piece *piece, cnp.npy_intp column, double *target) noexcept nogil:

@@ -27,6 +27,13 @@ cdef extern from "eomgen.h" nogil:
         const char *name
         eomgen_function call
         int n_in, n_out
+    ctypedef int (*eomgen_lane_function)(const double *, const double *, const double *, const double *, double *,
+                                         double *, int *) noexcept nogil
+    ctypedef struct eomgen_lanes:
+        int width
+        int (*usable)() noexcept nogil
+        const eomgen_lane_function *kernels
+    ctypedef const eomgen_lanes *eomgen_lanes_pointer
     ctypedef struct eomgen_model:
         int abi
         const char *name
@@ -34,11 +41,14 @@ cdef extern from "eomgen.h" nogil:
         const eomgen_kernel *kernels
         int (*precompute)(const double *, double *) noexcept nogil
         const char *metadata
+        const eomgen_lanes_pointer *lanes
+        int closed_at
     const eomgen_model *eomgen_model_table() noexcept
 
 cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
+    WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
 if MODEL.abi != 1:
@@ -62,6 +72,8 @@ cdef cnp.ndarray doubles(object value, str label, object error):
     cdef cnp.ndarray array = cnp.PyArray_FROM_O(value)
     if cnp.PyArray_TYPE(array) == cnp.NPY_DOUBLE and cnp.PyArray_ISBEHAVED_RO(array):
         return array
+    if isinstance(value, dict):
+        raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
     if array.dtype.kind not in "biufO":
         raise error(f"{label} must hold real numbers, not {array.dtype}")
     return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)
@@ -122,6 +134,7 @@ cdef class Context:
 
 
 include "_batches.pxi"
+include "_lanes.pxi"
 
 
 cdef class Kernel:
@@ -149,6 +162,7 @@ cdef class Kernel:
     """
 
     cdef eomgen_function call
+    cdef eomgen_lane_function lanes
     cdef const double *c
     cdef const double *u
     cdef int n_in, n_out, ndim
@@ -162,6 +176,7 @@ cdef class Kernel:
         cdef int index = find(name, error)
         self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
         self.call = MODEL.kernels[index].call
+        self.lanes = LANES.kernels[index] if LANES != NULL else NULL
         self.n_in, self.n_out = MODEL.kernels[index].n_in, MODEL.kernels[index].n_out
         self.c = <const double *>cnp.PyArray_DATA(context.c)
         self.u = <const double *>cnp.PyArray_DATA(context.u)
@@ -236,7 +251,8 @@ cdef class Kernel:
         cdef double now = 0
         cdef list held = []
         batch.call, batch.c, batch.nan = self.call, self.c, self.tolerant
-        batch.n_pieces, batch.n_out = len(values), self.n_out
+        batch.n_pieces, batch.n_in, batch.n_out = len(values), self.n_in, self.n_out
+        batch.lanes = NULL
         for i in range(batch.n_pieces):
             label, length, value = values[i]
             held.append(self.read(value, length, label, &batch.pieces[i], &columns))
@@ -253,16 +269,22 @@ cdef class Kernel:
             batch.c = <const double *>cnp.PyArray_DATA(<cnp.ndarray>constants)
         cdef cnp.ndarray result = self.target(out, held, columns)
         cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
+        cdef cnp.npy_intp plain = length_of_all
+        if columns >= 0 and self.lanes != NULL:
+            batch.lanes = self.lanes
+            length_of_all += WIDEST + LANES.width * (plain + 1 + MODEL.n_const)
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
         batch.columns = 1 if columns < 0 else columns
         batch.x, batch.y = batch.w + MODEL.n_work, batch.w + MODEL.n_work + self.n_in
         batch.u = batch.y + self.n_out
+        batch.side = batch.w + plain
+        batch.side += (64 - <uintptr_t>batch.side % 64) % 64 // sizeof(double)
         if self.long or columns > 1:
             with nogil:
-                failed = sweep(&batch, <double *>cnp.PyArray_DATA(result), &status)
+                failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
         else:
-            failed = sweep(&batch, <double *>cnp.PyArray_DATA(result), &status)
+            failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
         if failed >= 0:
             now = load(&batch, failed)
             self.report(status, now, copy(batch.x, self.n_in))
@@ -345,3 +367,4 @@ def capsule(str name not None):
     return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)
 
 include "_steppers.pxi"
+include "_ensembles.pxi"

@@ -1,10 +1,17 @@
 # Steppers: the explicit Runge-Kutta methods of eomgen_steppers.h over the model's right-hand side.
 
 cdef extern from "eomgen_steppers.h" nogil:
+    ctypedef struct eomgen_tape:
+        int n, n_out
+        const int *code
+        const double *numbers
+        const int *out
+        double *results
     ctypedef struct eomgen_signal:
         int n, order
         const double *times
         const double *values
+        const eomgen_tape *tape
     ctypedef struct eomgen_run:
         eomgen_function rhs
         const double *c
@@ -19,6 +26,8 @@ cdef extern from "eomgen_steppers.h" nogil:
         double *y
         double *y_old
         double *f
+        const double *closed
+        double *next
         double *K
         double *F
         int interpolates
@@ -26,21 +35,65 @@ cdef extern from "eomgen_steppers.h" nogil:
         int failure
         double failure_time
         double *failure_state
+        double hold
+        long steps, most_steps
+        long look_in
+        long (*look)(void *, const double *) noexcept nogil
+        void *looker
+        eomgen_function jacobian
+        long differentiations, factorizations
+        int stopped
     ctypedef struct eomgen_method:
         const char *name
-        int rows_K, rows_F, error_order
+        int rows_K, rows_F, error_order, squares
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23
+    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau
+    int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
+                     double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
     int eomgen_step(const eomgen_method *, eomgen_run *) noexcept
     void eomgen_between(const eomgen_method *, eomgen_run *, double, double *) noexcept
-    int eomgen_advance(const eomgen_method *, eomgen_run *, long, const double *, long, long *, double *, double *,
-                       long *) noexcept
+    void eomgen_play(const eomgen_tape *, double, const double *, const double *, const double *, double *) noexcept
+    const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
-cdef method_pointer[3] METHODS
+cdef method_pointer[5] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
-methods = tuple([METHODS[i].name.decode() for i in range(3)])
+METHODS[3], METHODS[4] = &eomgen_rk4, &eomgen_radau
+methods = tuple([METHODS[i].name.decode() for i in range(5) if METHODS[i].squares == 0 or "jacobian" in names])
+
+
+cdef class Tape:
+    """An expression of t, x, u and p given at run time.
+
+    Parameters
+    ----------
+    code : sequence of (operation, i, j, k)
+        Operations by name; operands are earlier instructions, or an index into numbers, x, u or p.
+    numbers : sequence of float
+    out : sequence of int
+        Instructions whose results are wanted.
+    """
+
+    cdef eomgen_tape tape
+    cdef cnp.ndarray code, numbers, out, results
+
+    def __cinit__(self, code, numbers, out):
+        self.code = np.array([(TAPES[row[0]], *row[1:]) for row in code], dtype=np.intc).reshape(-1, 4)
+        self.numbers, self.out = np.array(numbers, dtype=float), np.array(out, dtype=np.intc)
+        self.results = np.zeros(len(code) + 1)
+        self.tape.n, self.tape.n_out = len(code), len(out)
+        self.tape.code = <const int *>cnp.PyArray_DATA(self.code)
+        self.tape.numbers = <const double *>cnp.PyArray_DATA(self.numbers)
+        self.tape.out = <const int *>cnp.PyArray_DATA(self.out)
+        self.tape.results = <double *>cnp.PyArray_DATA(self.results)
+
+
+cdef dict TAPES = {}
+cdef int _code = 0
+while eomgen_operations[_code] != NULL:
+    TAPES[eomgen_operations[_code].decode()] = _code
+    _code += 1
 
 
 cdef cnp.ndarray rows(cnp.npy_intp n, cnp.npy_intp k):
@@ -57,15 +110,54 @@ cdef class Interpolant:
     cdef readonly double t_old, t
 
     def __call__(self, t):
-        times = np.asarray(t, dtype=float)
-        cdef cnp.ndarray flat = np.ascontiguousarray(times.reshape(-1))
-        cdef cnp.npy_intp k = cnp.PyArray_DIM(flat, 0), i
-        cdef cnp.ndarray result = rows(k, self.run.n)
-        cdef double *y = <double *>cnp.PyArray_DATA(result)
+        cdef cnp.ndarray flat = cnp.PyArray_GETCONTIGUOUS(doubles(t, "t", ValueError)), result
+        cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
+        cdef int j
         cdef double *at = <double *>cnp.PyArray_DATA(flat)
+        cdef double *y = <double *>cnp.PyArray_DATA(self.memory) + n * (1 + self.method.rows_F)
+        cdef double *out
+        if cnp.PyArray_NDIM(flat) == 0:
+            self.method.interpolate(&self.run, at[0], y)
+            return copy(y, n)
+        result = rows(n, k)
+        out = <double *>cnp.PyArray_DATA(result)
         for i in range(k):
-            self.method.interpolate(&self.run, at[i], y + i * self.run.n)
-        return result[0] if times.ndim == 0 else np.ascontiguousarray(result.T)
+            self.method.interpolate(&self.run, at[i], y)
+            for j in range(n):
+                out[j * k + i] = y[j]
+        return result
+
+    @property
+    def t_min(self):
+        return min(self.t_old, self.t)
+
+    @property
+    def t_max(self):
+        return max(self.t_old, self.t)
+
+
+cdef const eomgen_signal *make_signals(signals, list held) except? NULL:
+    """The inputs over time as C reads them, in arrays that `held` keeps alive."""
+    cdef eomgen_signal *table
+    cdef cnp.npy_intp bytes = MODEL.n_u * sizeof(eomgen_signal)
+    if not signals:
+        return NULL
+    memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
+    table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
+    held.append(memory)
+    for index, *given in signals:
+        if len(given) == 1:
+            tape = Tape(*given[0])
+            held.append(tape)
+            table[<int>index].n, table[<int>index].tape = 1, &(<Tape>tape).tape
+            continue
+        order, times, values = given
+        pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
+        held.extend(pair)
+        table[<int>index].n, table[<int>index].order = len(times), order
+        table[<int>index].times = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[0])
+        table[<int>index].values = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[1])
+    return table
 
 
 cdef class Stepper:
@@ -84,30 +176,35 @@ cdef class Stepper:
     atol : (n_x,) array
     max_step, first_step : float
         A first step of 0 is chosen.
-    signals : list of (index, order, times, values), optional
-        Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values.
+    signals : list of (index, order, times, values) or (index, (code, numbers, out)), optional
+        Inputs over time: order 0 holds, 1 is linear; 3 has rows of 4 coefficients in values; or an expression.
+    plan : dict, optional
+        Of a Journey; then the first evaluation is left to it, and each step starts on the constraints.
 
     Attributes
     ----------
-    t, t_old, evaluations, rejected
-        Time, time before the last step, calls of the right-hand side so far, steps tried in vain.
+    t, t_old, evaluations, rejected, differentiations, factorizations
+        Time, time before the last step, calls of the right-hand side so far, steps tried in vain; of implicit methods,
+        calls of the Jacobian and matrices factored.
     """
 
     cdef eomgen_run run
     cdef const eomgen_method *method
-    cdef eomgen_signal *signals
     cdef Context context
     cdef cnp.ndarray memory, atol
     cdef list held
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
-                  double max_step, double first_step=0.0, signals=()):
+                  double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
         self.method = METHODS[methods.index(method)]
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
-        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (4 + self.method.rows_K + self.method.rows_F)
+        cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
+        if self.method.squares > 0:
+            length += self.method.squares * n * n + 16 + n
+            self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -119,65 +216,25 @@ cdef class Stepper:
         run.y_old = run.y + n
         run.f = run.y_old + n
         run.failure_state = run.f + n
-        run.K = run.failure_state + n
+        run.next = run.failure_state + n
+        run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
+        run.K = run.next + n
         run.F = run.K + n * self.method.rows_K
+        if self.method.squares > 0:
+            run.F += self.method.squares * n * n + 16 + n
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
         run.rtol, run.max_step, run.h_abs = rtol, max_step, first_step
         run.t = run.t_old = t0
-        run.t_bound, run.direction = t_bound, -1.0 if t_bound < t0 else 1.0
-        self.listen(signals)
-        eomgen_start(self.method, run)
-
-    cdef listen(self, signals):
-        cdef eomgen_signal *table
-        cdef cnp.npy_intp bytes = MODEL.n_u * sizeof(eomgen_signal)
-        if not signals:
-            return
-        memory = cnp.PyArray_ZEROS(1, &bytes, cnp.NPY_UINT8, 0)
-        table = <eomgen_signal *>cnp.PyArray_DATA(<cnp.ndarray>memory)
-        self.held.append(memory)
-        for index, order, times, values in signals:
-            pair = np.array(times, dtype=float), np.array(values, dtype=float, order="C")
-            self.held.extend(pair)
-            table[<int>index].n, table[<int>index].order = len(times), order
-            table[<int>index].times = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[0])
-            table[<int>index].values = <const double *>cnp.PyArray_DATA(<cnp.ndarray>pair[1])
-        self.run.signals = table
+        run.t_bound, run.direction, run.hold = t_bound, -1.0 if t_bound < t0 else 1.0, NAN
+        run.signals = make_signals(signals, self.held)
+        if plan is None:
+            eomgen_start(self.method, run)
 
     def step(self):
         """Take one step; False if it would have to be too small."""
         return eomgen_step(self.method, &self.run) == 0
-
-    def advance(self, long steps, t_eval=None, long done=0):
-        """Take up to so many steps without the GIL.
-
-        Returns
-        -------
-        status : int
-            0 while under way, 1 at the end, negative if a step would have to be too small.
-        times : (k,) array
-            Of all steps; with t_eval, of those of t_eval[done:] that were reached.
-        states : (k, n_x) array
-        """
-        cdef cnp.ndarray asked, times, states
-        cdef cnp.npy_intp room
-        cdef long n_eval = -1, stored = 0
-        cdef int status
-        cdef const double *wanted = NULL
-        if t_eval is None:
-            room = steps
-        else:
-            asked = np.ascontiguousarray(t_eval, dtype=float)
-            n_eval, room, wanted = len(t_eval), len(t_eval) - done, <const double *>cnp.PyArray_DATA(asked)
-        times, states = np.empty(room), rows(room, self.run.n)
-        cdef double *T = <double *>cnp.PyArray_DATA(times)
-        cdef double *X = <double *>cnp.PyArray_DATA(states)
-        cdef long first = done
-        with nogil:
-            status = eomgen_advance(self.method, &self.run, steps, wanted, n_eval, &done, T, X, &stored)
-        return status, (times[:stored] if t_eval is None else asked[first:done]), states[:stored]
 
     def state(self):
         """A copy of the state (n_x,)."""
@@ -189,7 +246,7 @@ cdef class Stepper:
         cdef int n = self.run.n
         eomgen_between(self.method, &self.run, self.run.t, self.run.K + n)  # forms the coefficients
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
-        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
+        cdef cnp.npy_intp length = n * (2 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
         memcpy(data, self.run.y_old, n * sizeof(double))
@@ -214,6 +271,14 @@ cdef class Stepper:
         return self.run.rejected
 
     @property
+    def differentiations(self):
+        return self.run.differentiations
+
+    @property
+    def factorizations(self):
+        return self.run.factorizations
+
+    @property
     def failure(self):
         """(status, t, x) of the last evaluation that failed, or None."""
         if self.run.failure == 0:
@@ -221,4 +286,32 @@ cdef class Stepper:
         return self.run.failure, self.run.failure_time, copy(self.run.failure_state, self.run.n)
 
 
+def march(Context context not None, double t, double h, x, u=None, out=None):
+    """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
+    cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
+    cdef cnp.ndarray start = vector(x, n, "x", ValueError), inputs = context.u
+    cdef cnp.npy_intp length = n, n_work = MODEL.n_work + 5 * n
+    cdef double[STACK] stack
+    cdef double *w = stack
+    cdef cnp.ndarray result
+    if u is not None:
+        inputs = vector(u, MODEL.n_u, "u", ValueError)
+    if (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
+            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_SIZE(<cnp.ndarray>out) == n):
+        result = out
+    elif out is None:
+        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
+    else:
+        raise ValueError(f"out must be a contiguous float64 array of shape ({n},)")
+    if n_work > STACK:
+        heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
+        w = <double *>cnp.PyArray_DATA(heap)
+    status = eomgen_march(MODEL.kernels[index].call, n, t, h, <double *>cnp.PyArray_DATA(start),
+                          <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
+                          <double *>cnp.PyArray_DATA(result), w, w + MODEL.n_work)
+    return status, result
+
+
 stepper = Stepper
+
+include "_journeys.pxi"

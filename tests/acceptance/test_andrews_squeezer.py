@@ -62,6 +62,13 @@ def test_stored_states_keep_the_loops_closed(squeezer: Any, run: Any) -> None:
     assert run.residuals.velocity < 1e-11 * max(1.0, speed)
 
 
+def test_energy_is_the_work_of_the_drive(run: Any) -> None:
+    """The torque on K1 is constant: T + V grows by mom * (beta - beta(0)) and nothing else."""
+    work = REFERENCE["parameters_SI"]["mom"] * (run["beta"] - run["beta"][0])
+    assert np.ptp(run["beta"]) > 1.0
+    np.testing.assert_allclose(run["energy"] - run["energy"][0], work, rtol=0, atol=1e-9 * np.abs(work).max())
+
+
 def test_raw_states_of_plain_solve_ivp(squeezer: Any) -> None:
     solution = solve_ivp(squeezer.rhs, (0, END), squeezer.x0(), method="DOP853", rtol=1e-12, atol=1e-14)
     assert solution.success

@@ -16,6 +16,7 @@ import judges
 import models
 import numpy as np
 import pytest
+from circular import circular_functions
 from emit.library import Library, compile_library
 from magnitudes import largest_terms
 
@@ -112,7 +113,8 @@ def misses(targets: Targets, target: str, call: Callable[[str, np.ndarray, float
             if target != "c" and block.name in ("kinematics", "scales"):
                 continue  # called with other arguments from Python; cython runs the code that c is compared by
             values = targets.values(block.inputs, given, t)
-            expected = np.array(evaluate(list(block.outputs), values), dtype=float)
+            with circular_functions(target):
+                expected = np.array(evaluate(list(block.outputs), values), dtype=float)
             allowed = np.maximum(largest_terms(block.outputs, values), np.finfo(float).tiny)
             ulps = (np.abs(call(block.name, given, t) - expected) / (EPS * allowed)).max()
             if not ulps <= FEW:
@@ -220,7 +222,7 @@ def test_one_perturbed_coefficient_is_seen(
     # only the kernels compared, so that the compiler has little to do
     targets.program = pipeline.build(eqs, target, kernels=PERTURBED)
     if target == "c":
-        start = f"static int {kernel}_block("
+        start = f"static flag {kernel}_block("
 
         def change(text: str) -> str:
             return perturb(text, start, "\n}\n")

@@ -85,7 +85,7 @@ def test_momentum_and_energy_with_constraints(name: str, compiled: Callable[...,
         n = np.eye(mod.n_v)[mod.layout.freedoms.index(gap)]
         M, C_q = mod.mass_matrix(q), mod.constraint_jacobian(q, rows="all")
         for e in (0.0, 0.6, 1.0):
-            hit = mod.impact(0.0, x, {gap: e})
+            hit = mod.impact(0.0, x, {gap: e}, closed=True)  # a stop where it is
             dv = hit.x[mod.n_q :] - v
             size = np.abs(M @ v).max()
             np.testing.assert_allclose(M @ dv + C_q.T @ hit.constraint_impulses, n * hit[gap], atol=1e-9 * size)
@@ -145,12 +145,30 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
     x = mod.x0()
     for words, message in (
         ({}, "an impact needs gaps"),
-        ({"gaps": {"ss": 0.5}}, r"no coordinate or output 'ss'"),
-        ({"gaps": {"s": 1.5}}, "between 0 and 1"),
-        ({"lock": ["tau"]}, "no coordinate or output 'tau'"),
+        ({"gaps": {"ss": 0.5}}, r"gaps: no coordinate or output 'ss'"),
+        ({"gaps": {"s": 1.5}}, "restitution of s is between 0 and 1"),
+        ({"gaps": {"s": None}}, "restitution of s must be a number"),
+        ({"gaps": {"s": "a"}}, "restitution of s must be a number"),
+        ({"gaps": {"s": [0.5]}}, "restitution of s must be one number"),
+        ({"gaps": ["s"]}, "gaps must be a mapping"),
+        ({"lock": None}, "lock must be a list"),
+        ({"lock": [0]}, "lock must be a list"),
+        ({"lock": ["tau"]}, "lock: no coordinate or output 'tau'"),
         ({"gaps": {"speed": 0.5}}, "depends on velocities"),
+        ({"gaps": {"s": 0.5}}, r"gap s is 0\.\d+ m, open; an impact needs 0"),
     ):
-        with pytest.raises(eg.EomgenError, match=message):
+        with pytest.raises(eg.UsageError, match=message):
             mod.impact(0.0, x, **words)
-    with pytest.raises(eg.EomgenError, match="at the start; a gap is 0 or positive"):
-        ball().simulate_impacts(1.0, {"gap": 0.5}, {"z": 0.0})
+    with pytest.raises(eg.UsageError, match="t must be a number"):
+        mod.impact("a", x, lock=["s"])
+    with pytest.raises(eg.UsageError, match=r"gap z is -0\.1 m, closed too far"):
+        ball().impact(0.0, [-0.1, -1.0], {"z": 0.5})
+    for words, message in (
+        ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap is 0 or positive"),
+        ({"span": -1.0}, "forward in time"),
+        ({"gaps": {}}, "needs gaps"),
+        ({"most": 0}, "most is a number of impacts"),
+        ({"t_eval": [0.0]}, r"no t_eval=; the run it returns has t_events, and at\(t\)"),
+    ):
+        with pytest.raises(eg.UsageError, match=message):
+            ball().simulate_impacts(**{"span": 1.0, "gaps": {"gap": 0.5}, "initial": {"z": 1.0}, **words})

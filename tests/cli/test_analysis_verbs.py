@@ -135,8 +135,20 @@ def test_inverse(call: Call) -> None:
 
 
 def test_impact(call: Call) -> None:
-    found = call("impact", CRANK, "--target", "numpy", "--json", "--gap", "s=0.5", "--set", "theta=0.3").json
+    words = ("impact", CRANK, "--target", "numpy", "--gap")
+    found = call(*words, "s=0.5", "--closed", "--json", "--set", "theta=0.3").json
     np.testing.assert_allclose(found["rates_after"][0], -0.5 * found["rates_before"][0], rtol=1e-9)
     assert found["energy_lost"] > 0.0
     assert "energy lost" in call("impact", CRANK, "--target", "numpy", "--stop", "s").out
-    assert call("impact", CRANK, "--target", "numpy").code == 2
+    for option, message in (
+        ([], "give --gap NAME=RESTITUTION for what closes, or --stop NAME"),
+        (["--gap", "s"], "--gap s: write name=value, for example --gap s=0.5"),
+        (["--gap", "s=abc"], "--gap s=abc: 'abc' is not a number"),
+        (["--gap", "ss=0.5"], "--gap: no coordinate or output 'ss'"),
+        (["--gap", "s=2"], "--gap: the restitution of s is between 0 and 1"),
+        (["--stop", "q"], "--stop: no coordinate or output 'q'"),
+        (["--gap", "s=0.5"], "open; an impact needs 0"),
+    ):
+        result = call("impact", CRANK, "--target", "numpy", *option)
+        assert result.code == 2
+        assert message in " ".join(result.err.split())

@@ -107,3 +107,29 @@ def test_an_integration_that_fails(call: Call, model_file: Callable[[str], Path]
     text = PENDULUM + "forces:\n  push: {type: torque, joint: pivot, value: 1/(1 - t)**3}\n"
     result = call("run", model_file(text))
     expect(result, 4, "model.yaml")
+
+
+def test_a_locked_joint_without_a_number_is_blamed_on_lock(call: Call, model_file: Callable[[str], Path]) -> None:
+    result = call("check", model_file("name: x\n"), "--lock", "left=abc")
+    assert result.code == 2
+    assert "--lock left=abc" in result.err
+    for words in (("--rotation", "foo"), ("--mimic", "foo"), ("--friction", "-1")):
+        result = call("check", model_file("name: x\n"), *words)
+        assert result.code == 2
+        assert f"'{words[0]}'" in result.err
+
+
+def test_faults_in_c_of_the_user_are_faults_of_the_model(
+    call: Call, model_file: Callable[[str], Path], tmp_path: Path
+) -> None:
+    (tmp_path / "law.c").write_text("double law(double x)\n{\n    return k*x;\n}\n")
+    functions = "functions: {law: {type: native, source: law.c}}\n"
+    functions += "forces: {f: {type: torque, joint: pivot, value: law(theta)}}\n"
+    file = model_file(PENDULUM + functions)
+    result = call("run", file, "--allow-native")
+    expect(result, 1, "law.c:3: functions.law: the compiler says: ", "undeclared")
+    assert "gcc" not in result.err
+    file = model_file(
+        PENDULUM + functions.replace("law.c", "law.c, arguments: 2").replace("law(theta)", "law(theta, 1)")
+    )
+    expect(call("check", file, "--allow-native"), 1, "functions.law.arguments: law in law.c:1 takes 1 arguments")

@@ -52,7 +52,7 @@ def test_settings_and_text(call: Call) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ((), 2, "give --range: 1 degrees of freedom are left, for example of theta"),
+        ((), 2, "give --range: 1 degree of freedom is left, for example of theta"),
         (("--range", "theta"), 2, "write NAME=START:END"),
         (("--range", "theta=0:x"), 2, "'x' is not a number"),
         (("--range", "theta=0:1:0"), 2, "the count is 1 to"),
@@ -80,3 +80,55 @@ def test_coordinates_led_over_time(call: Call, model_file: Callable[[str], Path]
     found = call("kinematics", path, *FAST, "--range", "t=0:2:5", "--range", "Y=0:1", "--json").json["motion"]
     assert (found["last"]["X"], found["last"]["X_dot"]) == pytest.approx((4, 4))
     assert (found["last"]["Y"], found["last"]["Y_dot"]) == pytest.approx((1, 0.5))
+
+
+ARM = """
+name: arm
+bodies:
+  upper: {mass: 1, inertia: {zz: 0.1}, markers: {elbow: [0.5, 0, 0]}}
+  lower: {mass: 1, inertia: {zz: 0.1}, markers: {tip: [0.3, 0, 0]}}
+joints:
+  A: {type: revolute, between: [ground, upper], coordinate: q1}
+  B: {type: revolute, between: [upper.elbow, lower], coordinate: q2, limits: {lower: 0.5, upper: 2.5}}
+outputs: {x: x(lower.tip), y: y(lower.tip)}
+initial: {q2: 1}
+"""
+
+
+def test_a_workspace(call: Call, model_file: Callable[[str], Path], tmp_path: Path) -> None:
+    words = ("--over", "q1=0:2*pi:37", "--over", "q2=0:pi:25", "--of", "x", "--of", "y")
+    path = model_file(ARM)
+    files = ("--out", "ws.csv", "--plot", "ws.png")
+    found = call("kinematics", path, *FAST, *words, *files, "--json").json["workspace"]
+    assert set(found) == {"shape", "over", "of", "status", "range", "extent", "singular"}
+    assert (found["shape"], found["status"]) == ([37, 25], {"reached": 925})
+    assert found["extent"] == pytest.approx(np.pi * (0.8**2 - 0.2**2), rel=0.01)
+    assert found["range"]["x"] == pytest.approx([-0.8, 0.8])
+    assert len(found["singular"]) == 74
+    table = np.genfromtxt(tmp_path / "ws.csv", delimiter=",", names=True, usecols=range(4))
+    assert table["x"] == pytest.approx(0.5 * np.cos(table["q1_rad"]) + 0.3 * np.cos(table["q1_rad"] + table["q2_rad"]))
+    assert (tmp_path / "ws.png").stat().st_size > 10_000
+    result = call("kinematics", path, *FAST, *words, "--within-limits")
+    assert result.code == 0
+    assert "workspace of arm: x, y over q1 (37), q2 (25)" in result.out
+    assert "592 reached, 333 limits" in result.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--over", "q1=0:1:3"), "--over needs --of"),
+        (("--of", "x"), "belong to --over"),
+        (("--over", "q1=0:1", "--of", "x"), "write NAME=LOW:HIGH:COUNT"),
+        (("--over", "q1=0:1:x", "--of", "x"), "--over q1=0:1:x: "),
+        (("--over", "q1=0:1:3", "--over", "q1=0:1:3", "--of", "x"), "each name once"),
+        (("--over", "q1=0:1:3", "--of", "x", "--range", "q1=0:1"), "do not go together"),
+        (("--over", "q1=0:1:3", "--of", "z"), "no output or coordinate 'z'"),
+    ],
+)
+def test_what_a_workspace_refuses(
+    call: Call, model_file: Callable[[str], Path], words: tuple[str, ...], said: str
+) -> None:
+    result = call("kinematics", model_file(ARM), *FAST, *words)
+    assert result.code == 2
+    assert said in result.err

@@ -24,6 +24,8 @@ from eomgen.compilation import (
     load_core,
 )
 from eomgen.compilation import options as options_module
+from eomgen.compilation.compiler import CompilerInfo
+from eomgen.compilation.options import compile_flags
 from eomgen.errors import MissingDependencyError, ToolchainError, UsageError
 
 
@@ -59,7 +61,7 @@ def test_everything_that_matters_changes_the_key(
         (sources, "pendulum", Options()),
         (sources, "swing", Options()),
         (sources, "pendulum", Options(optimize=0)),
-        (sources, "pendulum", Options(optimize=1)),
+        (sources, "pendulum", Options(optimize=2)),
         (sources, "pendulum", Options(native=True)),
         (sources, "pendulum", Options(warnings=True)),
         (sources, "pendulum", Options(extra=["-DEXTRA"])),
@@ -70,8 +72,19 @@ def test_everything_that_matters_changes_the_key(
     keys = [compile_c_library(*variant).key for variant in variants]
     assert len(set(keys)) == len(keys)
     assert compile_c_library(sources, "pendulum", Options(jobs=1)).key == keys[0]
-    monkeypatch.setattr(options_module, "LARGE_SOURCE", 10)
+    monkeypatch.setattr(options_module, "GCC_LEVEL", 2)
     assert compile_c_library(sources, "pendulum").key == keys[3]
+
+
+def test_flags_are_those_measured_to_be_best() -> None:
+    gcc, clang = (CompilerInfo(kind, (kind,), kind, "") for kind in ("gcc", "clang"))
+    for compiler, size, level in ((gcc, 1, 1), (gcc, 10**7, 1), (clang, 1, 2), (clang, 10**7, 1)):
+        flags = compile_flags(Options(), compiler, size, hidden=True)
+        assert f"-O{level}" in flags
+        assert "-ffp-contract=off" in flags
+        assert "-ffast-math" not in flags
+    native = compile_flags(Options(native=True), gcc, 1, hidden=True)
+    assert {"-march=native", "-ffp-contract=fast"} <= set(native)
 
 
 @pytest.mark.parametrize("options", [Options(optimize=0), Options(native=True, warnings=True)])

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.describe import load, load_yaml, yaml_nodes
+from eomgen.describe import load_yaml, yaml_nodes
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import DEPTH, SIZE, scalar
 from eomgen.errors import ModelError, UsageError
+from eomgen.loading import load
 
 REFUSED = {
     "alias": ("name: a\ngravity: &g [0, 0, 0]\nindependent: *g\n", 2, "the anchor &g"),
@@ -135,7 +136,7 @@ class Refuse:
         if name.partition(".")[0] in ("sympy", "scipy", "matplotlib", "pandas", "jinja2"):
             raise ImportError(name + " is refused here")
 sys.meta_path.insert(0, Refuse())
-from eomgen.describe import load
+from eomgen.loading import load
 from eomgen.errors import ModelError
 m = load(sys.argv[1])
 print(m.mechanism().name, m.joints["A"].coordinate_names, len(m.to_yaml()) > 100)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import shlex
@@ -12,10 +13,13 @@ from pathlib import Path
 import pytest
 
 import eomgen
+from eomgen import rotations
 from eomgen.describe.fields import BODY, EQUATIONS, FORCE, FUNCTION, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
+from eomgen.describe.fields_constraints import CONSTRAINT
 from eomgen.describe.names import FUNCTIONS, QUANTITIES, TOTALS
 from eomgen.describe.scope import ENERGIES
 from eomgen.joints import JOINTS
+from eomgen.program import KERNELS
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -110,6 +114,24 @@ def test_the_page_of_functions_knows_every_key() -> None:
     words = set(re.findall(r"\w+", (ROOT / "docs" / "functions.md").read_text(encoding="utf-8")))
     fields = {key: field for keys in FUNCTION.values() for key, field in keys.items()}
     assert {*FUNCTION, *fields, *(word for field in fields.values() for word in field.choices)} - words == set()
+
+
+def test_the_pages_know_kernels_sequences_rotations_and_methods() -> None:
+    text = {
+        name: (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("python", "joints", "constraints")
+    }
+    assert {k.name for k in KERNELS} - set(re.findall(r"`(\w+)`", text["python"])) == set()
+    assert set(rotations.__all__) - set(re.findall(r"`(\w+)`", text["joints"])) == set()
+    sequences = {a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if b not in (a, c)}
+    assert sequences - set(re.findall(r"`(\w+)`", text["joints"])) == set()
+    for name, shown in re.findall(r"^\| `m\.(\w+)` \| `([^`]*)` \|$", text["constraints"], re.MULTILINE):
+        taken = [
+            p
+            for key, p in inspect.signature(getattr(eomgen.Model, name)).parameters.items()
+            if key not in ("self", "name")
+        ]
+        assert shown == ", ".join(p.name if p.default is p.empty else f"{p.name}={p.default}" for p in taken), name
+    assert set(CONSTRAINT) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
 
 
 def test_the_readme_shows_the_slider_crank_that_ships() -> None:

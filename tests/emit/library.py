@@ -9,10 +9,21 @@ from pathlib import Path
 
 import numpy as np
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-ffp-contract=off")
+STRICT = ("-std=c99", "-DEOMGEN_LANES=0", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-ffp-contract=off")
 POINTER = ctypes.POINTER(ctypes.c_double)
 FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[POINTER] * 5)
 PRECOMPUTE = ctypes.CFUNCTYPE(ctypes.c_int, POINTER, POINTER)
+
+
+LANES = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 6, ctypes.POINTER(ctypes.c_int))
+
+
+class Lanes(ctypes.Structure):
+    _fields_ = (
+        ("width", ctypes.c_int),
+        ("usable", ctypes.CFUNCTYPE(ctypes.c_int)),
+        ("kernels", ctypes.POINTER(ctypes.c_void_p)),
+    )
 
 
 class Entry(ctypes.Structure):
@@ -31,6 +42,7 @@ class Table(ctypes.Structure):
         ("kernels", ctypes.POINTER(Entry)),
         ("precompute", PRECOMPUTE),
         ("metadata", ctypes.c_char_p),
+        ("lanes", ctypes.POINTER(ctypes.POINTER(Lanes))),
     )
 
 
@@ -87,3 +99,38 @@ class Library:
         status, out = self(name, x, t)
         assert status == 0, f"{name} returned {status}"
         return out
+
+    @property
+    def lanes(self):
+        """Usable widths -> their tables."""
+        found, k = {}, 0
+        while self.table.lanes and self.table.lanes[k]:
+            lanes = self.table.lanes[k].contents
+            if lanes.usable():
+                found[lanes.width] = lanes
+            k += 1
+        return found
+
+    def side_by_side(self, width, name, t, x, u, c):
+        """A kernel in lanes: columns of x, u, c -> statuses (width,), out (n_out, width)."""
+        index = list(self.entries).index(name)
+        call = LANES(self.lanes[width].kernels[index])
+        given = [aligned(np.reshape(a, (-1, width))) for a in (t, x, u, c)]
+        n_out = self.entries[name].n_out
+        out = aligned(np.full((n_out + 1, width), np.nan))
+        out[-1] = 12345.0
+        work = aligned(np.full((self.table.n_work + 1, width), np.nan))
+        status = (ctypes.c_int * width)(*[77] * width)
+        worst = call(*(a.ctypes.data for a in (*given, out, work)), status)
+        assert (out[-1] == 12345.0).all()
+        assert bool(worst) == any(status)
+        return np.array(status), out[:-1]
+
+
+def aligned(array):
+    """A copy that begins at a multiple of 64 bytes; never empty."""
+    room = np.zeros(array.size + 16)
+    start = -(room.ctypes.data // 8) % 8
+    view = room[start : start + array.size].reshape(array.shape)
+    view[...] = array
+    return view

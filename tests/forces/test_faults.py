@@ -155,3 +155,41 @@ forces:
     told = [str(p) for p in error.value.problems]
     assert any("m.yaml:5: forces.rub: has no law" in line for line in told)
     assert any("m.yaml:6: forces.oil.potential: unknown name 'rate'" in line for line in told)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_torque_on_a_length_is_a_force_in_newton(target: str) -> None:
+    """6 N on a coordinate s along (0, 3, 4) / 5 do what the force of 6 N along that line does: 3 m/s^2 of 2 kg."""
+    rates = []
+    for kind in ("torque", "actuator", "force"):
+        m = eg.Model("pushed")
+        m.prismatic("s", m.ground, b := m.body("b", mass=2), axis=(0, 3, 4))
+        where = b if kind == "force" else "s"
+        getattr(m, kind)("push", where, value=(0, 3.6, 4.8) if kind == "force" else 6)
+        rates.append(m.compile(target=target).rhs(0.0, [0.0, 0.0])[1])
+    np.testing.assert_allclose(rates, 3.0, rtol=1e-14)
+
+
+def test_a_force_on_a_joint_is_refused_with_the_remedy(tmp_path: Path) -> None:
+    m, _ = slider()
+    m.force("push", "s", (1, 0, 0))
+    with pytest.raises(
+        ModelError, match=r"forces\.push\.marker: a force acts at a marker, and 's' is not one; .*torque"
+    ):
+        m.check()
+    m, b = slider()
+    handle = m.revolute("r", b, m.body("c", mass=1))
+    with pytest.raises(eg.errors.UsageError, match="'push' acts at a marker.*take torque or actuator"):
+        m.force("push", handle, (1, 0, 0))
+    file = tmp_path / "slider.yaml"
+    file.write_text(slider()[0].to_yaml() + "forces: {push: {type: force, joint: s, value: 3}}\n")
+    with pytest.raises(ModelError, match=r"forces\.push\.joint: a force acts at a marker") as caught:
+        eg.load(file).check()
+    assert len(caught.value.problems) == 1
+
+
+def test_a_body_may_bear_the_name_of_a_joint() -> None:
+    m = eg.Model("named")
+    m.prismatic("b", m.ground, m.body("b", mass=2), axis="x")
+    m.force("push", "b", (4, 0, 0))
+    assert m.compile(target="numpy").rhs(0.0, [0.0, 0.0])[1] == pytest.approx(2.0)

@@ -89,5 +89,5 @@ def test_redundant_equations_get_the_least_reactions() -> None:
         "relaxed": [[1, 1], [2, 2], [3, 3]],
     }
     K = np.array([2.0, 1.0, 1.0, 1.0, 1.0, 1e-17])
-    z = Pattern(described).factor(K, np.ones(3)).solve(np.array([6.0, 0.0, 0.0, 0.0]))
+    z = Pattern(described).balance(K, np.ones(8)).solve(np.array([6.0, 0.0, 0.0, 0.0]))
     np.testing.assert_allclose(z, [0.0, 3.0, 3.0, 0.0], atol=1e-12)

@@ -96,3 +96,10 @@ def test_public_names() -> None:
     assert tree <= set(eomgen.__all__)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = eomgen.nothing
+
+
+def test_descriptions_do_not_know_robots_nor_command_lines() -> None:
+    """Robots are described in the words of describe; what loads both stands above them."""
+    for file in (ROOT / "eomgen" / "describe").glob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        assert not [word for word in ("..robots", "..cli", "..loading") if f"from {word}" in text], file.name

@@ -15,6 +15,7 @@ import pytest
 
 import eomgen as eg
 from eomgen import pipeline
+from eomgen.compilation.native_faults import blame_source
 from eomgen.emit import emit_c
 from eomgen.errors import ModelError, ToolchainError, UsageError
 
@@ -144,10 +145,42 @@ def test_the_source_is_part_of_what_is_compiled(sources: Path) -> None:
 
 
 def test_errors_of_the_compiler_name_the_users_file(sources: Path) -> None:
-    (sources / "laws.c").write_text("double swing(double q) {\n    return sin(q\n}\n")
-    with pytest.raises(ToolchainError) as caught:
+    (sources / "laws.c").write_text("double swing(double q) {\n    return z + sin(q);\n}\n")
+    with pytest.raises(ModelError, match=r"laws\.c:2: functions\.swing: the compiler says: .*undeclared.*; correct"):
         pendulum("-swing(q)", full(sources)).compile()
-    assert "laws.c:2" in caught.value.output
+
+
+def test_other_words_of_a_compiler_are_no_fault_of_a_source(sources: Path) -> None:
+    functions = pendulum("-swing(q)", full(sources)).derive().kinematics.graph.functions.values()
+    for output in ("cc1: fatal error: no space left", "my_laws.c:3:1: error: x", "laws.c:3:1: warning: x"):
+        assert blame_source(ToolchainError("failed", "cc", output), functions) is None
+    found = blame_source(ToolchainError("failed", "cc", "/a/laws.c:3:1: error: b\n/a/laws.c:3:9: error: c"), functions)
+    assert [(p.file, p.line, p.message) for p in found.problems] == [("laws.c", 3, "the compiler says: b")]
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "message"),
+    [
+        ("double swing(double q);\n", {"arguments": 2}, r"laws\.c:1 takes 1 arguments, not the 2 declared"),
+        ("/* double swing(double) */\nstatic const double\nswing(double a,\n double b)\n{}", {},
+         r"swing\.arguments: swing in laws\.c:3 takes 2 arguments, not the 1 declared; give arguments: 2"),
+        ("double other(double q) { return swing(q); }\ndouble swing(void) { return 1; }", {}, "laws.c:2 takes 0 arg"),
+        ("int swing(int q) { return q; }", {}, "laws.c:1 has 'int', which is no double; write double swing.double."),
+        ("double swing(double *q) { return *q; }", {}, "has 'double .q', which is no double"),
+    ],
+)  # fmt: skip
+def test_arguments_are_held_against_the_source(sources: Path, text: str, keys: dict[str, Any], message: str) -> None:
+    (sources / "laws.c").write_text(text)
+    with pytest.raises(ModelError, match=message):
+        pendulum("-swing(q)", full(sources, **keys)).check()
+
+
+@pytest.mark.parametrize(
+    "text", ["#define LAW(n) double n(double q)\nLAW(swing) { return q; }\n", "real swing(const real q) { return q; }"]
+)
+def test_what_only_the_compiler_can_tell_is_left_to_it(sources: Path, text: str) -> None:
+    (sources / "laws.c").write_text("typedef double real;\n" + text)
+    assert pendulum("-swing(q)", full(sources)).compile().rhs(0, [0.5, 0.0])[1] == pytest.approx(-0.5)
 
 
 def test_packages_carry_the_function(sources: Path, tmp_path: Path) -> None:

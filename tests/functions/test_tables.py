@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline, PchipInterpolator, RectBivariateSpline
 
 import eomgen as eg
-from eomgen.describe.splines import curve_coefficients, slopes, surface_nodes
 from eomgen.numeric.functions import Curve, Surface
+from eomgen.numeric.splines import curve_coefficients, slopes, surface_nodes
 
 REFERENCES = {
     "cubic": lambda x, y: CubicSpline(x, y),

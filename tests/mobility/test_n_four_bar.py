@@ -61,6 +61,17 @@ def test_a_chain_of_any_length_goes_through_its_flat_position(n: int) -> None:
     assert np.abs(cranks - cranks[0]).max() <= 1e-5  # it stays a row of parallelograms
 
 
+@pytest.mark.parametrize("n", [10, pytest.param(40, marks=pytest.mark.slow)])
+def test_tight_tolerances_do_not_make_steps_crawl_at_the_flat_position(n: int) -> None:
+    """Steps start on the constraints, and a state that is on them to rounding is not moved by that rounding."""
+    run = n_four_bar(n).compile(independent=["theta0"]).simulate((0, 10), rtol=1e-10, atol=1e-12)
+    assert len(run.t) <= 400  # 142 are taken; of 10 loops 2,129 were
+    x, y, _ = tip(n, run.t)
+    assert max(np.abs(run["x"] - x).max(), np.abs(run["y"] - y).max()) <= 1e-4
+    assert np.ptp(run["energy"]) <= 1e-6 * run["T"].max()
+    assert max(run.residuals.position, run.residuals.velocity) <= 1e-10
+
+
 def operations(n: int) -> dict[str, int]:
     """Multiplications, additions and divisions of what a call of the right-hand side runs."""
     program = pipeline.build(n_four_bar(n).derive(independent=["theta0"]), "c", ["rhs"])
@@ -76,7 +87,7 @@ def test_the_work_of_a_loop_does_not_grow_with_the_number_of_loops() -> None:
     for part in ("closing", "dynamics"):
         per_loop = [(found[2 * n][part] - found[n][part]) / n for n in (5, 10, 20)]
         assert max(per_loop) <= 1.02 * min(per_loop), part
-    assert sum(found[40].values()) <= 40 * 720
+    assert sum(found[40].values()) <= 40 * 750
 
 
 def test_a_state_with_more_freedoms_at_once_is_named() -> None:

@@ -70,3 +70,28 @@ def test_units_do_not_matter_and_correlation_does():
     assert not safely_positive(np.array([1.0, 1e-16]), np.array([1.0, 1e-2]))
     assert not safely_positive(np.array([1.0, 1e-30]), np.array([1.0, 1e-30]))
     assert not safely_positive(np.array([1.0, np.nan]), np.array([1.0, 1.0]))
+
+
+@pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
+@pytest.mark.parametrize("along", [(1, 2, 3), (1, -1, 0), (1, 0, 0)])
+def test_a_thin_rod_that_may_spin_names_its_body_and_axis(along: tuple[int, int, int], rotation: str) -> None:
+    u = np.array(along) / np.linalg.norm(along)
+    m = eg.Model("rod", gravity=(0, 0, -9.81))
+    b = m.body("stick", mass=1, com=tuple(0.5 * u), inertia=((np.eye(3) - np.outer(u, u)) / 12).tolist())
+    m.spherical("s", m.ground, b, rotation=rotation)
+    m.initial(**{"s_1": 0.2, "s_2": 0.3} if rotation == "euler_angles" else {})
+    with pytest.raises(ModelError) as caught:
+        m.check()
+    (problem,) = caught.value.problems
+    assert problem.path == "joints.s"
+    if rotation == "euler_parameters" and along == (1, 0, 0):
+        assert problem.message.startswith("coordinate 's_wx' has no inertia behind it")
+        return
+    axis = ", ".join(f"{x:.3g}" for x in u)
+    assert problem.message.endswith(f"has no inertia behind it: it turns 'stick' about ({axis}) in body axes")
+    assert problem.remedy == "give 'stick' an inertia about that axis, or a joint that does not turn it so"
+    rates = [float(x) for x in problem.message.partition("rates ")[2].partition(" has")[0].split(" : ")]
+    if rotation == "euler_parameters":  # the angular velocity itself
+        w = np.zeros(3)
+        w[u != 0] = rates
+        np.testing.assert_allclose(np.cross(w, u), 0, atol=2e-3)

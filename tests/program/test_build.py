@@ -22,9 +22,12 @@ def names(program):
 
 def test_a_small_tree_has_its_right_hand_side_on_the_graph(systems):
     blocks, drivers = names(systems.chain(3).program())
+    assert drivers == ["dae_jacobian"]
+    assert {"rhs", "outputs", "project", "kinematics", "embedded_mass_matrix", "jacobian"} < set(blocks)
+    assert {"input_jacobian", "parameter_jacobian"} < set(blocks)
+    assert not {"terms", "position", "rate", "accelerated_outputs", "residual_jacobian"} & set(blocks)
+    _, drivers = names(systems.chain(3).program(limits=Limits(jacobian_nodes=10)))
     assert drivers == ["jacobian", *DERIVATIVES]
-    assert {"rhs", "outputs", "project", "kinematics", "embedded_mass_matrix", "residual_jacobian"} < set(blocks)
-    assert not {"terms", "position", "rate", "accelerated_outputs"} & set(blocks)
 
 
 def test_a_large_tree_and_a_loop_have_drivers(systems):
@@ -38,10 +41,21 @@ def test_a_large_tree_and_a_loop_have_drivers(systems):
     assert "residual_jacobian" not in blocks
 
 
+def test_derivatives_tell_which_entries_vanish(systems):
+    program = systems.chain(3).program()
+    n, sparsity = 3, program.metadata["sparsity"]
+    assert sparsity["jacobian"][:n] == [n, 2 * n + n + 1, 4 * n + n + 2]  # q' = v
+    outputs = {b.name: b.outputs for b in program.blocks}
+    for name, places in sparsity.items():
+        assert places == [k for k, x in enumerate(outputs[name]) if not x.is_zero]
+    assert len(sparsity["mass_matrix"]) == n * n
+
+
 def test_the_kernels_are_those_of_the_table_with_their_shapes(systems):
     for system in (systems.chain(2), systems.slider_crank(copies=2)):
         program = system.program()
-        empty = [k.name for k in KERNELS if k.late and 0 in k.shape(program.sizes)]
+        optional = ("events", "resets")
+        empty = [k.name for k in KERNELS if (k.late or k.name in optional) and 0 in k.shape(program.sizes)]
         expected = [k.name for k in KERNELS if k.name not in (*empty, "coordinate_slopes")]
         assert [k.name for k in program.kernels] == expected
         n, m = system.n, system.terms.n_c

@@ -119,6 +119,50 @@ def test_all_faults_are_told_at_once(arm: Any) -> None:
     assert [p.line for p in caught.value.problems] == [3, 5, 8]
 
 
+def test_inertias_and_scales_are_told_with_the_rest(arm: Any) -> None:
+    shapes = '<visual><geometry><mesh filename="a.stl" scale="1 0 1"/></geometry></visual>'
+    path = arm('ixx="0.1" iyy="0.1" izz="0.01"', 'ixx="0.1" iyy="0.1" izz="0.9"')
+    path.write_text(
+        path.read_text()
+        .replace("prismatic", "sliding")
+        .replace('mass value="0.5"/></inertial>', f'mass value="-1"/></inertial>{shapes}')
+    )
+    with pytest.raises(eg.ModelError) as caught:
+        eg.load(path)
+    assert [(p.line, p.path) for p in caught.value.problems] == [
+        (3, "link.upper.inertial.inertia"),
+        (5, "link.tip.inertial.mass"),
+        (5, "link.tip.visual.mesh.scale"),
+        (8, "joint.slide.type"),
+    ]
+    said = [p.message for p in caught.value.problems]
+    assert "one exceeds the sum of the others" in said[0]
+    assert said[2] == "a scale of 0 leaves nothing of the mesh"
+
+
+def test_a_mirrored_mesh_leaves_a_note_and_is_written_as_it_is(arm: Any, tmp_path: Path) -> None:
+    shape = '<visual><geometry><mesh filename="a.stl" scale="1 -1 1"/></geometry></visual>'
+    m = eg.load(arm('<mass value="0.5"/></inertial>', f'<mass value="0.5"/></inertial>{shape}'))
+    assert "link.tip.visual.mesh.scale: negative factors mirror the mesh" in m.notes
+    m.check()
+    m.save(tmp_path / "arm.yaml")
+    eg.load(tmp_path / "arm.yaml").check()
+    (tmp_path / "arm.yaml").write_text((tmp_path / "arm.yaml").read_text().replace("-1.0, 1.0]", "0.0, 1.0]"))
+    with pytest.raises(eg.ModelError, match=r"bodies\.tip\.display\[0\]\.scale: a scale of 0 leaves nothing"):
+        eg.load(tmp_path / "arm.yaml").check()
+
+
+def test_drives_are_in_the_units_of_their_joints(arm: Any) -> None:
+    """Without gravity: 3 N m on the shoulder alone, 2 N on the slide alone against Newton and Euler by hand."""
+    module = eg.load(arm(), actuate=True, gravity=(0, 0, 0)).compile(target="numpy")
+    units = dict(zip(module.u_names, (module.metadata["units"].get(n) for n in module.u_names), strict=True))
+    assert units == {"tau_shoulder": "N*m", "tau_slide": "N"}
+    x = np.zeros(4)
+    moved = module.rhs(0.0, x, u=[3.0, 2.0])[2:]
+    about_shoulder = 0.1 + 2 * 0.2**2 + 0.5 * 0.4**2
+    np.testing.assert_allclose(moved, [3 / about_shoulder, 2 / 0.5], rtol=1e-12)
+
+
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_no_entity_reads_a_file(suffix: str, arm: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     secret = tmp_path / "secret"

@@ -35,10 +35,12 @@ def test_auto_takes_what_needs_fewer_operations_and_says_so(name: str, floating:
     assert equations.method == choice.method == min(choice.operations, key=lambda m: choice.operations[m])
     recursive = model.derive("recursive")
     assert choice.operations["recursive"] == recursive.operations["accelerations"].total
-    if name != "talos":  # more than 24 velocities are solved for in loops
+    if name != "talos":
         tree = model.derive("embedding").tree
         solved = solve(factorize(tree.mass_matrix, equations.kinematics.parent), [-h for h in tree.bias])
-        assert choice.operations["embedding"] == count(solved).total
+        along = count(solved).total
+        # a floating base is solved along its own axes, which takes fewer
+        assert choice.operations["embedding"] < along if floating else choice.operations["embedding"] == along
 
 
 def test_a_large_robot_is_told_in_lines_that_fit() -> None:

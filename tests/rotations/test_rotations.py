@@ -254,3 +254,11 @@ def test_bad_input() -> None:
 def test_numbers_do_not_load_sympy() -> None:
     code = "import sys; from eomgen import rotations as r; r.matrix_from_euler_angles('xyz', [1, 2, 3]); "
     subprocess.run([sys.executable, "-c", code + "assert 'sympy' not in sys.modules"], check=True)
+
+
+def test_a_matrix_that_is_no_rotation_is_refused_with_its_determinant() -> None:
+    for matrix, determinant in ((2 * np.eye(3), "8"), (np.diag([1.0, 1.0, -1.0]), "-1")):
+        with pytest.raises(ValueError, match=f"not a rotation.* 1, which is {determinant}"):
+            rot.euler_parameters_from_matrix(matrix)
+    with pytest.raises(ValueError, match=r"not one of shape \(2, 2\)"):
+        rot.rotation_vector_from_matrix(np.eye(2))

@@ -180,8 +180,8 @@ def test_wrong_inputs_are_told(pendulum):
         ({"tua": 1.0}, "did you mean tau"),
         ({"tau": ([0.0, 0.0], [1.0, 2.0])}, "times must increase, not go from 0.0 to 0.0"),
         ({"tau": ([0.0, 1.0], [1.0])}, "same length"),
-        ({"tau": "strong"}, "must be a number"),
-        ({"tau": np.zeros((2, 2))}, "number, \\(times, values\\) or a function"),
+        ({"tau": "strong"}, "no name in input tau 'strong'"),
+        ({"tau": np.zeros((2, 2))}, "number, \\(times, values\\), a Signal, an expression as text or a function"),
         ({"tau": lambda t, x: x}, "one number at each time"),
         (3.0, "mapping"),
     ]:
@@ -199,7 +199,7 @@ def test_wrong_options_are_told(pendulum):
         ({"initial": np.zeros(3)}, r"shape \(2,\) \[theta, theta_dot\]"),
         ({"initial": {"thetta": 1.0}}, "did you mean theta"),
         ({"parameters": {"q": 1.0}}, "no parameter 'q'"),
-        ({"events": 3}, "event must be a function"),
+        ({"events": 3}, "event must be a name, an expression or a function"),
     ]:
         with pytest.raises(UsageError, match=words):
             pendulum.simulate(**({"span": 1.0} | options))
@@ -347,3 +347,35 @@ def test_unknown_options_are_refused_with_the_nearest(pendulum):
             super().__init__(*args, **options)
 
     assert pendulum.simulate(0.1, method=Mine, anything=3).t[-1] == 0.1
+
+
+class Pushing:
+    def push(self, t):
+        return t
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda t: t, r"lambda>\(t\) does not take; write it with both, as lambda t, x"),
+        (Pushing().push, r"push\(t\) does not take"),
+        (lambda: 1.0, r"\(\) does not take"),
+        (lambda t, x, gain: gain, r"\(t, x, gain\) does not take; bind its other arguments"),
+    ],
+)
+def test_functions_of_other_arguments_are_refused_by_name(crank, function, said):
+    m = crank()
+    with pytest.raises(UsageError, match=rf"input tau: its function is called as f\(t, x\), which .*{said}"):
+        m.simulate((0, 0.1), inputs={"tau": function})
+    with pytest.raises(UsageError, match=rf"an event is called as f\(t, x\), which .*{said}"):
+        m.simulate((0, 0.1), events=function)
+
+
+@pytest.mark.parametrize("function", [lambda t, x: 0.0, lambda *a: 0.0, lambda t, x, gain=1.0: 0.0 * gain, max])
+def test_functions_of_time_and_state_are_taken_as_they_are(crank, function):
+    if function is max:  # shows no signature
+        function = np.frompyfunc(lambda t, x: 0.0, 2, 1)
+        with pytest.raises((UsageError, TypeError, ValueError)):
+            crank().simulate((0, 0.01), inputs={"tau": function})
+        return
+    assert crank().simulate((0, 0.01), inputs={"tau": function}).t[-1] == 0.01

@@ -267,3 +267,21 @@ def test_a_hole_larger_than_the_rest_leaves_no_mass() -> None:
     hole = {"type": "sphere", "radius": 2, "density": 1, "subtract": True}
     with pytest.raises(ModelError, match=r"bodies\.b\.mass: is -"):
         one(solids=[{"type": "sphere", "radius": 1, "density": 1}, hole]).mechanism()
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"), [(0, "leaves nothing"), (-0.5, "would mirror the mesh"), ("s", "-2 .*mirror")]
+)
+def test_scales_that_leave_no_solid_are_refused(tmp_path: Path, scale: object, message: str) -> None:
+    file = written(tmp_path / "box.stl", trimesh.creation.box((1, 1, 1)))
+    m = one(solids=[{"type": "mesh", "file": str(file), "mass": 1, "scale": scale}])
+    m.parameter("s", -2)
+    with pytest.raises(ModelError, match=rf"bodies\.b\.solids\[0\]\.scale: .*{message}.*greater than 0"):
+        m.mechanism()
+
+
+def test_negative_lengths_by_parameters_are_refused() -> None:
+    m = one(solids=[{"type": "sphere", "radius": "s", "mass": 1}])
+    m.parameter("s", -2)
+    with pytest.raises(ModelError, match=r"solids\[0\]\.radius: 's' is negative"):
+        m.mechanism()

@@ -108,14 +108,13 @@ def test_heavy_top(rotation: str) -> None:
 
 
 WAYS = [(method, target) for method in sorted(METHODS) for target in ("cython", "numpy")]
-#: The others take 100,000 noisy steps to the singularity.
-QUICK = [("embedding", "cython"), ("embedding", "numpy"), ("lagrange", "cython"), ("recursive", "cython"),
-         ("recursive", "numpy")]  # fmt: skip
+SLOW = ("amalgamated", "hamilton")  #: noise may carry them through the singularity, or nearly
 
 
 @pytest.mark.parametrize(
     ("sequence", "method", "target"),
-    [(sequence, *way) for sequence in ("xyz", "zxz") for way in QUICK] + [("yzx", "auto", "cython")],
+    [(sequence, *way) for sequence in ("xyz", "zxz") for way in WAYS if way[0] not in SLOW]
+    + [("yzx", "auto", "cython")],
 )
 def test_euler_angles_stop_at_their_singularity_and_pass_by_it(sequence: str, method: str, target: str) -> None:
     """A ball spins about a fixed axis exactly through, and nearly through, the singular orientation at t = 1 s."""

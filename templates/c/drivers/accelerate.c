@@ -51,7 +51,15 @@ static int accelerate(double t, const double *restrict u, const double *restrict
     for (int i = 0; i < M; i++) {
         r[i] = gamma[i] / s[N + i];
     }
-    correct_linear(M, w + AT_G, r, scaled, w); /* of minimum norm: no small pivot makes it large */
+    double fastest = 0.0;
+    for (int k = 0; k < N; k++) {
+        fastest = fmax(fastest, fabs(w[AT_V + k] / s[k]));
+    }
+    /* of minimum norm: no small pivot makes it large */
+    status = correct_linear(M, w + AT_G, r, scaled, 1e-15 * fastest * fastest, 2, w);
+    if (status != 0) {
+        return status;
+    }
     embed_mass(w);
     status = ldl_factor(w + AT_B, w + AT_MASS, w + AT_EMBEDDED);
     if (status != 0) {

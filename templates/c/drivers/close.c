@@ -21,9 +21,9 @@ static int close_loops(double t, const double *restrict x, const double *restric
     for (int k = 0; k < N; k++) {
         v[k] /= s[k];
     }
-    correct_linear(M, w + AT_G, r, v, w);
+    status = correct_linear(M, w + AT_G, r, v, 1e-15 * fmax(longest_of(v, N), longest_of(r, M)), 1, w);
     for (int k = 0; k < N; k++) {
         v[k] *= s[k];
     }
-    return 0;
+    return status;
 }

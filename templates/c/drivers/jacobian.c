@@ -1,39 +1,3 @@
-/* The change of the projected state for the unit change of x[column]: dq and dv in w + AT_DQ and w + AT_DV. */
-static void project_direction(double t, int column, const double *restrict u, const double *restrict c,
-                              double *restrict w)
-{
-    const double *const s = w + AT_SCALES, *const q = w + AT_X;
-    double *const dq = w + AT_DQ, *const dv = w + AT_DV, *const r = w + AT_RATE, *const r3 = w + AT_ALONG + N + M;
-    for (int k = 0; k < NQ + N; k++) {
-        dq[k] = k == column ? 1.0 : 0.0;
-    }
-    for (int i = 0; i < M; i++) {
-        r[i] = 0.0;
-    }
-    if (column < NQ) {
-        find_velocities(q, dq, dv);
-        for (int k = 0; k < N; k++) {
-            dv[k] /= s[k];
-        }
-        correct_linear(MH, w + (MH < M ? AT_GH : AT_G), r, dv, w);
-        for (int k = 0; k < N; k++) {
-            dv[k] *= s[k];
-        }
-        spread(q, dv, dq);
-        rate_along(t, u, c, w);
-        for (int i = 0; i < M; i++) {
-            r[i] = r3[i] / s[N + i];
-        }
-    }
-    for (int k = 0; k < N; k++) {
-        dv[k] = NQ + k == column ? 1.0 / s[k] : 0.0;
-    }
-    correct_linear(M, w + AT_G, r, dv, w);
-    for (int k = 0; k < N; k++) {
-        dv[k] *= s[k];
-    }
-}
-
 static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
@@ -54,7 +18,10 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     find_multipliers(width, &parts, w + AT_L, w);
     prepare_residuals(t, u, c, w);
     for (int column = 0; column < NQ + N; column++) {
-        project_direction(t, column, u, c, w);
+        status = project_direction(t, column, u, c, w);
+        if (status != 0) {
+            return status;
+        }
         residuals_along(t, u, c, w);
         for (int k = 0; k < N; k++) {
             r1[k] *= s[k], da[k] = 0.0;

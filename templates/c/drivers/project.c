@@ -1,24 +1,19 @@
-/* x -= J^T G^-1 (J x + r), five times so that the term GENTLE leaves no trace: the nearest x with J x + r = 0, in the first
-   rows of J. */
-static void correct_linear(int rows, const double *restrict G, const double *restrict r, double *restrict x,
-                           double *restrict w)
+/* Newton's step dz back in w + AT_STEP, by the factor in w + AT_G; what linear theory leaves of the residual. */
+static double step_back(const double *restrict C, double *restrict w)
 {
-    const double *const J = w + AT_J;
-    double *const e = w + AT_E;
-    for (int pass = 0; pass < 5; pass++) {
-        for (int i = 0; i < rows; i++) {
-            e[i] = r[i];
-            for (int k = 0; k < N; k++) {
-                e[i] += J[i * N + k] * x[k];
-            }
-        }
-        cholesky_solve(rows, G, e);
-        for (int i = 0; i < rows; i++) {
-            for (int k = 0; k < N; k++) {
-                x[k] -= J[i * N + k] * e[i];
-            }
+    const double *const s = w + AT_SCALES, *const J = w + AT_J;
+    double *const e = w + AT_E, *const dz = w + AT_STEP;
+    for (int i = 0; i < MH; i++) {
+        e[i] = C[i] / s[N + i];
+    }
+    cholesky_solve(MH, w + AT_G, e);
+    for (int k = 0; k < N; k++) {
+        dz[k] = 0.0;
+        for (int i = 0; i < MH; i++) {
+            dz[k] += J[i * N + k] * e[i];
         }
     }
+    return largest_left(J, C, dz, s);
 }
 
 /* The nearest q with C(q) = 0, in place; leaves C and C_q, J and the factor of G there in w. */
@@ -26,7 +21,7 @@ static int close_position(double t, double *restrict q, const double *restrict u
                           double *restrict w)
 {
     const double *const s = w + AT_SCALES, *const C = w + AT_POSITION, *const J = w + AT_J;
-    double *const e = w + AT_E, *const dz = w + AT_STEP;
+    double *const dz = w + AT_STEP;
     double before = 0.0;
     int last = 0;
     for (int step = 0; step <= 25; step++) {
@@ -42,20 +37,19 @@ static int close_position(double t, double *restrict q, const double *restrict u
             return status;
         }
         if (step == 25) {
-            return is_within(1e-10, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(1e-10, 64.0, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
-        for (int i = 0; i < MH; i++) {
-            e[i] = C[i] / s[N + i];
-        }
-        cholesky_solve(MH, w + AT_G, e);
-        for (int k = 0; k < N; k++) {
-            dz[k] = 0.0;
-            for (int i = 0; i < MH; i++) {
-                dz[k] += J[i * N + k] * e[i];
+        double left = step_back(C, w);
+        if (left > 0.1 * size && !is_within(1e-15, 4.0, C, J, q, s)) { /* along weak rows, and the term keeps it */
+            double row;
+            const double weak = weakness(MH, J, w + AT_E, &row);
+            if (size < 0.01 * weak) { /* the step is far shorter than the way to lost rank */
+                (void)factor_gram(MH, J, fmax(TIKHONOV, 1e-4 * weak), w + AT_G);
+                left = step_back(C, w);
             }
         }
         const double part = damping(dz, N);
-        last = arrives(longest_of(dz, N), largest_left(J, C, dz, s));
+        last = arrives(longest_of(dz, N), left);
         for (int k = 0; k < N; k++) {
             dz[k] *= -s[k] * part;
         }

@@ -22,3 +22,26 @@ static double largest_left(const double *restrict J, const double *restrict C, c
     }
     return largest;
 }
+
+/* The square of the singular value of J along z, relative to the square of the largest row of J. */
+static double weakness(int rows, const double *restrict J, const double *restrict z, double *restrict largest)
+{
+    double across = 0.0, along = 0.0;
+    *largest = 0.0;
+    for (int k = 0; k < N; k++) {
+        double d = 0.0;
+        for (int i = 0; i < rows; i++) {
+            d += J[i * N + k] * z[i];
+        }
+        across += d * d;
+    }
+    for (int i = 0; i < rows; i++) {
+        double size = 0.0;
+        for (int k = 0; k < N; k++) {
+            size += J[i * N + k] * J[i * N + k];
+        }
+        along += z[i] * z[i];
+        *largest = fmax(*largest, size);
+    }
+    return along > 0.0 ? across / (along * *largest) : 1.0;
+}

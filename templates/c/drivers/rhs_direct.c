@@ -30,6 +30,7 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
         if (status == 0 && found[2 * N] != 0.0) {
             form_rates(y, found, out);
             for (int k = 0; k < N; k++) {
+                y[NQ + k] = found[k];
                 out[NQ + k] = found[N + k];
             }
             return 0;

@@ -24,16 +24,16 @@ EOMGEN_SHARED double largest_residual(const double *restrict C, const double *re
     return largest;
 }
 
-/* Whether each |C / s_c| is within the limit, or within what rounding of q leaves of it: 64 eps |J| |q / s_q|. */
-EOMGEN_SHARED int is_within(double limit, const double *restrict C, const double *restrict J, const double *restrict q,
-                            const double *restrict s)
+/* Whether each |C / s_c| is within the limit, or within what rounding of q leaves of it: so many eps |J| |q / s_q|. */
+EOMGEN_SHARED int is_within(double limit, double roundings, const double *restrict C, const double *restrict J,
+                            const double *restrict q, const double *restrict s)
 {
     for (int i = 0; i < MH; i++) {
         double rounded = 0.0;
         for (int k = 0; k < N; k++) {
             rounded += fabs(J[i * N + k] * coordinate_of(q, k)) / s[k];
         }
-        if (!(fabs(C[i] / s[N + i]) <= fmax(limit, 64.0 * 2.220446049250313e-16 * rounded))) {
+        if (!(fabs(C[i] / s[N + i]) <= fmax(limit, roundings * 2.220446049250313e-16 * rounded))) {
             return 0;
         }
     }
@@ -45,7 +45,7 @@ EOMGEN_SHARED int is_within(double limit, const double *restrict C, const double
 EOMGEN_SHARED int has_settled(int step, double size, double before, const double *restrict C, const double *restrict J,
                               const double *restrict q, const double *restrict s)
 {
-    return size == 0.0 || (step > 0 && (size <= 1e-15 || (size > 0.5 * before && is_within(1e-12, C, J, q, s))));
+    return size == 0.0 || (step > 0 && (size <= 1e-15 || (size > 0.5 * before && is_within(1e-12, 64.0, C, J, q, s))));
 }
 
 /* A full step of this scaled length that leaves so much of the residual, by linear theory, is the last one needed. */

@@ -1,25 +1,6 @@
-/* d = (L U)^-1 d */
-static void substitute_system(const double *restrict lu, const int *restrict plan, double *restrict d)
-{
-    const int *const last = plan + NZ, *const deep = plan + 2 * NZ;
-    for (int k = 0; k < NZ; k++) {
-        const double entry = d[plan[k]];
-        d[plan[k]] = d[k];
-        d[k] = entry;
-        for (int i = k + 1; i <= deep[k]; i++) {
-            d[i] -= lu[i * NZ + k] * entry;
-        }
-    }
-    for (int i = NZ - 1; i >= 0; i--) {
-        for (int j = i + 1; j <= last[i]; j++) {
-            d[i] -= lu[i * NZ + j] * d[j];
-        }
-        d[i] /= lu[i * NZ + i];
-    }
-}
-
 /* K z = r by steps with the factors of the relaxed K: the proximal point method, which of all solutions with redundant
-   constraints finds the one of least multipliers. Ends when the defect no longer halves. */
+   constraints finds the one of least multipliers. Ends when the defect no longer halves,
+   and says whether it is rounding. */
 static int solve_system(const double *restrict r, const int *restrict plan, double *restrict z, double *restrict w)
 {
     const double *const K = w + AT_SYSTEM, *const row = w + AT_ROW, *const column = w + AT_COLUMN;
@@ -28,7 +9,7 @@ static int solve_system(const double *restrict r, const int *restrict plan, doub
     for (int i = 0; i < NZ; i++) {
         z[i] = 0.0;
     }
-    for (int count = 0; count < 30; count++) {
+    for (int count = 0; count <= 30; count++) {
         double size = 0.0;
         for (int i = 0; i < NZ; i++) {
             d[i] = r[i];
@@ -43,8 +24,10 @@ static int solve_system(const double *restrict r, const int *restrict plan, doub
         if (!isfinite(size)) {
             return EOMGEN_NON_FINITE;
         }
-        if (size == 0.0 || (count > 1 && size > 0.5 * before)) {
-            return 0;
+        if (size == 0.0 || count == 30 || (count > 1 && size > 0.5 * before)) {
+            /* a step leaves 1e-10 / (s^2 + 1e-10) along constraints of singular value s */
+            const double weak = size > 0.0 ? 1e-10 * (before / size - 1.0) : 1.0;
+            return is_solved(r, z, weak, w) ? 0 : EOMGEN_UNSOLVED;
         }
         before = size;
         substitute_system(w + AT_LU, plan, d);

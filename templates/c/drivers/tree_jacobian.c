@@ -1,24 +1,59 @@
+/* b = -M^-1 b for the rows of b, each of so many columns. */
+static void tree_solve_rows(const double *restrict H, double *restrict b, int columns)
+{
+    for (int i = N - 1; i >= 0; i--) {
+        const double *const row = b + i * columns;
+        for (int j = PARENT[i]; j >= 0; j = PARENT[j]) {
+            const double ratio = H[i * (i + 1) / 2 + j];
+            double *const above = b + j * columns;
+            for (int k = 0; k < columns; k++) {
+                above[k] -= ratio * row[k];
+            }
+        }
+    }
+    for (int i = 0; i < N; i++) {
+        const double inverse = -1.0 / H[i * (i + 1) / 2 + i];
+        double *const row = b + i * columns;
+        for (int k = 0; k < columns; k++) {
+            row[k] *= inverse;
+        }
+        for (int j = PARENT[i]; j >= 0; j = PARENT[j]) {
+            const double ratio = H[i * (i + 1) / 2 + j], *const above = b + j * columns;
+            for (int k = 0; k < columns; k++) {
+                row[k] -= ratio * above[k];
+            }
+        }
+    }
+}
+
 static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                           double *restrict out, double *restrict w)
 {
-    double *const dq = w + AT_DQ, *const dv = w + AT_DV, *const r1 = w + AT_ALONG, *const rates = w + AT_RATES;
+    enum { NX = NQ + N };
+    double *const direction = w + AT_DQ, *const rates = w + AT_RATES;
+    const double *const r1_q = w + AT_RESIDUAL, *const r1_v = r1_q + N * NQ;
     const int status = tree_accelerate(t, x, u, c, w);
     if (status != 0) {
         return status;
     }
-    prepare_residuals(t, u, c, w);
-    for (int column = 0; column < NQ + N; column++) {
-        for (int k = 0; k < NQ + N; k++) {
-            dq[k] = k == column ? 1.0 : 0.0;
-        }
-        residuals_along(t, u, c, w);
-        tree_solve(w + AT_TERMS, r1);
-        change_rates(x, dq, dv, rates);
+    (void)residual_jacobian_block(t, w + AT_X, u, c, w + AT_RESIDUAL, w);
+    for (int i = 0; i < N; i++) {
+        double *const row = out + (NQ + i) * NX;
         for (int k = 0; k < NQ; k++) {
-            out[k * (NQ + N) + column] = rates[k];
+            row[k] = r1_q[i * NQ + k];
         }
         for (int k = 0; k < N; k++) {
-            out[(NQ + k) * (NQ + N) + column] = -r1[k];
+            row[NQ + k] = r1_v[i * N + k];
+        }
+    }
+    tree_solve_rows(w + AT_TERMS, out + NQ * NX, NX);
+    for (int column = 0; column < NX; column++) {
+        for (int k = 0; k < NX; k++) {
+            direction[k] = k == column ? 1.0 : 0.0;
+        }
+        change_rates(x, direction, direction + NQ, rates);
+        for (int k = 0; k < NQ; k++) {
+            out[k * NX + column] = rates[k];
         }
     }
     return 0;

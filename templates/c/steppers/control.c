@@ -5,42 +5,20 @@
 
 #include "eomgen_steppers.h"
 
-static double interpolated(const eomgen_signal *s, double t)
-{
-    int low = 0, high = s->n - 1;
-    const int size = s->order == 3 ? 4 : 1;
-    if (t <= s->times[0] || high == 0) {
-        return s->values[0];
-    }
-    if (t >= s->times[high]) {
-        return s->values[high * size];
-    }
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        if (s->times[middle] <= t) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    const double x = t - s->times[low], *const v = s->values + low * size;
-    if (s->order == 0) {
-        return v[0];
-    }
-    if (s->order == 1) {
-        return v[0] + x * ((v[1] - v[0]) / (s->times[low + 1] - s->times[low]));
-    }
-    return v[0] + x * (v[1] + x * (v[2] + x * v[3]));
-}
-
 void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
 {
-    if (run->signals != NULL) {
-        for (int i = 0; i < run->n_u; i++) {
-            if (run->signals[i].n > 0) {
-                run->u[i] = interpolated(run->signals + i, t);
-            }
+    if (--run->look_in == 0) {
+        run->look_in = run->look(run->looker, &run->t);
+        run->stopped = run->look_in <= 0;
+    }
+    if (run->stopped) {
+        for (int i = 0; i < run->n; i++) {
+            k[i] = NAN;
         }
+        return;
+    }
+    if (run->signals != NULL) {
+        eomgen_force(run, t, y);
     }
     const int status = run->rhs(t, y, run->u, run->c, k, run->w);
     run->evaluations++;
@@ -89,47 +67,70 @@ static double first_step(const eomgen_method *method, eomgen_run *run)
     return fmin(fmin(100.0 * h0, h1), fmin(length, run->max_step));
 }
 
+/* Where the next step starts: the state just evaluated, on the constraints. */
+static void keep_closed(eomgen_run *run)
+{
+    if (run->closed != NULL) {
+        memcpy(run->next, run->closed, (size_t)run->n * sizeof(double));
+    }
+}
+
 void eomgen_start(const eomgen_method *method, eomgen_run *run)
 {
     run->interpolates = 0;
     eomgen_evaluate(run, run->t, run->y, run->f);
+    keep_closed(run);
     if (!(run->h_abs > 0.0)) {
         run->h_abs = first_step(method, run);
+    }
+    if (method->begin != NULL) {
+        method->begin(run);
     }
 }
 
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
+    if (method->step != NULL) {
+        return method->step(run);
+    }
     const int n = run->n;
-    const double exponent = -1.0 / (method->error_order + 1);
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
     double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs < least ? least : run->h_abs;
     int rejected = 0;
+    if (run->most_steps > 0 && run->steps >= run->most_steps) {
+        return EOMGEN_TOO_MANY_STEPS;
+    }
     double *const spare = run->y_old;
     run->y_old = run->y, run->y = spare;
+    if (run->closed != NULL) { /* E. Eich, SIAM J. Numerical Analysis 30, 1993: the order stays; x' is the same at both */
+        memcpy(run->y_old, run->next, (size_t)n * sizeof(double));
+    }
     memcpy(run->K, run->f, (size_t)n * sizeof(double));
     for (;;) {
-        if (!(h_abs >= least)) {
+        if (run->stopped || !(h_abs >= least)) {
             run->y = run->y_old, run->y_old = spare;
-            return EOMGEN_STEP_TOO_SMALL;
+            return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
         double t_new = run->t + h_abs * run->direction;
-        if (run->direction * (t_new - run->t_bound) > 0.0) {
+        const double slack = method->fixed ? -1e-9 * h_abs : 0.0; /* no step for what rounding left over */
+        if (run->direction * (t_new - run->t_bound) > slack) {
             t_new = run->t_bound;
         }
         const double h = t_new - run->t;
         h_abs = fabs(h);
         method->attempt(run, h);
-        const double error = method->error(run, h);
-        if (error < 1.0) {
-            double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * pow(error, exponent));
+        const double error = n > 0 ? method->error(run, h) : 0.0;
+        if (error < 1.0 && !run->stopped) {
+            double factor = error == 0.0 ? 10.0 : fmin(10.0, 0.9 * eomgen_stretch(error, method->error_order));
             factor = rejected && factor > 1.0 ? 1.0 : factor;
             run->h_abs = h_abs * factor;
             run->t_old = run->t, run->t = t_new, run->step = h;
             run->interpolates = 0;
+            run->steps++;
+            keep_closed(run);
             return 0;
         }
-        const double factor = 0.9 * pow(error, exponent);
+        const double factor = 0.9 * eomgen_stretch(error, method->error_order);
         h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
         rejected = 1;
         run->rejected++;
@@ -143,29 +144,4 @@ void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, doub
         run->interpolates = 1;
     }
     method->interpolate(run, t, y);
-}
-
-int eomgen_advance(const eomgen_method *method, eomgen_run *run, long steps, const double *t_eval, long n_eval,
-                   long *done, double *times, double *states, long *stored)
-{
-    const size_t size = (size_t)run->n * sizeof(double);
-    for (long k = 0; k < steps; k++) {
-        if (run->direction * (run->t - run->t_bound) >= 0.0) {
-            return 1;
-        }
-        const int status = eomgen_step(method, run);
-        if (status != 0) {
-            return status;
-        }
-        if (n_eval < 0) {
-            times[*stored] = run->t;
-            memcpy(states + *stored * run->n, run->y, size);
-            ++*stored;
-        }
-        while (*done < n_eval && run->direction * (t_eval[*done] - run->t) <= 0.0) {
-            eomgen_between(method, run, t_eval[*done], states + *stored * run->n);
-            ++*stored, ++*done;
-        }
-    }
-    return run->direction * (run->t - run->t_bound) >= 0.0;
 }

@@ -1,16 +1,32 @@
-/* Explicit Runge-Kutta steppers over a model's right-hand side, with SciPy's step control. */
+/* Steppers over a model's right-hand side, with SciPy's step control. eomgen_run is one integration, eomgen_method how it
+   steps; eomgen_loop.h runs whole trajectories, with inputs over time, events and output at given times. */
 #ifndef EOMGEN_STEPPERS_H
 #define EOMGEN_STEPPERS_H
 
+#include <math.h>
+
 #include "eomgen.h"
+
+/* Expressions given at run time: instructions in order, each with a result of its own; see tape.c for the operations. */
+typedef struct {
+    int n, n_out;          /* instructions, values handed out */
+    const int *code;       /* rows of 4: operation, and its operands: earlier instructions, or an index for leaves */
+    const double *numbers; /* of the operation `number` */
+    const int *out;        /* n_out: the instructions handed out */
+    double *results;       /* n, work */
+} eomgen_tape;
 
 /* One input over time: u = value of a table at t, or constant where n is 0. Outside the table its end values hold. */
 typedef struct {
-    int n;               /* points */
-    int order;           /* 0 holds the last value, 1 linear, 3 cubic */
-    const double *times; /* n, increasing */
+    int n;                /* points; 1 for a tape */
+    int order;            /* 0 holds the last value, 1 linear, 3 cubic */
+    const double *times;  /* n, increasing */
     const double *values; /* n values; for order 3, 4 coefficients a point: value, slope, curvature / 2, third / 6 */
+    const eomgen_tape *tape; /* an expression of t, x and parameters instead of a table, or NULL */
 } eomgen_signal;
+
+/* The value of a table at time t. */
+double eomgen_interpolated(const eomgen_signal *s, double t);
 
 /* One integration. The caller owns every array; y, f, K, F change. */
 typedef struct {
@@ -25,17 +41,27 @@ typedef struct {
     const double *atol;           /* n */
     double t, t_old, step, h_abs; /* step: the last one taken, with its sign; h_abs: size of the next to try */
     double *y, *y_old, *f;        /* n: state, the one before, x' of the state */
+    const double *closed;         /* n in w: the state of the last evaluation on the constraints; NULL: steps start as they are */
+    double *next;                 /* n: where the next step starts, if not NULL */
     double *K;                    /* rows_K rows of n: stages */
     double *F;                    /* rows_F rows of n: coefficients between y_old and y */
     int interpolates;             /* F belongs to the last step */
-    long evaluations, rejected;
+    long evaluations, rejected, steps;
+    long most_steps;              /* more are refused; 0: any number */
     int failure;                  /* status of the last evaluation that failed */
     double failure_time;
     double *failure_state;        /* n */
+    double hold;                  /* tables of order 0 are read at this time, inside the present part; NAN: at t itself */
+    long look_in;                 /* evaluations until look is called; below 0 never */
+    long (*look)(void *looker, const double *t); /* the next look_in, or 0 to stop the run */
+    void *looker;
+    eomgen_function jacobian;     /* of implicit methods */
+    long differentiations, factorizations;
+    int stopped;                  /* look said so: results of evaluations are NaN from then on, and no step is taken */
 } eomgen_run;
 
 /* A method; attempt forms y after a step and all stages, with x' there in the last; error is what the norm must keep
-   under 1; prepare forms F. */
+   under 1; prepare forms F; interpolate reads t_old, step, y_old and F alone. */
 typedef struct {
     const char *name;
     int rows_K, rows_F;
@@ -44,27 +70,47 @@ typedef struct {
     double (*error)(const eomgen_run *run, double h);
     void (*prepare)(eomgen_run *run);
     void (*interpolate)(const eomgen_run *run, double t, double *y);
+    int fixed; /* steps are all max_step long, but for the last */
+    int squares; /* of implicit methods: n x n matrices after the rows in run->K, then 16 + n numbers */
+    void (*begin)(eomgen_run *run);
+    int (*step)(eomgen_run *run); /* in place of attempt and error */
 } eomgen_method;
 
-extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23;
+extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau;
 
-enum { EOMGEN_STEP_TOO_SMALL = -100 };
+enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEPS = -104 };
+
+/* The value of a table at time t. */
+double eomgen_table_value(const eomgen_signal *s, double t);
+
+/* error to the power of -1 / (order + 1): what the next step is to be multiplied with, but for safety. */
+static inline double eomgen_stretch(double error, int order)
+{
+    return order == 7 ? 1.0 / sqrt(sqrt(sqrt(error))) : pow(error, -1.0 / (order + 1));
+}
+
+/* The inputs at (t, y) into run->u, and the values of a tape into out. */
+void eomgen_force(eomgen_run *run, double t, const double *y);
+extern const char *const eomgen_operations[]; /* names of the codes, then NULL */
+void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out);
 
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k);
 
+/* dx'/dx at (t, y), where x' is f, into J; spare: 2 n doubles. 0, or the status of a failure, which is remembered. */
+int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare);
+
 /* First evaluation, and h_abs unless it is positive already. */
 void eomgen_start(const eomgen_method *method, eomgen_run *run);
 
-/* One accepted step: 0, or EOMGEN_STEP_TOO_SMALL. */
+/* One accepted step: 0, or one of the above, which leave t and y as they were. */
 int eomgen_step(const eomgen_method *method, eomgen_run *run);
+
+/* One Runge-Kutta step of size h from x into out, which may be x; k: 5 n doubles. The status of the right-hand side. */
+int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
+    double *out, double *w, double *k);
 
 /* The state at time t of the last step. */
 void eomgen_between(const eomgen_method *method, eomgen_run *run, double t, double *y);
-
-/* Up to `steps` steps. Where n_eval is negative every step's time and state are stored (rows of n), else the states at the
-   times t_eval[*done] onwards that were reached. *stored counts rows. 0 while running, 1 at t_bound, else a failure. */
-int eomgen_advance(const eomgen_method *method, eomgen_run *run, long steps, const double *t_eval, long n_eval,
-                   long *done, double *times, double *states, long *stored);
 
 #endif

@@ -103,6 +103,7 @@ static const char metadata[] =
 
 static const eomgen_model model = {
     1, "pendulum", 3, 1, 5, PENDULUM_N_WORK, (int)(sizeof kernels / sizeof kernels[0]), kernels, pendulum_precompute, metadata,
+    NULL, 0,
 };
 
 const eomgen_model *eomgen_model_table(void)

@@ -1,0 +1,175 @@
+"""Analysis: names of gaps (coordinates, outputs) -> their values, normals and rates at a state; what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.layout import Layout, number
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+    from ..runtime.signals import Forcing
+
+MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
+
+
+class Gaps:
+    """Coordinates and outputs that are followed as gaps.
+
+    Parameters
+    ----------
+    module : Module
+        With parameters and constant inputs bound.
+    names : sequence of str
+    forcing : Forcing, optional
+        Inputs that vary.
+    """
+
+    def __init__(self, module: Module, names: Sequence[str], forcing: Forcing | None = None) -> None:
+        self.module, self.layout, self.names, self.forcing = module, module.layout, tuple(names), forcing
+        layout = module.layout
+        self.outputs = [(i, layout.y.index(n)) for i, n in enumerate(names) if n not in layout.q + layout.loops]
+        self.loops = [(i, layout.loops.index(n)) for i, n in enumerate(names) if n in layout.loops]
+        self.tree = [(i, layout.q.index(n)) for i, n in enumerate(names) if n in layout.q]
+
+        self._kernels: dict[str, Any] = {}
+
+    def _kernel(self, name: str) -> Any:
+        if name not in self._kernels:
+            self._kernels[name] = self.module.kernels.motion(name)
+        return self._kernels[name]
+
+    def inputs(self, t: float, x: Array) -> Array | None:
+        """u (n_u,) at a state; None for the module's own."""
+        return self.forcing(t, x) if self.forcing else None
+
+    def values(self, t: Any, x: Array) -> Array:
+        """Of one state (n,), or of states (n_x, k) at times (k,): (n, k)."""
+        q, v = np.ascontiguousarray(x[: self.layout.n_q]), np.ascontiguousarray(x[self.layout.n_q :])
+        result = np.empty((len(self.names), *x.shape[1:]))
+        for i, j in self.tree:
+            result[i] = q[j]
+        if self.loops or self.outputs:
+            u = None if not self.forcing else self.forcing(t, x) if x.ndim == 1 else self.forcing.sample(t, x)
+            if self.loops:
+                values = self._kernel("loop_coordinates")(q, v, np.zeros_like(v), t=t, u=u)
+                for i, j in self.loops:
+                    result[i] = values[0, j]
+            if self.outputs:
+                values = self._kernel("motion_outputs")(q, v, np.zeros_like(v), t=t, u=u)
+                for i, j in self.outputs:
+                    result[i] = values[j]
+        return result
+
+    def normals(self, t: float, x: Array) -> Array:
+        """Derivatives of the rates by v, (n, n_v).
+
+        Raises
+        ------
+        UsageError
+            A gap that depends on velocities.
+        """
+        layout, u = self.layout, self.inputs(t, x)
+        q, v = np.ascontiguousarray(x[: layout.n_q]), np.ascontiguousarray(x[layout.n_q :])
+        rows = np.zeros((len(self.names), layout.n_v))
+        for i, _ in self.tree:
+            rows[i, layout.freedoms.index(self.names[i])] = 1.0
+        if self.loops:
+            every = self.module.kernels.state("loop_coordinate_jacobian")(q, t=t, u=u)
+            for i, j in self.loops:
+                rows[i] = every[j]
+        if self.outputs:
+            slopes = self._kernel("output_derivatives")(q, v, np.zeros_like(v), t=t, u=u)
+            for i, j in self.outputs:
+                if np.abs(slopes[j, layout.n_q : layout.n_x + layout.n_v]).max(initial=0.0) > 0.0:
+                    raise UsageError(
+                        f"gap {self.names[i]}: this output depends on velocities; a gap is a function of positions"
+                    )
+                rows[i] = by_velocity(layout, q, slopes[j, : layout.n_q])
+        return rows
+
+    def rates(self, t: float, x: Array, rows: Array | None = None) -> Array:
+        """Of one state, (n,): along v, and by themselves in time."""
+        rows = self.normals(t, x) if rows is None else rows
+        v = x[self.layout.n_q :]
+        rates = rows @ v
+        if self.outputs:
+            rates += drift(lambda time: self.values(time, x), t)
+        if self.loops:
+            q = np.ascontiguousarray(x[: self.layout.n_q])
+            values = self._kernel("loop_coordinates")(
+                q, np.ascontiguousarray(v), np.zeros_like(v), t=t, u=self.inputs(t, x)
+            )
+            for i, j in self.loops:
+                rates[i] = values[1, j]
+        return np.asarray(rates)
+
+
+def drift(values: Callable[[float], Array], t: float) -> Array:
+    """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
+    h = (t + MOMENT * max(1.0, abs(t))) - t
+    near, far = values(t + h) - values(t - h), values(t + 2.0 * h) - values(t - 2.0 * h)
+    return np.asarray((8.0 * near - far) / (12.0 * h))
+
+
+def by_velocity(layout: Layout, q: Array, slope: Array) -> Array:
+    """Derivative of a rate by v from that of the value by q: N^T slope."""
+    if layout.space is None:
+        return slope
+    return np.array([slope @ layout.space.rates(q, e) for e in np.eye(layout.n_v)])
+
+
+def allowance(layout: Layout, names: Sequence[str], tolerance: float) -> Array:
+    """Sizes (n,) at which gaps count as 0: a part of the model's length, or of 1 for angles."""
+    return np.array([tolerance * (1.0 if layout.unit(name) == "rad" else layout.length) for name in names])
+
+
+def check_gaps(
+    layout: Layout, gaps: Any = None, lock: Any = (), words: tuple[str, str] = ("gaps", "lock")
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Gaps with their restitutions and the names that are locked, if all of them are there and can be.
+
+    Parameters
+    ----------
+    layout : Layout
+    gaps, lock
+        As a user gives them.
+    words : (str, str)
+        What these are called where the user gives them.
+
+    Raises
+    ------
+    UsageError
+    """
+    word, other = words
+    if gaps is not None and not isinstance(gaps, Mapping):
+        raise UsageError(f"{word} must be a mapping of names to restitutions, {{name: 0.5}}, not {gaps!r}")
+    locked = (lock,) if isinstance(lock, str) else lock
+    if not isinstance(locked, Sequence) or not all(isinstance(name, str) for name in locked):
+        raise UsageError(f"{other} must be a list of coordinates, not {lock!r}")
+    if not gaps and not locked:
+        raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
+    if layout.given_rates:
+        raise UsageError("impacts need q' = v; the rates of this model's coordinates are given")
+    coordinates = [*layout.freedoms, *layout.loops]
+    placed = [name for name in coordinates if name in layout.q + layout.loops]
+    for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
+        for name in names:
+            if name not in allowed:
+                near = get_close_matches(str(name), allowed, 1)
+                hint = f"; did you mean {near[0]!r}?" if near else ""
+                raise UsageError(f"{what}: no coordinate or output {name!r}{hint}; there are {', '.join(allowed)}")
+    found: dict[str, float] = {}
+    for name, e in (gaps or {}).items():
+        if np.ndim(e):
+            raise UsageError(f"{word}: the restitution of {name} must be one number, not {e!r}")
+        found[name] = number(f"{word}: the restitution of {name}", e)
+        if not 0.0 <= found[name] <= 1.0:
+            raise UsageError(f"{word}: the restitution of {name} is between 0 and 1, not {e}")
+    return found, tuple(locked)

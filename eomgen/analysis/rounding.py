@@ -1,0 +1,137 @@
+"""Analysis: a matrix of small motions -> which of its eigenvalues rounding alone could move to the imaginary axis.
+
+The matrix is balanced first (B. N. Parlett, C. Reinsch, Balancing a matrix for calculation of eigenvalues and
+eigenvectors, Numer. Math. 13 (1969), 293-304), so that stiff parts do not drown slow ones; an eigenvalue is then
+uncertain as far as its component of the pseudospectrum of rounding reaches (L. N. Trefethen, M. Embree, Spectra and
+Pseudospectra, 2005, section 2).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..numeric.scales import Array, Indices
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+ROUNDING = 10.0 * float(
+    np.finfo(float).eps
+)  #: relative error of the entries of a matrix that is exact but for rounding
+ROUNDS = 30  #: of balancing, at most
+WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
+SWEEPS = 12  #: of Jacobi's method, at most
+
+
+def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
+    """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
+
+    Parameters
+    ----------
+    A : (n, n) array
+        Of s' = A s (1/s).
+    own : (n_dof,) array, optional
+        Accelerations of the model's own forces in units of the last n_dof states' displacements (1/s^2): slopes of
+        forces far below them are rounding.
+    error : float
+        Relative error of A.
+    """
+    if not A.size:
+        return "asymptotically stable"
+    balanced = _balance(A, own)
+    values = np.linalg.eigvals(balanced)
+    far = error * float(np.linalg.norm(balanced, 2))
+    zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
+    if (values.real[~zero] > 0.0).any():
+        return "unstable"
+    return "marginal" if zero.any() else "asymptotically stable"
+
+
+def _reaches_axis(A: Array, value: complex, far: float) -> bool:
+    """Whether a change of A by a norm of `far` can move an eigenvalue to the imaginary axis, straight on."""
+    identity = np.eye(len(A))
+    return all(
+        np.linalg.svd(A - (1j * value.imag + part * value.real) * identity, compute_uv=False)[-1] <= far for part in WAY
+    )
+
+
+def _balance(A: Array, own: Array | None) -> Array:
+    """A similar matrix whose rows and columns are of like size; forces of the model keep rows from being blown up."""
+    sizes = np.abs(A)
+    if own is not None and len(own) and len(A) >= 2 * len(own):
+        n = len(own)
+        rows = np.arange(len(A) - n, len(A))
+        sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], own)
+        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], 1e-300)
+    np.fill_diagonal(sizes, 0.0)
+    d = np.ones(len(A))
+    for _ in range(ROUNDS):
+        worst = 1.0
+        for i in range(len(A)):
+            row, column = float(np.linalg.norm(sizes[i])), float(np.linalg.norm(sizes[:, i]))
+            if row > 0.0 and column > 0.0:
+                f = 2.0 ** round(0.5 * np.log2(row / column))
+                sizes[i] /= f
+                sizes[:, i] *= f
+                d[i] *= f
+                worst = max(worst, f, 1.0 / f)
+        if worst <= 2.0:
+            break
+    return np.asarray(A * d / d[:, None])
+
+
+def own_accelerations(module: Module, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
+    """Accelerations that the forces of the model would make if they did not balance, scaled (1/s^2), (n_dof,).
+
+    Parameters
+    ----------
+    module : Module
+    t : float
+    x : (n_x,) array
+    B : (n_v, n_dof) array
+        Virtual displacements.
+    velocities : (n_dof,) indices
+    mass : (n_dof, n_dof) array
+        Embedded.
+    """
+    if not len(mass):
+        return np.zeros(0)
+    forces = np.abs(B).T @ np.abs(module.bias(t, x))
+    try:
+        return np.asarray(np.abs(np.linalg.inv(mass)) @ forces / module.layout.scales.q[velocities])
+    except np.linalg.LinAlgError:
+        return np.ones(len(mass))
+
+
+def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
+    """Squares of frequencies and shapes of symmetric M and K, slow modes as accurate as K has them.
+
+    By Jacobi's method on the nearly diagonal K of modes, which keeps small eigenvalues next to large ones (J. Demmel,
+    K. Veselic, Jacobi's method is more accurate than QR, SIAM J. Matrix Anal. Appl. 13 (1992), 1204-1245).
+    """
+    S = shapes / np.sqrt(np.einsum("ik,ij,jk->k", shapes, M, shapes))
+    T = S.T @ K @ S
+    T = 0.5 * (T + T.T)
+    eps = float(np.finfo(float).eps)
+    for _ in range(SWEEPS):
+        turned = False
+        for i in range(len(T)):
+            for j in range(i):
+                if abs(T[i, j]) <= eps * np.sqrt(abs(T[i, i] * T[j, j])) + 1e-300:
+                    continue
+                angle = 0.5 * np.arctan2(2.0 * T[i, j], T[i, i] - T[j, j])
+                if T[i, i] < T[j, j]:  # the smaller of both turns
+                    angle = 0.5 * np.arctan(2.0 * T[i, j] / (T[i, i] - T[j, j]))
+                c, s = np.cos(angle), np.sin(angle)
+                turn = np.array([[c, -s], [s, c]])
+                T[:, [i, j]] = T[:, [i, j]] @ turn
+                T[[i, j]] = turn.T @ T[[i, j]]
+                S[:, [i, j]] = S[:, [i, j]] @ turn
+                T[i, j] = T[j, i] = 0.0
+                turned = turned or abs(s) > eps
+        if not turned:
+            break
+    order = np.argsort(T.diagonal())
+    return np.asarray(T.diagonal()[order]), np.asarray(S[:, order])

@@ -1,0 +1,257 @@
+"""Analysis: a Module and a grid of coordinates -> Workspace: what outputs can reach, and how well conditioned it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.names import require, unknown
+from .tables import as_html, as_text, number
+from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
+from .workspace_grid import Grid, read_grid
+from .workspace_walk import OUT, REACHED, Flood, Stage, flood
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ..runtime.module import Module
+
+RESOLUTION = {2: 400, 3: 100}  #: raster cells along each side
+
+
+class Workspace:
+    """What outputs reach over a grid of coordinates; ``ws["tip_x"]`` is an array shaped like the grid.
+
+    Arrays have the axes of ``over`` last, in its order, and are NaN where the grid is not reached.  SI units, radians.
+
+    Attributes
+    ----------
+    over : dict of str to (n_k,) array
+        The coordinates of the grid and their values.
+    of : tuple of str
+        Outputs and coordinates.
+    values : (n_of, *shape) array
+        Of them.
+    q : (n_q, *shape) array
+        Positions, all on the branch of the initial one.
+    status : (*shape,) array of str
+        ``reached``; ``limits``: beyond limits, or within them and reached only through what is beyond; ``out of
+        reach``: the loops do not close, or not on this branch.
+    jacobian : (n_of, n_over, *shape) array
+        dy/dx of ``of`` by ``over``, along the constraints.
+    smallest, largest : (*shape,) arrays
+        Singular values of the Jacobian.
+    manipulability : (*shape,) array
+        Their product, sqrt(det J J^T) (T. Yoshikawa, Manipulability of robotic mechanisms, 1985).
+    condition : (*shape,) array
+        Their quotient, largest over smallest; infinite at a singular point.
+    quality : (*shape,) array
+        Smallest over largest singular value of the scaled constraint Jacobian with the rows of the led coordinates: 0
+        where the grid's coordinates do not determine the motion, 1 for an open chain.
+    singular : (*shape,) array of bool
+        Grid points at or beside a singular position.
+    singularities : list of WorkspaceSingular
+        Those positions, named.
+    """
+
+    def __init__(self, module: Module, grid: Grid, filled: Flood, known: Conditions) -> None:
+        layout = module.layout
+        self.name, self.q_names = layout.name, layout.q
+        self.over: dict[str, Array] = dict(zip(grid.names, grid.axes, strict=True))
+        self.of, self.shape = grid.of, grid.shape
+        self.units = {name: layout.unit(name) for name in ("t", *layout.q, *layout.loops, *layout.y)}
+        self.status, self.reached = filled.status, filled.status == REACHED
+        here = self.reached
+        self.values = np.where(here, np.moveaxis(known.y, -1, 0), np.nan)
+        self.q = np.where(here, np.moveaxis(filled.q, -1, 0), np.nan)
+        self.jacobian = np.where(here, np.moveaxis(known.J, (-2, -1), (0, 1)), np.nan)
+        self.quality = np.where(here, known.quality, np.nan)
+        self.singular = known.singular & here
+        self.singularities: list[WorkspaceSingular] = [one for one in known.found if here[one.point]]
+        self.smallest, self.largest, self.manipulability, self.condition = _measures(self.jacobian)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What ``ws[name]`` gives."""
+        measures = ("smallest", "largest", "manipulability", "condition", "quality", "singular", "status")
+        return tuple(dict.fromkeys((*self.over, *self.of, *self.q_names, *measures)))
+
+    def __getitem__(self, name: str) -> Any:
+        """An array (*shape,)."""
+        if name in self.over:
+            k = list(self.over).index(name)
+            return np.broadcast_to(
+                np.expand_dims(self.over[name], [i for i in range(len(self.shape)) if i != k]), self.shape
+            )
+        if name in self.of:
+            return self.values[self.of.index(name)]
+        if name in self.q_names:
+            return self.q[self.q_names.index(name)]
+        if name not in self.names:
+            raise unknown("column", name, self.names)
+        return getattr(self, name)
+
+    def area(self, resolution: int = RESOLUTION[2]) -> float:
+        """The area two outputs cover, each part counted once: of the images of the grid's cells, on a raster.
+
+        Parameters
+        ----------
+        resolution : int
+            Raster cells along each side.
+
+        Raises
+        ------
+        UsageError
+            There are not two outputs, or fewer coordinates than outputs.
+        """
+        return self._extent(2, "area", resolution)
+
+    def volume(self, resolution: int = RESOLUTION[3]) -> float:
+        """The volume three outputs cover; see :meth:`area`."""
+        return self._extent(3, "volume", resolution)
+
+    def _extent(self, d: int, what: str, resolution: int) -> float:
+        from .workspace_extent import covered
+
+        if len(self.of) != d or len(self.over) < d:
+            raise UsageError(
+                f"{what}() needs {d} outputs over {d} or more coordinates, not {len(self.of)} over {len(self.over)}"
+            )
+        _, width, raster = covered(self.values, resolution)
+        return float(np.count_nonzero(raster) * np.prod(width))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row for each grid point, indexed by the coordinates of the grid.
+
+        Raises
+        ------
+        MissingDependencyError
+            pandas is not installed.
+        """
+        module = require("pandas", "pandas", "to_pandas")
+        index = module.MultiIndex.from_product(self.over.values(), names=list(self.over))
+        rest = [name for name in self.names if name not in self.over]
+        frame: pandas.DataFrame = module.DataFrame({name: self[name].ravel() for name in rest}, index=index)
+        return frame
+
+    def save(self, path: str | Path) -> Path:
+        """Write all arrays, shaped like the grid, to ``.npz`` (added if there is no ending), or rows to ``.csv``.
+
+        Returns
+        -------
+        Path
+            The file written.
+        """
+        target = Path(path)
+        target = target.with_suffix(".npz") if not target.suffix else target
+        if target.suffix not in (".npz", ".csv"):
+            raise UsageError(f"{target}: a workspace is written as .npz or .csv")
+        if target.suffix == ".npz":
+            arrays: dict[str, Any] = {f"[{name}]": np.asarray(self[name]) for name in self.names}
+            np.savez_compressed(target, over=list(self.over), of=self.of, jacobian=self.jacobian, **arrays)
+            return target
+        heads = [f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.names]
+        columns = [self[name].ravel() for name in self.names]
+        with target.open("w", encoding="utf-8") as file:
+            file.write(",".join(heads) + "\n")
+            for row in zip(*columns, strict=True):
+                file.write(",".join(f"{x:.17g}" if isinstance(x, float) else str(x) for x in row) + "\n")
+        return target
+
+    def plot(self, by: str = "manipulability", ax: Any = None, figure: Any = None) -> Any:
+        """Draw the outputs, and beside them the grid, coloured by one of the columns; singular positions are marked.
+
+        Parameters
+        ----------
+        by : str
+            A column of numbers.
+        ax : matplotlib Axes, optional
+            Where to draw the outputs alone.
+        figure : matplotlib Figure, optional
+            Where to draw both; by default a new one.
+
+        Returns
+        -------
+        Axes, or an array of two
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib is not installed.
+        """
+        from .workspace_plot import plot_workspace
+
+        return plot_workspace(self, by, ax, figure)
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """What the workspace amounts to, as label and value."""
+        counts = {word: int(np.count_nonzero(self.status == word)) for word in (REACHED, "limits", OUT)}
+        facts = [("points", ", ".join(f"{n} {word}" for word, n in counts.items() if n))]
+        for k, name in enumerate(self.of):
+            if self.reached.any():
+                low, high = np.nanmin(self.values[k]), np.nanmax(self.values[k])
+                facts.append((name, f"{number(low)} .. {number(high)} {self.units.get(name, '')}".rstrip()))
+        if len(self.over) >= len(self.of) in RESOLUTION:
+            area = len(self.of) == 2
+            facts.append(("area" if area else "volume", number(self.area() if area else self.volume(), 4)))
+        if np.isfinite(self.manipulability).any():
+            facts.append(("manipulability", f"up to {number(np.nanmax(self.manipulability))}"))
+        for kind in ("stop", "change point", "outputs"):
+            same = [one for one in self.singularities if one.kind == kind]
+            if same:
+                more = f", and {len(same) - 1} more" if len(same) > 1 else ""
+                facts.append((f"singular: {kind}", str(same[0]).removeprefix(f"{kind} at ") + more))
+        return facts
+
+    @property
+    def title(self) -> str:
+        """What of, over what."""
+        axes = ", ".join(f"{name} ({len(x)})" for name, x in self.over.items())
+        return f"workspace of {self.name}: {', '.join(self.of)} over {axes}"
+
+    def __str__(self) -> str:
+        return as_text(self.title, self.facts)
+
+    def _repr_html_(self) -> str:
+        return as_html(self.title, self.facts)
+
+    def __repr__(self) -> str:
+        return f"<Workspace of {self.name}: {np.count_nonzero(self.reached)} of {self.reached.size} points reached>"
+
+
+def _measures(J: Array) -> tuple[Array, Array, Array, Array]:
+    """Smallest and largest singular value, product and quotient, of (n_of, n_over, *shape)."""
+    A = np.moveaxis(J, (0, 1), (-2, -1))
+    fine = np.isfinite(A).all(axis=(-2, -1))
+    found = np.full((4, *A.shape[:-2]), np.nan)
+    if fine.any():
+        S = np.linalg.svd(A[fine], compute_uv=False)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found[:, fine] = S[:, -1], S[:, 0], S.prod(axis=1), S[:, 0] / S[:, -1]
+    smallest, largest, product, quotient = found
+    return smallest, largest, product, quotient
+
+
+def find_workspace(
+    module: Module,
+    over: Mapping[str, Any],
+    of: str | Sequence[str],
+    initial: Mapping[str, float] | ArrayLike | None,
+    t: float,
+    limits: bool | Mapping[str, Any],
+    points: int,
+) -> Workspace:
+    """See :meth:`~..runtime.kinematic_analyses.KinematicAnalyses.workspace`."""
+    grid = read_grid(module, over, of, limits, points)
+    stage = Stage(module, grid, initial, t)
+    reader = Reader(stage)
+    reader.require_positions(stage.q, stage.t)
+    filled = flood(stage)
+    return Workspace(module, grid, filled, judge(stage, reader, filled))

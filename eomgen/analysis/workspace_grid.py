@@ -1,0 +1,145 @@
+"""Analysis: what a user asks of a workspace -> a checked grid of led values, names of results and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.names import unknown
+
+if TYPE_CHECKING:
+    from ..runtime.layout import Layout
+    from ..runtime.module import Module
+
+MOST_AXES = 3
+Index = tuple[int, ...]
+
+
+class Limit(NamedTuple):
+    """The range a coordinate may have."""
+
+    name: str
+    lower: float
+    upper: float
+
+
+class Grid(NamedTuple):
+    """Values of the led coordinates, one axis for each."""
+
+    names: tuple[str, ...]  #: t among them for time
+    axes: tuple[Array, ...]
+    of: tuple[str, ...]  #: outputs and coordinates to give over it
+    limits: tuple[Limit, ...]
+
+    @property
+    def shape(self) -> Index:
+        """Points of each axis."""
+        return tuple(len(axis) for axis in self.axes)
+
+    def at(self, index: Index) -> Array:
+        """Values (n_axes,) at a point."""
+        return np.array([axis[k] for axis, k in zip(self.axes, index, strict=True)])
+
+    def neighbours(self, index: Index) -> list[tuple[int, Index]]:
+        """Axis and index of the points beside one."""
+        found = []
+        for k, n in enumerate(self.shape):
+            for step in (-1, 1):
+                if 0 <= index[k] + step < n:
+                    found.append((k, (*index[:k], index[k] + step, *index[k + 1 :])))
+        return found
+
+
+def read_grid(
+    module: Module, over: Mapping[str, Any], of: str | Sequence[str], limits: bool | Mapping[str, Any], points: int
+) -> Grid:
+    """Check names, values, limits and the number of points.
+
+    Raises
+    ------
+    UsageError
+    """
+    layout = module.layout
+    if not isinstance(over, Mapping) or not over:
+        raise UsageError(f"over names coordinates and their values, such as {{'theta': (0, 6.28, 73)}}, not {over!r}")
+    coordinates = (*layout.q, *layout.loops)
+    for name in over:
+        if name not in (*coordinates, "t"):
+            raise unknown("coordinate to vary", name, (*coordinates, "t"))
+        if _kind(layout, name) == "parameter":
+            raise UsageError(f"{name} is an Euler parameter, which no grid can lead; take rotation: euler_angles")
+    if len(over) > MOST_AXES:
+        raise UsageError(f"a grid has 1 to {MOST_AXES} coordinates, not {len(over)}: {', '.join(over)}")
+    led = [name for name in over if name != "t"]
+    if len(led) > layout.n_dof:
+        left = f"at most {layout.n_dof}" if layout.n_dof else "none is left, the drivers move all: vary t"
+        raise UsageError(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom, {left}")
+    axes = tuple(_axis(name, given) for name, given in over.items())
+    size = int(np.prod([len(axis) for axis in axes], dtype=object))
+    if size > points:
+        shape = " x ".join(str(len(axis)) for axis in axes)
+        raise UsageError(f"{shape} = {size} grid points, more than points={points}; take fewer values or raise points")
+    wanted = (of,) if isinstance(of, str) else tuple(of)
+    known = dict.fromkeys((*layout.y, *coordinates))
+    for name in wanted:
+        if name not in known:
+            raise unknown("output or coordinate", name, known)
+    if not wanted or len(set(wanted)) < len(wanted):
+        raise UsageError(f"of names outputs or coordinates, each once, not {of!r}")
+    return Grid(tuple(over), axes, wanted, _limits(module, limits))
+
+
+def _kind(layout: Layout, name: str) -> str:
+    kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))
+    return kinds.get(name, "time")
+
+
+def _axis(name: str, given: Any) -> Array:
+    """Values of one axis from (low, high, count) or from the values themselves."""
+    what = f"over {name}: give (low, high, count) or two or more rising or falling values"
+    if isinstance(given, tuple) and len(given) == 3 and isinstance(given[2], (int, np.integer)):
+        count = given[2]
+        if isinstance(count, bool) or count < 2:
+            raise UsageError(f"{what}; a count is at least 2, not {count!r}")
+        if count > 10_000_000:
+            raise UsageError(f"over {name}: {count} values are too many")
+        given = np.linspace(given[0], given[1], int(count))
+    try:
+        values = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{what}, not {given!r}") from None
+    steps = np.diff(values) if values.ndim == 1 else np.empty(0)
+    if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
+        raise UsageError(f"{what}, not {given!r}")
+    return values
+
+
+def _limits(module: Module, given: bool | Mapping[str, Any]) -> tuple[Limit, ...]:
+    """Declared limits, or those given."""
+    coordinates = (*module.layout.q, *module.layout.loops)
+    if not isinstance(given, Mapping):
+        declared = module.layout.limits if given else {}
+        pairs = {name: (kept.get("lower"), kept.get("upper")) for name, kept in declared.items()}
+        if given and not any(x is not None for pair in pairs.values() for x in pair):
+            raise UsageError("limits=True, and no joint of the model has lower or upper limits; give limits={name: ..}")
+        pairs = {name: pair for name, pair in pairs.items() if name in coordinates}
+    else:
+        pairs = {}
+        for name, pair in given.items():
+            if name not in coordinates:
+                raise unknown("coordinate to limit", name, coordinates)
+            if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+                raise UsageError(f"limits {name}: give (lower, upper), None for none, not {pair!r}")
+            pairs[name] = (pair[0], pair[1])
+    found = []
+    for name, (low, high) in pairs.items():
+        lower, upper = -np.inf if low is None else float(low), np.inf if high is None else float(high)
+        if not lower <= upper:
+            raise UsageError(f"limits {name}: lower {lower:g} is above upper {upper:g}")
+        if lower > -np.inf or upper < np.inf:
+            found.append(Limit(name, lower, upper))
+    return tuple(found)

@@ -1,0 +1,143 @@
+"""Stage cli, ensemble: model file and cases -> many runs, their last states or statistics."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import UsageError
+from .analysis import Prepared, analysis_options
+from .options import require_folder
+from .screen import finite, print_heading, print_json, print_table, stage
+
+if TYPE_CHECKING:
+    from ..ensembles.ensemble import Ensemble
+
+SHOWN = 10  #: failures listed
+
+
+@click.command()
+@analysis_options
+@click.option(
+    "--cases",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
+)
+@click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
+@click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the numbers drawn.")
+@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M times.")
+@click.option("--statistics", is_flag=True, help="Keep mean, deviation, least and greatest only.")
+@click.option("--solver", metavar="NAME", help="Integrator; that of the file by default.")
+@click.option("--rtol", type=float, metavar="X", help="Relative tolerance.")
+@click.option("--atol", type=float, metavar="X", help="Absolute tolerance.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Runs at a time; all processors by default.")
+@click.option("--cluster", metavar="N|ADDRESS", help="Run on N dask workers here, or on those of a scheduler.")
+@click.option(
+    "--store", type=click.Path(path_type=Path), metavar="DIR", help="Keep finished runs and go on from there."
+)
+@click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw a column to a picture.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
+def ensemble(
+    work: Prepared, cases: Path | None, vary: tuple[str, ...], count: int | None, seed: int, end: float | None,
+    samples: int | None, statistics: bool, solver: str | None, rtol: float | None, atol: float | None,
+    threads: int | None, cluster: str | None, store: Path | None, plot: tuple[str, str] | None, out: Path | None,
+    as_json: bool,
+) -> None:  # fmt: skip
+    """Run a model many times: from a table of cases, or with values drawn at random."""
+    if out is not None and out.suffix not in (".npz", ".csv"):
+        raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
+    for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
+        require_folder(word, path)
+    module = work.module
+    values = _read(cases) if cases is not None else {}
+    values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
+    if not values:
+        raise UsageError("nothing differs between the runs: give --cases FILE or --vary NAME=LOW:HIGH")
+    sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial), "parameters": {}, "inputs": {}}
+    for name, column in values.items():
+        kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
+        sorted_values[kind][name] = column
+    last = module.metadata.get("simulation", {}).get("end") or 10.0
+    times = None if samples is None else _even(end or float(last), samples)
+    with stage("integrate"):
+        found = module.simulate_many(
+            end, *(group or None for group in sorted_values.values()), method=solver, t_eval=times, threads=threads,
+            reduce="statistics" if statistics else None, cluster=_cluster(cluster), store=store, rtol=rtol, atol=atol,
+        )  # fmt: skip
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        found.to_pandas().to_csv(out, index=False) if out.suffix == ".csv" else found.save(out)
+    if plot is not None:
+        found.plot(plot[0]).figure.savefig(plot[1], dpi=150)
+    files = [str(path) for path in (out, plot and plot[1]) if path]
+    _tell(work, found, sorted(values), files, as_json)
+
+
+def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], as_json: bool) -> None:
+    table = found.summary()
+    failures = found.failures()
+    if as_json:
+        print_json(
+            work.heading(float(found.t[-1])) | {"count": found.count, "varied": varied} |
+            {"steps": int(found.steps.sum()), "failures": [failure._asdict() for failure in failures], "files": files} |
+            {"summary": {name: {key: finite(x) for key, x in row.items()} for name, row in table.items()}}
+        )  # fmt: skip
+        return
+    print_heading(f"{found.count} runs to t = {found.t[-1]:g} s; varied: {', '.join(varied)}")
+    lines = [[name, *(f"{x:.6g}" for x in row.values())] for name, row in table.items()]
+    print_table(["at the end", "mean", "deviation", "least", "greatest"], lines, right=range(1, 5))
+    for failure in failures[:SHOWN]:
+        click.echo(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
+    if len(failures) > SHOWN:
+        click.echo(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+    for file in files:
+        click.echo(f"wrote {file}")
+
+
+def _even(end: float, count: int) -> list[float]:
+    return [end * i / (count - 1) for i in range(count)]
+
+
+def _cluster(given: str | None) -> int | str | None:
+    return int(given) if given is not None and given.isdigit() else given
+
+
+def _read(path: Path) -> dict[str, list[float]]:
+    """The columns of a table of cases."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2:
+        raise UsageError(f"--cases {path}: a line of names and a line for each run are needed")
+    names = [name.strip() for name in rows[0]]
+    columns: dict[str, list[float]] = {name: [] for name in names}
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(names):
+            raise UsageError(f"{path}:{number}: {len(row)} values for {len(names)} names")
+        for name, word in zip(names, row, strict=True):
+            try:
+                columns[name].append(float(word))
+            except ValueError:
+                raise UsageError(f"{path}:{number}: {name} must be a number, not {word!r}") from None
+    return columns
+
+
+def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
+    """Values drawn for each name, from a stream of its own."""
+    import numpy as np
+
+    drawn = {}
+    for k, words in enumerate(vary):
+        name, _, ends = words.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            limits = float(low), float(high)
+        except ValueError:
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers") from None
+        drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
+    return drawn

@@ -1,0 +1,90 @@
+"""Stage describe, events: entries of the section ``events`` -> Events of the mechanism, with their resets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..graph.core import Expr
+from ..graph.substitute import symbols_of
+from .checks import check_keys
+from .description import Entry
+from .fields import EVENT, OUTPUT
+from .mechanism import Event
+from .names import QUANTITIES, nearest
+from .reading import Reader, is_number
+from .scope import quantity_of
+from .sympy_face import name_of
+
+_LATE = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
+_ACCELERATIONS = (2, 9, 10)  #: levels of QUANTITIES
+
+
+def build_events(reader: Reader, entries: list[Entry]) -> tuple[Event, ...]:
+    """Events in the order of their declaration; faults are noted."""
+    return tuple(_event(reader, entry) for entry in entries)
+
+
+def _event(reader: Reader, entry: Entry) -> Event:
+    path, values = entry.path, entry.values
+    reader.names.declare("event", entry.name, path)
+    check_keys(path, values, EVENT, reader.faults)
+    expression = reader.stand_in
+    if "expression" in values:
+        expression = _instant(reader, f"{path}.expression", values["expression"])
+    direction = values.get("direction", 0)
+    if not is_number(direction) or direction not in (-1, 0, 1):
+        reader.faults.add(f"{path}.direction", f"{direction!r} is not 1, -1 or 0", "1 rising, -1 falling, 0 both")
+        direction = 0
+    reset = _reset(reader, f"{path}.reset", values.get("reset") or {})
+    restitution = None
+    if values.get("restitution") is not None:
+        restitution = reader.number(f"{path}.restitution", values["restitution"])
+        if restitution is not None and not 0.0 <= restitution <= 1.0:
+            reader.faults.add(f"{path}.restitution", f"{restitution:g} is not between 0 and 1")
+        if reset:
+            reader.faults.add(f"{path}.reset", "stands beside a restitution", "give one of the two")
+        if direction == 1:
+            reader.faults.add(f"{path}.direction", "an impact is a gap that closes", "give -1, or leave it out")
+        direction = -1
+    doc = reader.text(f"{path}.doc", values.get("doc", ""))
+    terminal = _times(reader, f"{path}.terminal", values.get("terminal", False))
+    return Event(str(entry.name), expression, terminal, int(direction), reset, restitution, doc)
+
+
+def _times(reader: Reader, path: str, value: Any) -> int:
+    if isinstance(value, bool) or value is None:
+        return int(bool(value))
+    if isinstance(value, int) and value > 0:
+        return value
+    reader.wrong(path, value, "times")
+    return 0
+
+
+def _instant(reader: Reader, path: str, value: Any) -> Expr:
+    """An expression of what is known of a state without solving for accelerations."""
+    expression = reader.expression(path, value, OUTPUT)
+    for name in sorted(symbols_of([expression])):
+        what, found = _LATE.get(reader.names.kinds.get(name, "")), quantity_of(name)
+        if found is not None and QUANTITIES[found[0]][0] in _ACCELERATIONS:
+            what = "acceleration"
+        if what is not None:
+            remedy = "t, parameters, inputs, coordinates, velocities, positions and velocities of markers can"
+            reader.faults.add(path, f"the {what} {name!r} cannot stand in an event", remedy)
+    return expression
+
+
+def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...]:
+    if not isinstance(given, Mapping):
+        reader.wrong(path, given, "rates")
+        return ()
+    known = list(reader.names.of("coordinate", "velocity"))
+    result = []
+    for key, value in given.items():
+        name = name_of(key)
+        if name in known:
+            result.append((str(name), _instant(reader, f"{path}.{name}", value)))
+        else:
+            remedy = nearest(str(name), known, "coordinates and velocities")
+            reader.faults.add(f"{path}.{name}", f"no coordinate or velocity {name!r}", remedy)
+    return tuple(result)

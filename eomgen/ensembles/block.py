@@ -1,0 +1,282 @@
+"""A block of cases -> Block, what became of its runs; in compiled code on several threads, or one by one in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import EomgenError, UsageError
+from ..numeric.scales import Array
+from ..runtime.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
+from ..runtime.events import WAIT, Events
+from ..runtime.late import eager
+from ..runtime.signals import Forcing
+from .cases import UNASSEMBLED, Cases, assemble_states
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+Integers = np.ndarray[Any, np.dtype[Any]]
+
+TOO_SMALL_STEP, TOO_MANY_STEPS, BAD_PARAMETERS, FAILED, LOST = -100, -104, -110, -112, -113
+EVENT = 1  #: SciPy's
+#: What a status means; 0 is the end of the span.
+MEANING = {
+    0: "the end was reached",
+    EVENT: MESSAGES[TERMINAL],
+    STOPPED: "not run: the ensemble was interrupted",
+    TOO_SMALL_STEP: TOO_SMALL,
+    TOO_MANY_STEPS: "more than max_steps steps",
+    BAD_PARAMETERS: "the constants that follow from the parameters cannot be computed",
+    UNASSEMBLED: "the initial values cannot be assembled",
+    FAILED: "the integration failed",
+    ZENO: "events that reset the state follow each other ever faster (Zeno), or a reset leads nowhere",
+    RESET_FAILED: MESSAGES[RESET_FAILED],
+    LOST: "the worker that ran it failed",
+}
+EVERY = 0.05  #: seconds between looks at threads at work
+COUNTS = ("steps", "rejected", "evaluations", "noted")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all runs have in common.
+
+    Attributes
+    ----------
+    span : (float, float)
+    method : str
+    options : dict
+        rtol, atol, max_step, first_step, as steppers take them.
+    max_steps : int
+    t_eval : (m,) array or None
+    inputs : dict
+        Inputs that vary over time: name -> (times, values), Signal or expression.
+    events : object
+        As a user gives them, without functions.
+    keep_events : int
+        Events kept of each run.
+    """
+
+    span: tuple[float, float]
+    method: str
+    options: dict[str, Any]
+    max_steps: int
+    t_eval: Array | None
+    inputs: dict[str, Any]
+    events: Any
+    keep_events: int
+
+
+@dataclass(frozen=True)
+class Block:
+    """What became of the runs of a block.
+
+    Attributes
+    ----------
+    x : (n_x, k) array
+        Last states, projected; NaN where a run was not begun.
+    t : (k,) array
+        Their times.
+    samples : (n_x, m, k) array or None
+        Projected states at the times asked for; NaN where a run did not get to.
+    status : (k,) int array
+        See ``MEANING``; a failed evaluation's code is in `failure`.
+    failure, failure_time, steps, rejected, evaluations : (k,) arrays
+    noted : (k,) int array
+        Number of events.
+    notes : (2 + n_x, m, k) array or None
+        Number, time and state of the first m events of each run; NaN where there were fewer.
+    words : dict of int to str
+        What more there is to say about a run.
+    """
+
+    x: Array
+    t: Array
+    samples: Array | None
+    status: Integers
+    failure: Integers
+    failure_time: Array
+    steps: Integers
+    rejected: Integers
+    evaluations: Integers
+    noted: Integers
+    notes: Array | None = None
+    words: dict[int, str] = field(default_factory=dict)
+
+
+def run_block(
+    module: Module, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
+) -> Block:
+    """Run every case of a block.
+
+    Parameters
+    ----------
+    module : Module
+    cases : Cases
+    plan : Plan
+    threads : int
+        Runs at a time; the results do not depend on it.
+    watch : callable, optional
+        Told now and then how many runs have ended.
+    """
+    x0, failed, words = assemble_states(module, cases, plan.span[0])
+    told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
+    core: Any = eager(module.core)
+    run = _run_compiled if plan.method in getattr(core, "methods", ()) and hasattr(core, "ensemble") else _run_python
+    good = np.flatnonzero(~failed)
+    some = good.size < cases.count
+    rows = _rows(cases, good if some else slice(None))
+    found = run(module, x0[:, good].T if some else x0.T, rows, plan, threads, watch)
+    block = _spread(found, good, cases.count, plan.span[0]) if some else found
+    block.status[failed] = UNASSEMBLED
+    project(module, cases, block, plan.t_eval)
+    return Block(**{**vars(block), "words": {**block.words, **told}})
+
+
+def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
+    return {name: a if a.ndim == 1 else a[:, chosen].T for name, a in (("p", cases.p), ("u", cases.u))}
+
+
+def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
+    core: Any = eager(module.core)
+    forcing = Forcing(module.layout, plan.inputs)
+    nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
+    settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
+    ensemble = core.ensemble(
+        plan.method, nodes, x0, rows["p"], rows["u"], max_steps=plan.max_steps, t_eval=plan.t_eval,
+        signals=forcing.encode(), events=find_events(module, plan).encode(), keep=plan.keep_events, **settings,
+    )  # fmt: skip
+    work(ensemble, min(threads, max(len(x0), 1)), watch)
+    samples, notes = (None if x is None else x.transpose(2, 1, 0) for x in (ensemble.samples, ensemble.notes))
+    numbers = {name: getattr(ensemble, name) for name in ("t", "status", "failure", "failure_time", *COUNTS)}
+    return Block(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
+
+
+def find_events(module: Module, plan: Plan) -> Events:
+    """The events of the runs.
+
+    Raises
+    ------
+    UsageError
+        One that only a single run can watch.
+    """
+    events = Events(module.layout, plan.events)
+    for event in (*events.functions, *(event for event in events.model if event.action == WAIT)):
+        what = "is an impact" if event.action == WAIT else "is a function"
+        raise UsageError(
+            f"event {event.name} of simulate_many {what}, which needs Python; "
+            "give an expression as text, a reset, or run simulate for each case"
+        )
+    return events
+
+
+def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> None:
+    """Let threads run the trajectories of an ensemble; an interrupt ends them within a few steps."""
+    from threading import Thread
+
+    workers = [Thread(target=ensemble.work, daemon=True) for _ in range(threads)]
+    try:
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            while worker.is_alive():
+                worker.join(EVERY)
+                if watch is not None:
+                    watch(ensemble.done)
+    except BaseException:
+        ensemble.stop()
+        for worker in workers:
+            if worker.ident is not None:
+                worker.join()
+        raise
+
+
+def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
+    """The same through ``simulate``, one run after the other: where there is no compiled stepper for the method."""
+    count, n = x0.shape
+    sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
+    status, failure, steps, rejected, evaluations, noted = (np.zeros(count, dtype=np.int_) for _ in range(6))
+    names = find_events(module, plan).names
+    notes = np.full((2 + n, plan.keep_events, count), np.nan) if names else None
+    samples = None if sizes is None else np.full(sizes, np.nan)
+    x, t = np.full((n, count), np.nan), np.full(count, plan.span[0])
+    block = Block(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
+    times = None if plan.t_eval is None else np.unique(np.append(plan.t_eval, plan.span[1]))
+    if times is not None and plan.span[1] < plan.span[0]:
+        times = times[::-1]
+    for k in range(count):
+        bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
+        try:
+            run = bound.simulate(
+                plan.span, x0[k], inputs=plan.inputs, method=plan.method, t_eval=times, progress=False,
+                events=plan.events, **plan.options,
+            )  # fmt: skip
+        except UsageError:
+            raise
+        except EomgenError as error:
+            block.status[k], block.words[k] = FAILED, str(error)
+            continue
+        block.x[:, k], block.t[k], block.evaluations[k] = run.x[:, -1], run.t[-1], run.nfev
+        block.steps[k] = 0 if times is not None else len(run.t) - 1
+        if block.samples is not None and plan.t_eval is not None:
+            stored = np.isin(run.t, plan.t_eval)
+            block.samples[:, : stored.sum(), k] = run.x[:, stored]
+        block.status[k] = run.status
+        if notes is not None:
+            _take_notes(notes[:, :, k], run.t_events, run.x_events)
+            block.noted[k] = sum(map(len, run.t_events))
+        if watch is not None:
+            watch(k + 1)
+    return block
+
+
+def _take_notes(notes: Array, t_events: list[Array], x_events: list[Array]) -> None:
+    """Put the events of a run in order into rows (2 + n, m)."""
+    numbers = np.concatenate([np.full(len(t), float(i)) for i, t in enumerate(t_events)])
+    found = np.vstack([numbers, np.concatenate(t_events), np.concatenate(x_events, axis=1)])
+    order = np.argsort(found[1], kind="stable")[: notes.shape[1]]
+    notes[:, : len(order)] = found[:, order]
+
+
+def _spread(found: Block, good: Integers, count: int, start: float) -> Block:
+    """A block with places for the runs that could not be begun."""
+
+    def widened(array: Any, fill: float) -> Any:
+        wide = np.full((*array.shape[:-1], count), fill, dtype=array.dtype)
+        wide[..., good] = array
+        return wide
+
+    fills = {"x": np.nan, "samples": np.nan, "notes": np.nan, "t": start}
+    wide = {
+        name: value if name == "words" or value is None else widened(value, fills.get(name, 0))
+        for name, value in vars(found).items()
+    }
+    return Block(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
+
+
+def project(module: Module, cases: Cases, block: Block, t_eval: Array | None) -> None:
+    """Bring the stored states onto the constraints, as ``simulate`` does; a state that cannot be becomes NaN."""
+    if not module.n_rows and not module.layout.space:
+        return
+    _project_columns(module, cases, block, block.x[:, None, :], block.t[None])
+    if block.samples is not None and t_eval is not None:
+        times = np.repeat(t_eval[:, None], cases.count, axis=1)
+        _project_columns(module, cases, block, block.samples, times)
+    if block.notes is not None:
+        _project_columns(module, cases, block, block.notes[2:], block.notes[1])
+
+
+def _project_columns(module: Module, cases: Cases, block: Block, states: Array, times: Array) -> None:
+    """Project states (n_x, m, k) at times (m, k) where they are."""
+    for k in range(cases.count):
+        good = np.isfinite(states[:, :, k]).all(axis=0)
+        if good.any():
+            try:
+                states[:, good, k] = module.project(states[:, good, k], t=times[good, k], **cases.column(k))
+            except EomgenError as error:
+                block.status[k], block.words[k] = FAILED, str(error)
+                states[:, :, k] = np.nan

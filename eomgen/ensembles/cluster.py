@@ -1,0 +1,131 @@
+"""All blocks of an ensemble -> what is kept of each, by the workers of a dask cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..runtime.names import require
+from .block import LOST, MEANING, Block, Plan, find_events
+from .blocks import Kept, keep, reduce_block
+from .cases import Cases
+from .handle import Handle
+from .reductions import Reduction
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+AHEAD = 3  #: blocks under way or waiting for each worker
+
+
+@contextmanager
+def open_client(cluster: Any) -> Iterator[Any]:
+    """A client of dask.distributed for what a user names as cluster.
+
+    Parameters
+    ----------
+    cluster : True or 'local', int, str, or Client
+        A cluster on this machine with a worker for each processor, or with so many; the address of a scheduler; a
+        client, which stays open.
+
+    Raises
+    ------
+    MissingDependencyError
+        dask.distributed is not installed.
+    """
+    distributed: Any = require("distributed", "eomgen[cluster]", "cluster=")
+    if isinstance(cluster, distributed.Client):
+        yield cluster
+    elif cluster is True or cluster == "local" or (isinstance(cluster, int) and cluster > 0):
+        workers = None if cluster is True or cluster == "local" else cluster
+        if workers is None:
+            import os
+
+            workers = os.cpu_count() or 1
+        with (
+            distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+            ) as local,
+            distributed.Client(local) as client,
+        ):
+            yield client
+    elif isinstance(cluster, str):
+        with distributed.Client(cluster) as client:
+            yield client
+    else:
+        raise UsageError(
+            "cluster must be True, a number of local workers, the address of a scheduler or a dask Client, "
+            f"not {cluster!r}"
+        )
+
+
+def count_workers(client: Any) -> int:
+    """Threads of all workers."""
+    return sum(client.nthreads().values()) or 1
+
+
+def run_on_workers(
+    client: Any,
+    module: Module,
+    handle: Handle,
+    cases: Cases,
+    plan: Plan,
+    reduction: Reduction,
+    parts: list[tuple[int, int]],
+    wanted: list[int],
+    watch: Callable[[int], None] | None,
+) -> Iterator[tuple[int, Kept]]:
+    """Run the wanted blocks on the workers and yield each as it is ready.
+
+    A block whose worker dies is run again by another; one whose task fails is given up, and its runs are marked.
+    """
+    distributed: Any = require("distributed", "eomgen[cluster]", "cluster=")
+    waiting = iter(wanted)
+    ready = distributed.as_completed()
+    indices: dict[str, int] = {}
+
+    def submit() -> None:
+        index = next(waiting, None)
+        if index is not None:
+            start, stop = parts[index]
+            future = client.submit(_task, handle, cases.part(start, stop), plan, reduction, pure=False)
+            indices[future.key] = index
+            ready.add(future)
+
+    for _ in range(AHEAD * count_workers(client)):
+        submit()
+    done = 0
+    for future in ready:
+        index = indices.pop(future.key)
+        start, stop = parts[index]
+        error = future.exception()
+        if isinstance(error, UsageError):
+            raise error
+        kept = future.result() if error is None else _lost(module, cases.part(start, stop), plan, reduction, error)
+        future.release()
+        submit()
+        done += stop - start
+        if watch is not None:
+            watch(done)
+        yield index, kept
+
+
+def _task(handle: Handle, cases: Cases, plan: Plan, reduction: Reduction) -> Kept:
+    return reduce_block(handle.open(), cases, plan, reduction)
+
+
+def _lost(module: Module, cases: Cases, plan: Plan, reduction: Reduction, error: BaseException) -> Kept:
+    """What is kept of a block that no worker could run: runs without states, marked so."""
+    sizes, k = (module.n_x, 0 if plan.t_eval is None else len(plan.t_eval)), cases.count
+    samples = None if plan.t_eval is None else np.full((*sizes, k), np.nan)
+    failure, steps, rejected, evaluations, noted = (np.zeros(k, dtype=np.int_) for _ in range(5))
+    notes = np.full((2 + sizes[0], plan.keep_events, k), np.nan) if find_events(module, plan).names else None
+    status = np.full(k, LOST, dtype=np.intc)
+    x, t = np.full((sizes[0], k), np.nan), np.full(k, plan.span[0])
+    block = Block(x, t, samples, status, failure, np.zeros(k), steps, rejected, evaluations, noted, notes)
+    words = dict.fromkeys(range(k), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
+    return keep(module, cases, plan, reduction, block, words)

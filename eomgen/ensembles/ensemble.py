@@ -1,0 +1,216 @@
+"""Stage runtime: what many runs came to, by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from ..runtime.names import require, unknown
+from .block import EVENT, MEANING, Plan, find_events
+from .cases import Cases
+from .reductions import names_of, summarise, with_outputs
+
+if TYPE_CHECKING:
+    import pandas
+
+    from ..runtime.module import Module
+    from ..runtime.trajectory import Trajectory
+
+
+class Failure(NamedTuple):
+    """A run that did not reach the end."""
+
+    run: int
+    status: int
+    t: float  #: how far it came (s)
+    message: str
+
+
+class Ensemble:
+    """The result of :meth:`Module.simulate_many`.
+
+    ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
+    velocities and outputs.  Runs that failed hold NaN.
+
+    Attributes
+    ----------
+    count : int
+        Number of runs, k.
+    x : (n_x, k) array or None
+        Last states, projected onto the constraints; None where a reduction kept none.
+    samples : (n_x, m, k) array or None
+        States at ``t``.
+    t : (m,) array
+        Times asked for; the end of the span where none were.
+    t_end : (k,) array
+        How far each run came (s).
+    status : (k,) int array
+        0 where the end was reached; ``failures`` says more.
+    steps, rejected, evaluations : (k,) int arrays
+    event_names : tuple of str
+    event_counts : (k,) int array
+        Events of each run, all kinds together.
+    reduced : dict
+        What a reduction kept: ``count``, ``mean``, ``variance``, ``least``, ``greatest`` (n_x + n_y, m) of the
+        statistics, in the order of ``names``; lists of arrays, one a block, of a function.
+    names : tuple of str
+        Names of states and outputs.
+    """
+
+    def __init__(
+        self,
+        module: Module,
+        cases: Cases,
+        plan: Plan,
+        runs: dict[str, Any],
+        kept: dict[str, Any],
+        words: dict[int, str],
+    ) -> None:
+        self._module, self._cases, self._plan, self._words = module, cases, plan, words
+        self.count = cases.count
+        self.names = names_of(module)
+        self.t = np.array([plan.span[1]]) if plan.t_eval is None else plan.t_eval
+        self.t_end, self.status = runs["t"], runs["status"]
+        self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
+        self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
+        self._notes = kept.pop("notes", None)
+        self._failure, self._failure_time = runs["failure"], runs["failure_time"]
+        self.x, self.samples = kept.pop("x", None), kept.pop("samples", None)
+        self.reduced = kept
+
+    @property
+    def ok(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """(k,) which runs reached the end, or an event that ends them."""
+        return np.asarray((self.status == 0) | (self.status == EVENT))
+
+    def failures(self) -> list[Failure]:
+        """The runs that did not reach the end, with what stopped them."""
+        return [self._describe(int(k)) for k in np.flatnonzero(~self.ok)]
+
+    def _describe(self, k: int) -> Failure:
+        status, code = int(self.status[k]), int(self._failure[k])
+        message = self._words.get(k) or MEANING.get(status, f"status {status}")
+        if code and k not in self._words:
+            from ..runtime.failure import WORDS
+
+            reason = WORDS.get(code, (f"status {code}",))[0]
+            message += f"; last failure near t = {self._failure_time[k]:.6g} s: {reason}"
+        return Failure(k, status, float(self.t_end[k]), message)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.names:
+            raise unknown("column", name, self.names)
+        row = self.names.index(name)
+        if "mean" in self.reduced:
+            return np.asarray(self.reduced["mean"][row])
+        if self.x is None:
+            raise UsageError(f"this ensemble kept what its reduction made ({', '.join(self.reduced)}), not {name!r}")
+        states = self.x[:, None] if self.samples is None else self.samples
+        if row < len(self.x):
+            found = states[row]
+        else:
+            found = np.stack([self._outputs(states[:, j], float(t))[row] for j, t in enumerate(self.t)])
+        return np.asarray(found[0] if self.samples is None else found)
+
+    def _outputs(self, x: Array, t: float) -> Array:
+        return with_outputs(self._module, self._cases, x, t)
+
+    def events(self, name: str) -> tuple[Array, Array]:
+        """Times (m, k) of an event in each run, and the projected states (n_x, m, k) there; NaN where it was not."""
+        if name not in self.event_names:
+            raise unknown("event", name, self.event_names)
+        if self._notes is None:
+            raise UsageError("this ensemble kept no events; give reduce='states' or 'events'")
+        mine = self._notes[0] == self.event_names.index(name)
+        most = int(mine.sum(axis=0).max(initial=0))
+        order = np.argsort(~mine, axis=0, kind="stable")[:most]
+        found = np.take_along_axis(np.where(mine, self._notes[1:], np.nan), order[None], axis=1)
+        return found[0], found[1:]
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Mean, deviation, least and greatest of every state and output at the end, over the runs that got there."""
+        if "mean" in self.reduced:
+            rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
+        elif self.x is None:
+            raise UsageError("this ensemble kept no states to summarise")
+        else:
+            parts = summarise(self._outputs(np.where(self.status == 0, self.x, np.nan), self._plan.span[1]))
+            spread = parts["squares"] / max(float(parts["count"]) - 1.0, 1.0)
+            rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
+        keys = ("mean", "deviation", "least", "greatest")
+        values = np.array([rows[0], np.sqrt(rows[1]), *rows[2:]]).T.tolist()
+        return {name: dict(zip(keys, row, strict=True)) for name, row in zip(self.names, values, strict=True)}
+
+    def case(self, k: int) -> dict[str, Any]:
+        """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs."""
+        if not -self.count <= k < self.count:
+            raise UsageError(f"there are runs 0 to {self.count - 1}, not {k}")
+        cases, column = self._cases, self._cases.column(k)
+        if cases.states is not None:
+            initial: Any = cases.states[:, k]
+        else:
+            initial = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
+        inputs = dict(zip(self._module.u_names, column["u"].tolist(), strict=True)) | self._plan.inputs
+        return {"initial": initial, "parameters": column["p"], "inputs": inputs}
+
+    def trajectory(self, k: int, **options: Any) -> Trajectory:
+        """Run k again, with all its steps; options as for ``Module.simulate``."""
+        plan = self._plan
+        settings = {"method": plan.method, **plan.options, **options}
+        return self._module.simulate(plan.span, **self.case(k), **settings)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each run: status, end, parameters that vary, and the columns at the end."""
+        pd = require("pandas", "pandas", "to_pandas")
+        cases = self._cases
+        columns: dict[str, Any] = {"status": self.status, "t_end": self.t_end, "steps": self.steps}
+        if cases.p.ndim > 1:
+            columns |= {name: row for name, row in zip(self._module.p_names, cases.p, strict=True) if np.ptp(row)}
+        if self.x is not None:
+            end = self._outputs(self.x, self._plan.span[1])
+            columns |= dict(zip(self.names, end, strict=True))
+        return pd.DataFrame(columns)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the arrays to an .npz file that NumPy alone reads."""
+        target = Path(path).with_suffix(".npz")
+        arrays: dict[str, Any] = {
+            name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)
+        }
+        for name in ("x", "samples"):
+            if getattr(self, name) is not None:
+                arrays[name] = getattr(self, name)
+        runs = {name: getattr(self, name) for name in ("t", "t_end", "status", "steps", "rejected", "evaluations")}
+        with target.open("wb") as file:
+            np.savez_compressed(file, names=np.array(self.names), **runs, **arrays)
+        return target
+
+    def plot(self, name: str, ax: Any = None, limit: int = 200) -> Any:
+        """Lines of a column over time, mean and spread for statistics, a histogram where there are last states only.
+
+        Parameters
+        ----------
+        name : str
+        ax : matplotlib Axes, optional
+        limit : int
+            Draw so many runs at most, evenly chosen.
+        """
+        from .picture import draw
+
+        return draw(self, name, ax, limit)
+
+    def unit(self, name: str) -> str:
+        """The unit of a column."""
+        return self._module.layout.unit(name)
+
+    def __repr__(self) -> str:
+        failed = int((~self.ok).sum())
+        lost = f", {failed} failed" if failed else ""
+        return f"<Ensemble of {self._module.name}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"

@@ -1,0 +1,110 @@
+"""A Module <-> what a worker on any machine needs to have it: the file of its code, or the sources to build it from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..errors import MissingDependencyError, ToolchainError, UsageError
+from ..numeric.scales import Array
+from ..runtime.late import eager
+from ..runtime.pickling import restore
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+
+class Handle(NamedTuple):
+    """A module as it travels.
+
+    Attributes
+    ----------
+    kind : type
+        Of the module.
+    name, file : str
+        Import name and file of its code where it was made.
+    digest : str
+        SHA-256 of that file.
+    recipe : str
+        JSON with the model's name, the source texts and the options to build it with; empty where there are none (an
+        installed package).
+    p, u : arrays
+        Values bound.
+    """
+
+    kind: type[Module]
+    name: str
+    file: str
+    digest: str
+    recipe: str
+    p: Array
+    u: Array
+
+    def open(self) -> Module:
+        """The module: from its own file if that is here and the same, else built from the sources, or imported.
+
+        Raises
+        ------
+        ToolchainError
+            It cannot be built here.
+        """
+        core = _open(self.name, self.file, self.digest, self.recipe)
+        return self.kind(core, self.p, self.u)
+
+
+def describe(module: Module) -> Handle:
+    """How workers get a module.
+
+    Raises
+    ------
+    UsageError
+        Its code has no file of its own.
+    """
+    core: Any = eager(module.core)
+    file = str(getattr(core, "__file__", "") or "")
+    if not file or not Path(file).is_file():
+        raise UsageError(f"the module of {module.name!r} has no file that workers could load; use target cython")
+    return Handle(type(module), core.__name__, file, digest(file), _recipe(Path(file)), module.p, module.u)
+
+
+def digest(file: str) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def _recipe(file: Path) -> str:
+    manifest = file.parent / "manifest.json"
+    folder = file.parent / "sources"
+    if not manifest.is_file() or not folder.is_dir():
+        return ""
+    facts = json.loads(manifest.read_text(encoding="utf-8"))
+    sources = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
+    return json.dumps({"name": facts["name"], "sources": sources, "options": facts["recipe"].get("options", {})})
+
+
+@lru_cache(maxsize=8)
+def _open(name: str, file: str, wanted: str, recipe: str) -> Any:
+    if Path(file).is_file() and digest(file) == wanted:
+        return restore(_core, name, file, None, None)  # type: ignore[arg-type]
+    if not recipe:
+        try:
+            return import_module(name)
+        except ImportError as error:
+            raise ToolchainError(f"this worker has no module {name}: install its package there") from error
+    try:
+        compilation = import_module("eomgen.compilation")
+    except ImportError as error:
+        raise MissingDependencyError(
+            "a worker on another machine builds the module itself and needs eomgen: pip install eomgen"
+        ) from error
+    facts = json.loads(recipe)
+    options = compilation.Options(**facts["options"])
+    return compilation.load_core(compilation.compile_sources(facts["sources"], facts["name"], options))
+
+
+def _core(core: Any, p: None, u: None) -> Any:
+    return core

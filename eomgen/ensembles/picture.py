@@ -1,0 +1,39 @@
+"""An Ensemble -> a picture of one of its columns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..runtime.names import require
+
+if TYPE_CHECKING:
+    from .ensemble import Ensemble
+
+
+def draw(ensemble: Ensemble, name: str, ax: Any, limit: int) -> Any:
+    """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
+    values = ensemble[name]
+    if ax is None:
+        plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
+        ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
+    unit = ensemble.unit(name)
+    label = f"{name} ({unit})" if unit else name
+    if "mean" in ensemble.reduced:
+        row = ensemble.names.index(name)
+        spread = np.sqrt(ensemble.reduced["variance"][row])
+        ax.fill_between(ensemble.t, values - spread, values + spread, alpha=0.3, label="mean ± deviation")
+        ax.plot(ensemble.t, values, label="mean")
+        ax.plot(ensemble.t, ensemble.reduced["least"][row], "k:", lw=0.8, label="least, greatest")
+        ax.plot(ensemble.t, ensemble.reduced["greatest"][row], "k:", lw=0.8)
+        ax.legend(frameon=False)
+    elif values.ndim == 2:
+        chosen = np.unique(np.linspace(0, ensemble.count - 1, min(limit, ensemble.count)).astype(int))
+        ax.plot(ensemble.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
+    else:
+        ax.hist(values[np.isfinite(values)], bins="auto")
+        ax.set(xlabel=f"{label} at t = {ensemble.t[0]:.6g} s", ylabel="runs")
+        return ax
+    ax.set(xlabel="t (s)", ylabel=label)
+    return ax

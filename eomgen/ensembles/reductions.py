@@ -1,0 +1,171 @@
+"""Blocks of runs as they come -> what is kept of them: last states, samples, statistics, or what a function returns.
+
+A reduction turns a block into named arrays and joins those of all blocks in the order of the runs, so that the result
+does not depend on which was ready first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .block import Block, Plan
+from .cases import Cases
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+Arrays = dict[str, Any]
+GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
+
+
+class Reduction(Protocol):
+    """How blocks are boiled down."""
+
+    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays: ...
+    def join(self, parts: Sequence[Arrays]) -> Arrays: ...
+
+
+class States:
+    """The last states, the samples where times were asked for, and the events.
+
+    Parameters
+    ----------
+    kept : sequence of str
+        Which of them.
+    """
+
+    def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
+        self.kept = tuple(kept)
+
+    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+        """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
+        return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """Side by side."""
+        return {name: np.concatenate([part[name] for part in parts], axis=-1) for name in parts[0]}
+
+
+class Statistics:
+    """Count, mean, variance, least and greatest of every state and output over the runs that got there.
+
+    Means and variances of blocks are merged as in T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the
+    sample variance, The American Statistician 37 (1983).
+    """
+
+    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+        """count (g, m), mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
+        if plan.t_eval is None or block.samples is None:
+            states, times = np.where(block.status == 0, block.x, np.nan)[:, None, :], np.array([plan.span[1]])
+        else:
+            states, times = block.samples, plan.t_eval
+        grains = []
+        values = [with_outputs(module, cases, states[:, j], float(t)) for j, t in enumerate(times)]
+        for start in range(0, cases.count, GRAIN):
+            parts = [summarise(x[:, start : start + GRAIN]) for x in values]
+            grains.append({name: np.stack([part[name] for part in parts], axis=-1) for name in parts[0]})
+        return {name: np.stack([grain[name] for grain in grains]) for name in grains[0]}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """One grain after the other, and the variance at the end."""
+        grains = [{name: rows[g] for name, rows in part.items()} for part in parts for g in range(len(part["count"]))]
+        total = grains[0]
+        for grain in grains[1:]:
+            total = merge(total, grain)
+        count = total["count"]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            variance = np.where(count > 1, total["squares"] / (count - 1.0), np.nan)
+        return {**{name: total[name] for name in ("count", "mean", "least", "greatest")}, "variance": variance}
+
+
+class Custom:
+    """What a user's function makes of each block.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(block)`` with a :class:`~.block.Block` -> a mapping of names to arrays.
+    """
+
+    def __init__(self, function: Callable[[Block], Mapping[str, Any]]) -> None:
+        self.function = function
+
+    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+        """As the function says."""
+        made = self.function(block)
+        if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
+            raise UsageError(f"the function of reduce must return a mapping of names to arrays, not {made!r}")
+        return {name: np.asarray(value) for name, value in made.items()}
+
+    def join(self, parts: Sequence[Arrays]) -> Arrays:
+        """A list of what was made of each block, for each name."""
+        return {name: [part[name] for part in parts] for name in parts[0]}
+
+
+def choose_reduction(reduce: Any) -> Reduction:
+    """The reduction that a user names: None or 'states', 'statistics', 'events', or a function of a block."""
+    if callable(reduce):
+        return Custom(reduce)
+    if reduce in (None, "states"):
+        return States()
+    if reduce == "events":
+        return States(["notes"])
+    if reduce == "statistics":
+        return Statistics()
+    raise UsageError(f"reduce must be 'states', 'statistics', 'events' or a function of a block, not {reduce!r}")
+
+
+def with_outputs(module: Module, cases: Cases, x: Array, t: float) -> Array:
+    """States and outputs (n, k), as ``names_of`` has them."""
+    if not module.n_y:
+        return x
+    further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
+    y = np.full((module.n_y, x.shape[1]), np.nan)
+    good = np.flatnonzero(np.isfinite(x).all(axis=0))
+    if cases.p.ndim == 1 and good.size:
+        u = cases.u if cases.u.ndim == 1 else cases.u[:, good]
+        y[:, good] = module.outputs(np.full(good.size, t), x[:, good], p=cases.p, u=u)
+    elif good.size:
+        for k in good:
+            y[:, k] = module.outputs(t, x[:, k], **cases.column(int(k)))
+    return np.concatenate([x, y[further]])
+
+
+def names_of(module: Module) -> tuple[str, ...]:
+    """States, then the outputs that do not repeat a coordinate."""
+    return (*module.x_names, *(name for name in module.y_names if name not in module.x_names))
+
+
+def summarise(values: Array) -> Arrays:
+    """Count (), mean, sum of squared deviations, least and greatest (n,) over the columns that are finite."""
+    good = values[:, np.isfinite(values).all(axis=0)]
+    count = good.shape[1]
+    nothing = np.full(len(values), np.nan)
+    if not count:
+        return {"count": np.array(0), "mean": nothing, "squares": nothing, "least": nothing, "greatest": nothing}
+    mean = good.mean(axis=1)
+    squares = ((good - mean[:, None]) ** 2).sum(axis=1)
+    return {
+        "count": np.array(count), "mean": mean, "squares": squares, "least": good.min(axis=1),
+        "greatest": good.max(axis=1),
+    }  # fmt: skip
+
+
+def merge(one: Arrays, other: Arrays) -> Arrays:
+    """Both together."""
+    a, b = one["count"], other["count"]
+    total = np.maximum(a + b, 1)
+    gap = other["mean"] - one["mean"]
+    mean, squares = one["mean"] + gap * (b / total), one["squares"] + other["squares"] + gap**2 * (a * b / total)
+    return {
+        "count": a + b,
+        "mean": np.where(a == 0, other["mean"], np.where(b == 0, one["mean"], mean)),
+        "squares": np.where(a == 0, other["squares"], np.where(b == 0, one["squares"], squares)),
+        "least": np.fmin(one["least"], other["least"]),
+        "greatest": np.fmax(one["greatest"], other["greatest"]),
+    }

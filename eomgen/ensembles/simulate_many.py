@@ -1,0 +1,229 @@
+"""Stage runtime: Module, many initial values, parameters and inputs -> Ensemble."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..runtime.late import eager
+from ..runtime.names import check_names
+from ..runtime.progress import Progress, wanted
+from ..runtime.signals import Forcing, Signal
+from ..runtime.simulate import DEFAULTS, find_span, ordered_times
+from ..runtime.tolerances import check_tolerances
+from .block import LOST, Plan, find_events
+from .blocks import RUNS, Kept, choose_size, run_local, split
+from .cases import Cases, collect_cases
+from .ensemble import Ensemble
+from .reductions import Reduction, choose_reduction
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+OPTIONS = ("rtol", "atol", "max_step", "first_step")
+
+
+def simulate_many(
+    module: Module,
+    span: float | tuple[float, float] | None = None,
+    initial: Mapping[str, Any] | ArrayLike | None = None,
+    parameters: Mapping[str, Any] | ArrayLike | None = None,
+    inputs: Mapping[str, Any] | ArrayLike | None = None,
+    *,
+    count: int | None = None,
+    method: str | None = None,
+    t_eval: ArrayLike | None = None,
+    events: Any = None,
+    keep_events: int = 16,
+    reduce: Any = None,
+    threads: int | None = None,
+    cluster: Any = None,
+    store: str | Path | None = None,
+    block: int | None = None,
+    max_steps: int = 1_000_000,
+    progress: bool | None = None,
+    **options: Any,
+) -> Ensemble:
+    """Integrate the equations of motion for many initial values, parameters and inputs.
+
+    Every run has steps of its own.  The results do not depend, to the last bit, on how threads, workers and blocks are
+    chosen; a run that fails is marked and holds up no other.
+
+    Parameters
+    ----------
+    module : Module
+    span : (float, float) or float, optional
+        As for ``simulate``.
+    initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
+        Named values, held exactly, or states, a column each, which are projected onto the constraints.
+    parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
+        An input may also vary over time, the same for all runs: a table (times, values), a Signal, or an expression as
+        text; (k,) inputs are constant.
+    count : int, optional
+        Number of runs, where no array tells it.
+    method : str, optional
+        DOP853, RK45 or RK23 run in compiled code; any other method of ``simulate`` runs one after the other.
+    t_eval : (m,) array, optional
+        Times to store; the end alone by default.
+    events : str, list of str, or mapping of names to expressions, optional
+        As for ``simulate``, without functions; those of the model by default.
+    keep_events : int
+        Keep so many events of each run, the first ones.
+    reduce : {'states', 'statistics', 'events'} or callable, optional
+        What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count,
+        mean, variance, least and greatest of states and outputs over the runs; or what ``reduce(block)`` returns for
+        each :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
+    threads : int, optional
+        Runs at a time; all processors by default.
+    cluster : True, int, str or dask Client, optional
+        Run on the workers of dask.distributed: a local cluster, with so many workers; the address of a scheduler; a
+        client.  A worker loads the module's code if its file is there, and else builds it.
+    store : str or Path, optional
+        Folder that keeps finished blocks: the same call again goes on where it stopped.
+    block : int, optional
+        Runs handled together; chosen by default.
+    max_steps : int
+        Give up a run that takes more.
+    progress : bool, optional
+        Show progress on stderr; by default for long runs on a terminal.
+    **options
+        rtol, atol, max_step, first_step; defaults as for ``simulate``.
+
+    Returns
+    -------
+    Ensemble
+
+    Raises
+    ------
+    UsageError
+        Unknown names, wrong shapes, lengths that differ; a store of another ensemble.
+    MissingDependencyError
+        dask.distributed is not installed.
+    """
+    check_names("option of simulate_many", options, OPTIONS)
+    tables, constants = _separate(inputs)
+    cases = collect_cases(module, initial, parameters, constants, count)
+    plan = _plan(module, span, method, t_eval, tables, max_steps, options, (events, keep_events))
+    reduction = choose_reduction(reduce)
+    threads = _positive("threads", threads, os.cpu_count() or 1)
+    watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
+    size = module.n_x * 8 * (1 if plan.t_eval is None else len(plan.t_eval))
+    with ExitStack() as stack:
+        if watch is not None:
+            stack.callback(watch.close)
+        client = workers = None
+        if cluster is not None and cluster is not False:
+            from .cluster import count_workers, open_client
+
+            client = stack.enter_context(open_client(cluster))
+            workers = count_workers(client)
+        parts = split(cases.count, _positive("block", block, choose_size(cases.count, size, workers or 1)))
+        store_of = None if store is None else _open_store(store, module, cases, plan, reduce, parts)
+        kept: dict[int, Kept] = {}
+        if store_of is not None:
+            found = {index: store_of.load(index) for index in range(len(parts))}
+            kept = {index: value for index, value in found.items() if value is not None}
+        missing = [index for index in range(len(parts)) if index not in kept]
+        look = None if watch is None else watch.look
+        for index, value in _run(module, cases, plan, reduction, parts, missing, threads, client, look):
+            kept[index] = value
+            if store_of is not None and not (value[0]["runs_status"] == LOST).any():
+                store_of.save(index, *value)
+    return _gather(module, cases, plan, reduction, parts, kept)
+
+
+def _run(
+    module: Module, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], missing: list[int],
+    threads: int, client: Any, watch: Callable[[float], None] | None,
+) -> Iterator[tuple[int, Kept]]:  # fmt: skip
+    if client is None:
+        return run_local(module, cases, plan, reduction, parts, missing, threads, watch)
+    from .cluster import run_on_workers
+    from .handle import describe
+
+    return run_on_workers(client, module, describe(module), cases, plan, reduction, parts, missing, watch)
+
+
+def _gather(
+    module: Module, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], kept: dict[int, Kept]
+) -> Ensemble:
+    ordered = [kept[index] for index in range(len(parts))]
+    runs = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
+    made = [{name: x for name, x in arrays.items() if not name.startswith("runs_")} for arrays, _ in ordered]
+    words = {start + k: text for (start, _), (_, told) in zip(parts, ordered, strict=True) for k, text in told.items()}
+    return Ensemble(module, cases, plan, runs, reduction.join(made), words)
+
+
+def _plan(
+    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int,
+    options: dict[str, Any], watched: tuple[Any, int],
+) -> Plan:  # fmt: skip
+    declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+    start, end = find_span(span, float(declared["end"]))
+    method = declared["method"] if method is None else method
+    if not isinstance(method, str):
+        raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
+    Forcing(module.layout, tables).require_finite()
+    chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
+    chosen = check_tolerances(module.n_x, abs(end - start), chosen)
+    times = None if t_eval is None else ordered_times(t_eval, start, end)
+    most, keep = _positive("max_steps", max_steps, 1), _positive("keep_events", watched[1], 1)
+    plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep)
+    find_events(module, plan)
+    return plan
+
+
+def _separate(inputs: Any) -> tuple[dict[str, Any], Any]:
+    """Inputs that are tables over time, and the others."""
+    if not isinstance(inputs, Mapping):
+        return {}, inputs
+    tables = {
+        name: x for name, x in inputs.items()
+        if isinstance(x, (Signal, str)) or (isinstance(x, tuple) and len(x) == 2 and np.ndim(x[0]) == 1)
+    }  # fmt: skip
+    for name, value in inputs.items():
+        if callable(value) and name not in tables:
+            raise UsageError(
+                f"input {name} of simulate_many must be a number, (k,) numbers or a table (times, values), "
+                "a Signal or an expression as text, not a function"
+            )
+    return tables, {name: x for name, x in inputs.items() if name not in tables} or None
+
+
+def _positive(what: str, given: Any, default: int) -> int:
+    if given is None:
+        return default
+    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 1:
+        raise UsageError(f"{what} must be a whole number of at least 1, not {given!r}")
+    return int(given)
+
+
+def _open_store(
+    folder: str | Path, module: Module, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
+) -> Any:
+    from .handle import digest
+    from .store import Store
+
+    def _plain(x: Any) -> Any:
+        if isinstance(x, Signal):
+            return [x.interpolation, x.times.tolist(), x.values.tolist()]
+        return x if isinstance(x, str) else np.asarray(x).tolist()
+
+    file = getattr(eager(module.core), "__file__", None)
+    code = digest(file) if file else hashlib.sha256(str(module.core.metadata).encode()).hexdigest()
+    identity = {
+        "model": module.name, "code": code, "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
+        "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
+        "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
+        "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,
+        "reduce": getattr(reduce, "__qualname__", reduce) or "states", "block": parts[0][1],
+    }  # fmt: skip
+    return Store(folder, identity)

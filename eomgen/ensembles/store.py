@@ -1,0 +1,84 @@
+"""Finished blocks <-> files in a folder, so that a run that was stopped goes on where it was."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+
+FORMAT = "eomgen ensemble 1"
+
+
+class Store:
+    """A folder with a file for each finished block and a manifest that says which ensemble they belong to.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made if it is not there.
+    identity : dict
+        What the results depend on, JSON-like.
+
+    Raises
+    ------
+    UsageError
+        The folder belongs to another ensemble, or holds something else.
+    """
+
+    def __init__(self, folder: str | Path, identity: dict[str, Any]) -> None:
+        self.folder = Path(folder)
+        manifest = self.folder / "manifest.json"
+        wanted = json.loads(json.dumps({"format": FORMAT, **identity}))
+        if manifest.is_file():
+            self._compare(manifest, wanted)
+            return
+        if self.folder.is_dir() and any(self.folder.iterdir()):
+            raise UsageError(f"store {self.folder} is not empty and holds no ensemble; name another folder")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        _write(manifest, json.dumps(wanted, indent=1).encode())
+
+    def _compare(self, manifest: Path, wanted: dict[str, Any]) -> None:
+        try:
+            found = json.loads(manifest.read_text(encoding="utf-8"))
+        except ValueError:
+            found = {}
+        differing = sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name))
+        if differing:
+            raise UsageError(
+                f"store {self.folder} belongs to another ensemble: {', '.join(differing)} differ; "
+                "name another folder or remove this one"
+            )
+
+    def _path(self, index: int) -> Path:
+        return self.folder / f"block_{index:06d}.npz"
+
+    def save(self, index: int, arrays: dict[str, Any], words: dict[int, str]) -> None:
+        """Keep the arrays of a block; complete or not there."""
+        import io
+
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays, words=np.array(json.dumps({str(k): text for k, text in words.items()})))
+        _write(self._path(index), buffer.getvalue())
+
+    def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:
+        """The arrays of a block, or None if it was not finished."""
+        try:
+            with np.load(self._path(index), allow_pickle=False) as data:
+                arrays = {name: data[name] for name in data.files}
+        except FileNotFoundError:
+            return None
+        except (ValueError, OSError, EOFError, KeyError) as error:
+            raise UsageError(f"{self._path(index)} cannot be read: {error}; remove it to run its block again") from None
+        words = json.loads(str(arrays.pop("words")))
+        return arrays, {int(k): text for k, text in words.items()}
+
+
+def _write(path: Path, data: bytes) -> None:
+    attempt = path.with_name(f".{path.name}.{os.getpid()}")
+    attempt.write_bytes(data)
+    os.replace(attempt, path)

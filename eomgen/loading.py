@@ -1,0 +1,54 @@
+"""From the suffix of a file to a Model: model files through describe, robots through robots."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from .describe import Model, load_yaml
+from .errors import UsageError
+
+#: Suffix of a file -> what it is; the table of what can be loaded.
+SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
+ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
+
+
+def load(path: str | os.PathLike[str], *, allow_native: bool = False, **robot: Any) -> Model:
+    """A model from a file, by its suffix.
+
+    Parameters
+    ----------
+    path : str or path
+        A model file ``.yaml`` or ``.yml``, or a robot ``.urdf`` or ``.xml`` (MJCF).
+    allow_native : bool, optional
+        Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
+        names are not read.
+    **robot
+        For robots: ``floating``, ``lock``, ``mimic`` and the other fields of :class:`eomgen.robots.Options`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    UsageError
+        The suffix is not one that can be loaded, or an option is not one of it.
+    FileNotFoundError
+        There is no such file.
+    ModelError
+        The file cannot be read as a model; what can only be judged as a whole is told by ``Model.mechanism``.
+    """
+    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    if suffix in ROBOTS:
+        from .robots import describe_file  # only where it is needed: MJCF brings its own compiler
+
+        return Model.from_description(describe_file(path, **robot))
+    if suffix not in SUFFIXES:
+        known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
+        raise UsageError(
+            f"{os.fspath(path)}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}"
+        )
+    if robot:
+        raise UsageError(f"{os.fspath(path)}: {', '.join(robot)}: options of robot files, not of model files")
+    return load_yaml(path, allow_native=allow_native)

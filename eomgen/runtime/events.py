@@ -1,0 +1,232 @@
+"""Stage runtime: events of the model and of one run -> what integrators watch for, and what happens then.
+
+An event is a zero of an expression or function of time and state.  Those of the model are compiled with it; those given
+for a run are its names, expressions as text, or functions f(t, x) with SciPy's attributes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
+
+import numpy as np
+
+from ..errors import UsageError, ZenoError
+from ..numeric.scales import Array
+from .layout import Layout
+from .names import check_names, require_time_and_state, unknown
+from .tapes import Formula, is_formula, record_tape
+
+if TYPE_CHECKING:
+    from .module import Module
+    from .signals import Forcing
+
+GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
+UNWATCHED = 2  #: a direction
+CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, are Zeno's: as in loop.c
+
+
+class Named(list[Array]):
+    """What belongs to each event, by its place or its name."""
+
+    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
+        super().__init__(values)
+        self.names = tuple(names)
+
+    @overload
+    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
+    @overload
+    def __getitem__(self, key: slice) -> list[Array]: ...
+    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
+        if isinstance(key, str):
+            if key not in self.names:
+                raise unknown("event", key, self.names)
+            key = self.names.index(key)
+        return super().__getitem__(key)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (list(self), self.names)
+
+
+class Event:
+    """An event with the number of times it may still happen.
+
+    Parameters
+    ----------
+    function : callable f(t, x)
+        With SciPy's attributes, unless these are given.
+    name : str
+    terminal : int
+        The run ends when it has happened so often; 0: never.
+    direction : {1, -1, 0}
+        Rising, falling, both; or UNWATCHED.
+    action : {GO_ON, RESET, WAIT}
+        Whether the model's kernel gives a new state, or an impact does.
+    """
+
+    def __init__(
+        self,
+        function: Any,
+        name: str = "",
+        terminal: float | None = None,
+        direction: float | None = None,
+        action: int = GO_ON,
+    ) -> None:
+        if not callable(function):
+            raise UsageError(f"an event must be a name, an expression or a function f(t, x), not {function!r}")
+        require_time_and_state("an event", function)
+        self.function, self.action = function, action
+        self.name = name or str(getattr(function, "__name__", type(function).__name__))
+        self.terminal = (getattr(function, "terminal", None) or 0) if terminal is None else terminal
+        given = getattr(function, "direction", 0) if direction is None else direction
+        self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
+        self.left: tuple[float, float] | None = None  #: time of the last reset, and the side of zero it led to
+
+    def __call__(self, t: float, x: Array) -> float:
+        """The value at time t and state x; right after a reset, one on the side to which it led."""
+        value = float(self.function(t, x))
+        if self.left is not None and abs(t - self.left[0]) <= 1e-14 * max(abs(t), 1e-3):
+            return self.left[1] * max(abs(value), 1e-300)
+        return value
+
+
+class Events:
+    """All events of one run.
+
+    Parameters
+    ----------
+    layout : Layout
+    given : None, or one event or several: names, texts, functions; a mapping names them
+        None watches all of the model.  Those of the model that reset the state are watched always.
+    """
+
+    def __init__(self, layout: Layout, given: Any) -> None:
+        self.layout = layout
+        self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
+        self.names: list[str] = []
+        self.model: list[Event] = []
+        self.formulas: list[tuple[Event, Formula]] = []
+        self.functions: list[Event] = []
+        if given is None and not self.declared:
+            return
+        known = [str(event["name"]) for event in self.declared]
+        chosen = set(known) if given is None else set()
+        for name, one in _listed(given):
+            if isinstance(one, str) and one in known and name is None:
+                chosen.add(one)
+            elif is_formula(one) or isinstance(one, Mapping):
+                self.formulas.append(_of_text(layout, one, name))
+            else:
+                self.functions.append(Event(one, name or ""))
+        self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
+        taken: dict[str, int] = {}
+        for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
+            taken[name] = taken.get(name, 0) + 1
+            self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
+        if all(event.direction == UNWATCHED for event in self.model):
+            self.names, self.model = self.names[len(known) :], []
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def resets(self) -> bool:
+        """Whether an event changes the state."""
+        return any(event.action != GO_ON for event in self.model)
+
+    def encode(self) -> dict[str, Any] | None:
+        """As the compiled loop takes them; None if there are none."""
+        if not self.names:
+            return None
+        every = [*self.model, *(event for event, _ in self.formulas), *self.functions]
+        return {
+            "model": len(self.model),
+            "tape": record_tape([formula for _, formula in self.formulas]) if self.formulas else None,
+            "outside": [event.function for event in self.functions],
+            "direction": [event.direction for event in every],
+            "most": [int(event.terminal) for event in every],
+            "action": [event.action for event in every],
+            "resets": self.layout.metadata.get("resets", []) if self.model else [],
+        }
+
+    def listed(self, module: Module, forcing: Forcing) -> list[Event]:
+        """The same as functions f(t, x), for SciPy's methods."""
+        kernel = module.kernels.timed("events", nan=True) if self.model else None
+        found: list[Event] = []
+        for i, event in enumerate(self.model):
+            function = _value_of(kernel, forcing, i)
+            found.append(Event(function, self.names[i], event.terminal, event.direction, event.action))
+        p = module.p
+        for event, formula in self.formulas:
+            found.append(Event(formula.function(p), event.name, event.terminal, event.direction))
+        return [*found, *self.functions]
+
+    def reset(self, module: Module, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
+        """The state after the events that happened at time t."""
+        after = np.array(x, dtype=float)
+        for i in fired:
+            if self.model[i].action == RESET:
+                values = module.kernels.timed("resets")(t, after, u=forcing(t, after))
+                for (event, place), value in zip(self.layout.metadata["resets"], values, strict=True):
+                    if event == i:
+                        after[place] = value
+                after = np.asarray(module.project(after, t=t))
+        gaps = [i for i in fired if self.model[i].action == WAIT]
+        if gaps:
+            from ..analysis.impact import strike_events
+
+            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after))
+        return after
+
+    def crowded(self, t: float, count: int) -> ZenoError:
+        """The error for resets that never end."""
+        return self.crowded_near(t, count, [event.name for event in self.model if event.action != GO_ON])
+
+    @staticmethod
+    def crowded_near(t: float, count: int, names: Sequence[str]) -> ZenoError:
+        """The same, of named events."""
+        return ZenoError(
+            f"the events {', '.join(names)} follow each other ever faster near t = {t:.6g} s, after {count} resets "
+            "(Zeno), or a reset leads nowhere: end the run there (terminal: a number of times), let what comes to rest "
+            "stay in contact by a contact force, or reset otherwise"
+        )
+
+
+def _listed(given: Any) -> list[tuple[str | None, Any]]:
+    if given is None:
+        return []
+    if isinstance(given, Mapping):
+        return [(str(name), one) for name, one in given.items()]
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return [(None, one) for one in given]
+    return [(None, given)]
+
+
+def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formula]:
+    """An event by its text, or by a mapping with the keys of a model file."""
+    options = {"expression": given} if isinstance(given, str) else dict(given)
+    check_names("key of an event", options, ("expression", "terminal", "direction"))
+    text = options.get("expression")
+    if not isinstance(text, str):
+        raise UsageError(f"event {name or ''}: its expression must be a text, not {text!r}")
+    direction = options.get("direction") or 0
+    if direction not in (-1, 0, 1):
+        raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
+    event = Event(_unknown, name or text, int(options.get("terminal") or 0), direction)
+    return event, Formula(layout, text, f"event {name or text!r}")
+
+
+def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
+    action = RESET if event.get("resets") else WAIT if event.get("restitution") is not None else GO_ON
+    direction = int(event.get("direction") or 0) if chosen or action != GO_ON else UNWATCHED
+    return Event(_unknown, str(event["name"]), int(event.get("terminal") or 0), direction, action)
+
+
+def _unknown(t: float, x: Array) -> float:
+    raise NotImplementedError("the compiled loop evaluates this event")
+
+
+def _value_of(kernel: Any, forcing: Forcing, i: int) -> Callable[[float, Array], float]:
+    if forcing:
+        return lambda t, x: float(kernel(t, x, u=forcing(t, x))[i])
+    return lambda t, x: float(kernel(t, x)[i])

@@ -1,0 +1,136 @@
+"""Stage runtime: times and states of an integrator's steps -> the end of a run whose steps lead nowhere.
+
+Next to a singular position, or where a force jumps, an integrator may go on for days in steps just above rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+from .failure import place
+
+WINDOW = 200  #: steps judged together
+SHORT = 5e-9  #: mean step relative to the span below which a run crawls
+STILL = 1e-4  #: change of the state in a window, relative to the largest yet, below which nothing happens
+MANY = 100_000  #: steps left that a run may take at any pace
+REMEDY = (
+    "look for a force that jumps (smooth it), a singular position, or motions far faster than the run is long (try an "
+    "implicit method, Radau)"
+)
+
+
+class Crawling(Exception):
+    """Raised inside an integration whose steps lead nowhere.
+
+    Parameters
+    ----------
+    t : float
+    x : (n_x,) array
+    step : float
+        Mean length of the last steps (s).
+    """
+
+    def __init__(self, t: float, x: Array, step: float) -> None:
+        super().__init__(t, x, step)
+        self.t, self.x, self.step = t, x, step
+
+
+class Pace:
+    """Watches how a run advances.
+
+    A run crawls if its mean step would take more than ``MANY`` further steps and is less than ``SHORT`` of its span,
+    while either the state stands still or it is at a known singularity: a short impact moves the state.
+
+    Parameters
+    ----------
+    start, end : float
+        Of the run (s).
+    x : (n_x,) array
+        First state.
+    n_q : int
+        Number of positions; velocities follow.
+    max_step : float
+        The user's; steps that it keeps short are not a crawl.
+    troubled : callable
+        (t, x) -> whether the state is at a known singularity.
+    """
+
+    def __init__(
+        self, start: float, end: float, x: Array, n_q: int, max_step: float, troubled: Callable[[float, Array], bool]
+    ) -> None:
+        self.end, self.parts = end, (slice(n_q), slice(n_q, None))
+        self.limit = min(SHORT * abs(end - start), 0.1 * max_step)
+        self.troubled = troubled
+        self.steps = 0
+        self.t, self.x = start, np.array(x)
+        self.largest = np.abs(self.x)
+
+    def look(self, t: float, x: Array, steps: int = 1) -> None:
+        """Take note of so many further steps, the last of which came to x at t."""
+        self.steps += steps
+        if self.steps < WINDOW:
+            return
+        step, moved = abs(t - self.t) / self.steps, np.abs(x - self.x)
+        self.t, self.x, self.steps = t, np.array(x), 0
+        self.largest = np.fmax(self.largest, np.abs(self.x))
+        if step > self.limit or abs(self.end - t) < MANY * step:
+            return
+        still = all((moved[part] <= STILL * self.largest[part].max(initial=0.0)).all() for part in self.parts)
+        if still or self.troubled(t, self.x):
+            raise Crawling(t, self.x, step)
+
+
+def watch_steps(solver: Any, pace: Pace) -> Any:
+    """A subclass of a SciPy solver that shows its steps to `pace`."""
+
+    def step(self: Any) -> Any:
+        message = solver.step(self)
+        if self.status == "running":
+            pace.look(self.t, self.y)
+        return message
+
+    return type(solver.__name__, (solver,), {"step": step, "__module__": solver.__module__})
+
+
+def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:
+    """Which rate is steepest in which state where a run crawls, in words; empty if none is steep for the steps.
+
+    Parameters
+    ----------
+    rhs : callable
+        f(t, x).
+    crawl : Crawling
+    names : names of the states
+    atol : float or (n_x,) array
+        Absolute tolerance; the changes tried are no less, nor less than the motion of ten steps.
+    """
+    t, x = crawl.t, crawl.x
+    found, words = 0.0, ""
+    sizes = np.fmax(np.broadcast_to(atol, x.shape), 10.0 * crawl.step * np.abs(np.array(rhs(t, x))))
+    sizes = np.fmax(sizes, 1e-12 * np.abs(x))
+    for j, size in enumerate(sizes):
+        low, high = x.copy(), x.copy()
+        low[j] -= size
+        high[j] += size
+        change = np.abs(np.array(rhs(t, high)) - np.array(rhs(t, low)))
+        if not np.isfinite(change).all():
+            continue
+        slope = change / (2 * size)
+        i = int(slope.argmax())
+        if slope[i] > max(found, 1e-2 / crawl.step):
+            found = slope[i]
+            words = f"the rate of {names[i]} changes by {change[i]:.3g} where {names[j]} changes by {2 * size:.1g}"
+    return words
+
+
+def describe_crawl(crawl: Crawling, names: tuple[str, ...], end: float, method: str, steep: str) -> str:
+    """The message of a run that crawls."""
+    why = f": {steep}" if steep else ""
+    return (
+        f"{method} gave up at t = {crawl.t:.9g} s of {end:.6g} s{place(names, crawl.x)}: its steps, {crawl.step:.1e} s "
+        f"on average, lead nowhere{why}; {REMEDY}"
+    )

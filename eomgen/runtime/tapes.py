@@ -1,0 +1,163 @@
+"""Stage runtime: an expression as text -> a tape that compiled loops play, and a function of (t, x) for all others.
+
+The text is read by the same parser as those of model files; nothing is ever executed.  A generated package has no
+parser and refuses texts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ExpressionError, MissingDependencyError, UsageError
+from ..numeric.scales import Array
+from .layout import Layout
+from .names import unknown
+
+if TYPE_CHECKING:
+    from ..graph.core import Expr
+
+#: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
+Tape = tuple[list[tuple[str, int, int, int]], list[float], list[int]]
+
+
+class Formula:
+    """An expression of time, coordinates, velocities and parameters, given for one run.
+
+    Parameters
+    ----------
+    layout : Layout
+    text : str
+        As in a model file, e.g. ``"theta - pi/2"``.
+    what : str
+        Whose it is, for messages.
+    """
+
+    def __init__(self, layout: Layout, text: str, what: str) -> None:
+        try:
+            from ..describe.expressions import parse
+            from ..graph.core import Graph
+            from ..graph.evaluate import compile_evaluator
+            from ..graph.substitute import symbols_of
+        except ImportError:
+            raise MissingDependencyError(
+                f"{what}: an expression as text needs eomgen to be read: pip install eomgen, or give a function f(t, x)"
+            ) from None
+        self.text, self.layout = text, layout
+        graph = Graph()
+        known = ("t", *layout.x, *layout.p)
+
+        def resolve(name: str) -> Expr:
+            if name not in known:
+                raise unknown(f"name in {what}", name, known)
+            return graph.symbol(name)
+
+        try:
+            self.expression = parse(text, graph, resolve)
+        except ExpressionError as error:
+            raise UsageError(f"{what}: {error}") from None
+        self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
+        self._evaluate = compile_evaluator([self.expression], known)
+
+    def function(self, p: Array) -> Callable[[float, Array], float]:
+        """f(t, x) at given parameters (n_p,)."""
+        evaluate, values = self._evaluate, p.tolist()
+        return lambda t, x: float(evaluate([t, *np.asarray(x).tolist(), *values])[0])
+
+
+def record_tape(formulas: Sequence[Formula]) -> Tape:
+    """One tape for several expressions."""
+    from ..graph.tape import record_tape as record
+
+    layout = formulas[0].layout
+
+    def place(name: str) -> tuple[str, int]:
+        for kind, names in (("x", layout.x), ("p", layout.p)):
+            if name in names:
+                return kind, names.index(name)
+        return "t", 0
+
+    return record([formula.expression for formula in formulas], place)
+
+
+class DeclaredSignal:
+    """An input's expression over time that the model itself declares, as its metadata hold it.
+
+    Parameters
+    ----------
+    tape : list
+        As :mod:`eomgen.graph.tape` makes them.
+    """
+
+    def __init__(self, tape: Sequence[Any]) -> None:
+        code, numbers, out = tape
+        self.tape: Tape = [(str(op), int(a), int(b), int(c)) for op, a, b, c in code], list(numbers), list(out)
+        self.depends_on_state = any(op == "x" for op, *_ in self.tape[0])
+
+    def function(self, p: Array) -> Callable[[float, Array], float]:
+        """f(t, x) at given parameters (n_p,)."""
+        code, numbers, out = self.tape
+        leaves = {"const": numbers, "p": p.tolist()}
+
+        def play(t: float, x: Array) -> float:
+            results: list[float] = []
+            for op, a, b, c in code:
+                if op == "t":
+                    value = t
+                elif op == "x":
+                    value = float(x[a])
+                elif op in leaves:
+                    value = leaves[op][a]
+                else:
+                    operands = (results[a], results[b], results[c])
+                    try:
+                        value = OPERATIONS[op](*operands)
+                    except (ArithmeticError, ValueError):
+                        value = math.nan
+                results.append(float(value))
+            return results[out[0]]
+
+        return play
+
+
+def _one(function: Callable[[float], float]) -> Callable[[float, float, float], float]:
+    return lambda a, b, c: function(a)
+
+
+def _two(function: Callable[[float, float], float]) -> Callable[[float, float, float], float]:
+    return lambda a, b, c: function(a, b)
+
+
+#: What each operation of a tape does, as tape.c does it.
+OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
+    "add": lambda a, b, c: a + b,
+    "sub": lambda a, b, c: a - b,
+    "mul": lambda a, b, c: a * b,
+    "div": lambda a, b, c: a / b,
+    "neg": lambda a, b, c: -a,
+    "pow": _two(math.pow),
+    "atan2": _two(math.atan2),
+    "abs": _one(abs),
+    "sign": lambda a, b, c: (a > 0) - (a < 0),
+    "min": _two(min),
+    "max": _two(max),
+    "lt": lambda a, b, c: a < b,
+    "le": lambda a, b, c: a <= b,
+    "eq": lambda a, b, c: a == b,
+    "not": lambda a, b, c: not a,
+    "and": lambda a, b, c: bool(a) and bool(b),
+    "or": lambda a, b, c: bool(a) or bool(b),
+    "select": lambda a, b, c: b if a else c,
+}
+OPERATIONS |= {
+    name: _one(getattr(math, name))
+    for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+}
+
+
+def is_formula(value: Any) -> bool:
+    """Whether what a user gives is an expression as text."""
+    return isinstance(value, str)

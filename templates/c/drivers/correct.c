@@ -1,0 +1,57 @@
+/* The nearest x with J x + r = 0, in the first rows of J, by passes x -= J^T G^-1 (J x + r). Where weak rows keep
+   something, the term in G is lowered below them, unless it is rounding: noise / s^order along a singular value s, with
+   noise = 1e-15 V^order of velocities V (eomgen/numeric/gram.py says why). Leaves G as it was, with the term GENTLE. */
+static int correct_linear(int rows, double *restrict G, const double *restrict r, double *restrict x, double noise,
+                          int order, double *restrict w)
+{
+    const double *const J = w + AT_J;
+    double *const e = w + AT_E, *const z = e + M, relative = GENTLE, before = INFINITY;
+    int status = 0;
+    for (int pass = 0; pass < 50 && status == 0; pass++) {
+        double longest = 0.0, square = 0.0, size;
+        int left = 0;
+        for (int i = 0; i < rows; i++) {
+            double total = fabs(r[i]);
+            e[i] = r[i];
+            for (int k = 0; k < N; k++) {
+                const double term = J[i * N + k] * x[k];
+                e[i] += term;
+                total += fabs(term);
+            }
+            left = left || fabs(e[i]) > 4.0 * 2.220446049250313e-16 * total;
+            longest = fmax(longest, fabs(e[i]));
+            square += e[i] * e[i];
+            z[i] = e[i];
+        }
+        if (!left) {
+            break;
+        }
+        cholesky_solve(rows, G, z);
+        if (longest > 0.01 * before) {
+            const double weak = weakness(rows, J, z, &size);
+            if (!(sqrt(square) * (order == 2 ? weak : sqrt(weak)) > noise * sqrt(size))) {
+                break;
+            }
+            if (relative > TIKHONOV) {
+                relative = fmax(TIKHONOV, fmin(0.1 * relative, 1e-4 * weak));
+                status = factor_gram(rows, J, relative, G);
+                for (int i = 0; i < rows; i++) {
+                    z[i] = e[i];
+                }
+                cholesky_solve(rows, G, z);
+            } else if (longest > 0.5 * before) {
+                break;
+            }
+        }
+        for (int i = 0; i < rows; i++) {
+            for (int k = 0; k < N; k++) {
+                x[k] -= J[i * N + k] * z[i];
+            }
+        }
+        before = longest;
+    }
+    if (relative < GENTLE && status == 0) {
+        status = factor_gram(rows, J, GENTLE, G);
+    }
+    return status;
+}

@@ -1,0 +1,24 @@
+/* Trajectories 4 at a time, on processors with AVX2. */
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "eomgen_ensembles.h"
+
+#if EOMGEN_LANES & 4
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC target("avx2")
+#endif
+#define EOMGEN_WIDTH 4
+#include "eomgen_lane_runs.h"
+
+EOMGEN_PIECE extern const eomgen_lane_worker eomgen_lane_worker4;
+const eomgen_lane_worker eomgen_lane_worker4 = { 4, lane_memory, takes, work_in_lanes };
+#if defined(__clang__)
+#pragma clang attribute pop
+#endif
+#else
+typedef int no_lanes_of_4;
+#endif

@@ -1,0 +1,68 @@
+/* The numbers that straight-line functions compute with: `real` is double or, where EOMGEN_WIDTH is defined, so many
+   doubles side by side (lanes). The operations are the same, so every lane has the bits of the plain function. */
+#ifndef EOMGEN_REAL_H
+#define EOMGEN_REAL_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+/* EOMGEN_PORTABLE: do without the vector types of GCC and Clang. */
+#if defined(__GNUC__) && !defined(EOMGEN_PORTABLE)
+#define EOMGEN_VECTORS
+#endif
+
+#ifdef EOMGEN_WIDTH
+typedef double real __attribute__((vector_size(8 * EOMGEN_WIDTH)));
+typedef int64_t flag __attribute__((vector_size(8 * EOMGEN_WIDTH))); /* all bits where true */
+#define EOMGEN_LANE(x, k) (x)[k]
+/* A check that fails marks its lanes and the others go on. */
+#define EOMGEN_BEGIN flag failed = { 0 };
+#define EOMGEN_REJECT(lost) failed |= (lost);
+#define EOMGEN_RETURN return failed;
+
+static inline real same(double a)
+{
+    return a - (real){ 0.0 };
+}
+
+static inline real choose(flag condition, real a, real b)
+{
+    return (real)(((flag)a & condition) | ((flag)b & ~condition));
+}
+
+static inline real abs_of(real a)
+{
+    return (real)((flag)a & ~(flag)same(-0.0));
+}
+#else
+#define EOMGEN_WIDTH 1
+#define EOMGEN_PLAIN
+typedef double real;
+typedef int flag;
+#define EOMGEN_LANE(x, k) (x)
+#define EOMGEN_BEGIN
+#define EOMGEN_REJECT(lost) if (lost) { return 2; }
+#define EOMGEN_RETURN return 0;
+#define same(a) (a)
+#define choose(condition, a, b) ((condition) ? (a) : (b))
+#define abs_of(a) fabs(a)
+#endif
+
+/* NAME(a), NAME(a, b): a function of doubles in every lane. */
+#define EOMGEN_EACH(NAME, FUNCTION) \
+    static inline real NAME(real a) \
+    { \
+        real y = same(0.0); \
+        for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k)); } \
+        return y; \
+    }
+#define EOMGEN_EACH_PAIR(NAME, FUNCTION) \
+    static inline real NAME(real a, real b) \
+    { \
+        real y = same(0.0); \
+        for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k), EOMGEN_LANE(b, k)); } \
+        return y; \
+    }
+
+#endif

@@ -1,0 +1,146 @@
+/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again. */
+#include <math.h>
+#include <string.h>
+
+#include "eomgen_loop.h"
+
+enum { SAMPLES = 16, HALVINGS = 50 };
+
+static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, double fb)
+{
+    const double row[4] = {a, b, fa, fb};
+    if (ev->direction[i] != 0 && ev->direction[i] * (fb - fa) < 0.0) {
+        return n;
+    }
+    memcpy(ev->bracket + 4 * n, row, sizeof row);
+    ev->whose[n] = i;
+    return n + 1;
+}
+
+/* A reset left the value at zero: it has to be seen on its side before it can come back. */
+static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+{
+    double t = run->t_old, g = 0.0;
+    int seen = 0;
+    for (int k = HALVINGS; k >= 0; k--) {
+        const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
+        const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
+        if (seen && value * ev->leaving[i] <= 0.0) {
+            ev->leaving[i] = 0;
+            return add(ev, n, i, t, next, g, value);
+        }
+        seen = seen || value * ev->leaving[i] > 0.0;
+        t = next, g = value;
+    }
+    ev->leaving[i] = seen ? 0 : ev->leaving[i];
+    return n;
+}
+
+/* Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again. */
+static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
+{
+    const double a = ev->g[i], b = ev->g_new[i], h = fabs(run->step), s = a > 0.0 ? 1.0 : -1.0;
+    const double da = run->direction * s * ev->slope[i] * h, db = run->direction * s * ev->slope_new[i] * h;
+    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0) {
+        return 0;
+    }
+    const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
+    const double least = s * a * y * y * (1.0 + 2.0 * x) + da * x * y * y + s * b * x * x * (1.0 + 2.0 * y) - db * x * x * y;
+    return least < 0.5 * fmin(fabs(a), fabs(b));
+}
+
+static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+{
+    const double s = ev->g[i] > 0.0 ? 1.0 : -1.0;
+    double left = run->t_old, right = run->t, best = INFINITY, at = left;
+    for (int k = 1; k < SAMPLES; k++) {
+        const double t = run->t_old + k * (run->t - run->t_old) / SAMPLES, value = s * value_at(method, run, ev, i, t);
+        if (value < best) {
+            best = value, at = t;
+        }
+    }
+    const double h = (run->t - run->t_old) / SAMPLES, ratio = 0.3819660112501051;
+    left = at - h, right = at + h;
+    for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > 1e-8 * fabs(run->step); k++) { /* golden section */
+        const int low = fabs(at - left) > fabs(right - at);
+        const double t = at + ratio * ((low ? left : right) - at), value = s * value_at(method, run, ev, i, t);
+        if (value < best) {
+            *(low ? &right : &left) = at;
+            best = value, at = t;
+        } else {
+            *(low ? &left : &right) = t;
+        }
+    }
+    if (best <= 0.0) {
+        n = add(ev, n, i, run->t_old, at, ev->g[i], s * best);
+        n = best < 0.0 ? add(ev, n, i, at, run->t, s * best, ev->g_new[i]) : n;
+    }
+    return n;
+}
+
+static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_events *ev)
+{
+    int n = 0;
+    event_slopes(run, ev, ev->g_new, ev->slope_new);
+    for (int i = 0; i < ev->n; i++) {
+        const double a = ev->g[i], b = ev->g_new[i];
+        const int noted = a == 0.0 && ev->latest[i] == run->t_old; /* at the end of the step before */
+        if (ev->direction[i] > 1 || (noted && ev->leaving[i] == 0)) {
+            continue;
+        }
+        if (ev->leaving[i] != 0) {
+            n = brackets_after_reset(method, run, ev, n, i);
+        } else if ((a <= 0.0 && b >= 0.0) || (a >= 0.0 && b <= 0.0)) {
+            n = add(ev, n, i, run->t_old, run->t, a, b);
+        } else if (may_touch(run, ev, i)) {
+            n = brackets_of_touch(method, run, ev, n, i);
+        }
+        ev->size[i] = fmax(ev->size[i], fabs(b));
+    }
+    return n;
+}
+
+/* Zeros of the brackets in place of their first ends, in order. */
+static void sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n)
+{
+    for (int k = 0; k < n; k++) {
+        const int i = ev->whose[k];
+        const double t = zero_between(method, run, ev, i, ev->bracket + 4 * k);
+        int at = k;
+        for (; at > 0 && run->direction * (ev->bracket[4 * (at - 1)] - t) > 0.0; at--) {
+            ev->bracket[4 * at] = ev->bracket[4 * (at - 1)], ev->whose[at] = ev->whose[at - 1];
+        }
+        ev->bracket[4 * at] = t, ev->whose[at] = i;
+    }
+}
+
+int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double *t)
+{
+    eomgen_events *const ev = j->events;
+    int stop = 0;
+    event_values(run, ev, run->t, run->y, ev->g_new);
+    const int n = find_brackets(method, run, ev);
+    sort_zeros(method, run, ev, n);
+    for (int k = 0; k < n; k++) {
+        const int i = ev->whose[k];
+        const double zero = ev->bracket[4 * k];
+        if (stop && (stop == 2 || fabs(zero - *t) > 1e-14 * fmax(fabs(*t), j->span))) {
+            break;
+        }
+        double *const row = j->notes + j->n_notes++ * (2 + run->n);
+        row[0] = i, row[1] = zero;
+        eomgen_between(method, run, zero, row + 2);
+        ev->count[i]++;
+        ev->latest[i] = zero;
+        if (ev->most[i] > 0 && ev->count[i] >= ev->most[i]) {
+            stop = 2, *t = zero;
+        } else if (ev->action[i] != EOMGEN_GO_ON) {
+            *t = stop ? *t : zero;
+            stop = 1, ev->fired[i] = 1;
+        }
+    }
+    double *const spare = ev->g, *const other = ev->slope;
+    ev->g = ev->g_new, ev->g_new = spare;
+    ev->slope = ev->slope_new, ev->slope_new = other;
+    return run->stopped ? -1 : stop;
+}

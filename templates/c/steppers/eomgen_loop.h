@@ -1,0 +1,79 @@
+/* Whole trajectories in C: no Python, no memory of its own, one eomgen_run and one eomgen_journey for each, so that many
+   can run at the same time. The caller owns every array. */
+#ifndef EOMGEN_LOOP_H
+#define EOMGEN_LOOP_H
+
+#include "eomgen_steppers.h"
+
+/* What happens at an event besides that it is noted. */
+enum {
+    EOMGEN_GO_ON = 0,
+    EOMGEN_RESET = 1, /* the model's kernel `resets` gives new values of some states */
+    EOMGEN_WAIT = 2   /* the run waits for the caller to call eomgen_jump */
+};
+
+/* Events: zeros of values, first those of the model's kernel `events`, then of a tape, then of the caller. */
+typedef struct {
+    int n, n_model, n_tape;
+    eomgen_function values; /* n_model, or NULL */
+    const eomgen_tape *tape; /* n_tape, or NULL */
+    int (*outside)(void *asker, double t, const double *y, double *g); /* the rest, or NULL; not 0: stop the run */
+    void *asker;
+    const int *direction; /* n: 1 rising, -1 falling, 0 both, 2: not watched */
+    const long *most;     /* n: the run ends at this one; 0: never */
+    const int *action;    /* n */
+    eomgen_function resets, project; /* of the model; NULL: none, no constraints */
+    int n_resets;
+    const int *reset_of, *reset_x; /* n_resets: the event, and the state that gets the value */
+    double *values_reset;          /* n_resets, work */
+    double *g, *g_new, *slope, *slope_new, *size, *trial, *y; /* n each, work; y: states */
+    long *count;                   /* n: how often each happened */
+    int *leaving;                  /* n: side of zero to which a reset led, until it is seen there; 0: none */
+    double *bracket;               /* 2 n rows of 4, work: ends in time, values there */
+    int *whose, *fired;            /* 2 n; n: those at the last stop */
+    double *latest;                /* n: when each happened last */
+    double last_reset;
+    int crowded;                   /* resets in a row that followed each other too closely */
+} eomgen_events;
+
+/* One trajectory: what is asked, and what came of it so far. */
+typedef struct {
+    const double *nodes; /* n_nodes times in order, where the run must not step over; the last is its end */
+    long n_nodes;
+    const double *t_eval; /* n_eval times to store in order; n_eval below 0: every step */
+    long n_eval;
+    eomgen_events *events; /* or NULL */
+    double span;           /* length of the whole run */
+    long room;             /* rows in times and states: at least 2 beyond those stored, or n_eval */
+    double *times, *states;
+    long pieces_room;      /* rows in pieces, 0: not wanted. A row: t_old, step, end, y_old (n), F (rows_F n) */
+    double *pieces;
+    long notes_room;       /* rows in notes, at least 2 n beyond those there. A row: event, t, state (n) */
+    double *notes;
+    long node, done, stored, n_pieces, n_notes, resets; /* start at 0; the caller may take rows and set back the last four */
+    int begun, ended;
+} eomgen_journey;
+
+enum {
+    EOMGEN_FULL = 0,     /* an array is full: take what is there and call again */
+    EOMGEN_END = 1,
+    EOMGEN_TERMINAL = 2, /* an event ended the run */
+    EOMGEN_WAITING = 3,  /* at an event: call eomgen_jump, then go on */
+    EOMGEN_ZENO = -102,  /* resets follow each other ever faster, or one leads nowhere */
+    EOMGEN_RESET_FAILED = -103
+};
+
+/* Go on until something of the above, or a failure of eomgen_step. */
+int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+
+/* Go on from the present time at another state: that of run->y, which the caller has changed. 0 or EOMGEN_ZENO. */
+int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
+
+/* Events: values at the start; zeros of the last step in order, noted, up to one at which the run stops, at *t. Returns
+   whether it stops, 2 if it is to end there, -1 if the caller's own events stopped the run. */
+void eomgen_arm(eomgen_run *run, eomgen_events *events);
+int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey, double *t);
+/* After a reset: which side of zero it led to. Not 0 if it led nowhere. */
+int eomgen_depart(eomgen_run *run, eomgen_events *events);
+
+#endif

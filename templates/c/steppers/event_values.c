@@ -1,0 +1,82 @@
+/* Events: zeros of functions of time and state within a step, by the dense output. A change of sign is found as SciPy's
+   solve_ivp does; a value that comes to zero and back within one step is looked for as well. */
+#include <math.h>
+#include <string.h>
+
+#include "eomgen_loop.h"
+
+static int event_values(eomgen_run *run, eomgen_events *ev, double t, const double *y, double *g)
+{
+    if (ev->values == NULL && ev->tape == NULL && ev->outside == NULL) {
+        return 0;
+    }
+    if (run->signals != NULL) {
+        eomgen_force(run, t, y);
+    }
+    if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) != 0) {
+        for (int i = 0; i < ev->n_model; i++) {
+            g[i] = NAN; /* no event here */
+        }
+    }
+    if (ev->tape != NULL) {
+        eomgen_play(ev->tape, t, y, run->u, run->c, g + ev->n_model);
+    }
+    if (ev->outside != NULL && ev->outside(ev->asker, t, y, g + ev->n_model + ev->n_tape) != 0) {
+        run->stopped = 1;
+    }
+    return run->stopped;
+}
+
+/* Rates of the values along the motion, by a short way along x'. */
+static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, double *slope)
+{
+    const double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs, h = 1e-5 * length;
+    for (int i = 0; i < run->n; i++) {
+        ev->y[i] = run->y[i] + h * run->f[i];
+    }
+    event_values(run, ev, run->t + h, ev->y, slope);
+    for (int i = 0; i < ev->n; i++) {
+        slope[i] = (slope[i] - g[i]) / h;
+    }
+}
+
+void eomgen_arm(eomgen_run *run, eomgen_events *ev)
+{
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope);
+    for (int i = 0; i < ev->n; i++) {
+        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->latest[i] = NAN;
+    }
+}
+
+int eomgen_depart(eomgen_run *run, eomgen_events *ev)
+{
+    int stuck = 0;
+    for (int i = 0; i < ev->n; i++) {
+        ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
+    }
+    run->step = 0.0;
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope);
+    for (int i = 0; i < ev->n; i++) {
+        if (!ev->fired[i] || ev->action[i] == EOMGEN_GO_ON) {
+            ev->fired[i] = 0;
+            continue;
+        }
+        const double rate = run->direction * ev->slope[i];
+        const int touching = fabs(ev->g[i]) <= 1e-9 * ev->size[i];
+        const int through = ev->action[i] == EOMGEN_WAIT && rate < 0.0; /* a gap that goes on closing */
+        stuck = stuck || (touching && (through || !(fabs(rate) > 1e-9 * ev->trial[i])));
+        ev->leaving[i] = touching ? (rate > 0.0 ? 1 : -1) : 0;
+        ev->fired[i] = 0;
+    }
+    return stuck;
+}
+
+/* Value of event i at time t of the last step. */
+static double value_at(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double t)
+{
+    eomgen_between(method, run, t, ev->y);
+    event_values(run, ev, t, ev->y, ev->trial);
+    return ev->trial[i];
+}

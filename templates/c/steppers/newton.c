@@ -1,0 +1,142 @@
+/* Systems (g - J) x = r of implicit methods. Where J = [0 1; K D], of a state [q; v] with q' = v, only
+   (g - D - K / g) v = r_v + K r_q / g is solved, and q = (r_q + v) / g. */
+#include <math.h>
+#include <string.h>
+
+#include "eomgen_steppers.h"
+
+/* Where each number of a run is, after the rows_K rows of n in run->K. */
+typedef struct {
+    double *J, *real, *re, *im; /* n x n each */
+    double *state;              /* NEWTON_STATE numbers */
+    int *order, *order_complex; /* n each */
+} newton_area;
+
+enum { NEWTON_STATE = 16, HALVED = 0 };
+
+static newton_area newton_areas(const eomgen_run *run, int rows)
+{
+    const int n = run->n, square = n * n;
+    double *const at = run->K + rows * n;
+    double *const state = at + 4 * square;
+    int *const order = (int *)(state + NEWTON_STATE);
+    return (newton_area){at, at + square, at + 2 * square, at + 3 * square, state, order, order + n};
+}
+
+/* Whether the first half of J is [0 1]. */
+static int is_halved(int n, const double *J)
+{
+    const int half = n / 2;
+    if (n % 2 != 0) {
+        return 0;
+    }
+    for (int i = 0; i < half; i++) {
+        for (int k = 0; k < n; k++) {
+            if (J[i * n + k] != (k == half + i ? 1.0 : 0.0)) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* dx'/dx at (t, y) into J, inputs that are expressions of the state included; 0, or the status of a failure. */
+int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare)
+{
+    const int n = run->n;
+    int feedback = 0;
+    if (run->signals != NULL) {
+        eomgen_force(run, t, y);
+        for (int i = 0; i < run->n_u; i++) {
+            feedback = feedback || run->signals[i].tape != NULL;
+        }
+    }
+    run->differentiations++;
+    const int status = run->jacobian(t, y, run->u, run->c, J, run->w);
+    if (status != 0) {
+        run->failure = status, run->failure_time = t;
+        memcpy(run->failure_state, y, (size_t)n * sizeof(double));
+        return status;
+    }
+    double *const moved = spare, *const change = spare + n;
+    for (int k = 0; feedback && k < n; k++) { /* x' at inputs of a state moved a little, all else where it is */
+        const double step = 1.5e-8 * fmax(fabs(y[k]), 1e-3);
+        memcpy(moved, y, (size_t)n * sizeof(double));
+        moved[k] += step;
+        eomgen_force(run, t, moved);
+        run->evaluations++;
+        if (run->rhs(t, y, run->u, run->c, change, run->w) != 0) {
+            continue;
+        }
+        for (int i = 0; i < n; i++) {
+            J[i * n + k] += (change[i] - f[i]) / (moved[k] - y[k]);
+        }
+    }
+    return 0;
+}
+
+/* Factor g - J for a real g and for g = x + i y; 1 if one is singular. */
+static int newton_factor(eomgen_run *run, const newton_area *a, double g, double x, double y)
+{
+    const int n = run->n, halved = a->state[HALVED] != 0.0, m = halved ? n / 2 : n;
+    const double square = x * x + y * y;
+    run->factorizations += 2;
+    for (int i = 0; i < m; i++) {
+        const double *const row = a->J + (halved ? m + i : i) * n;
+        double *const real = a->real + i * m, *const re = a->re + i * m, *const im = a->im + i * m;
+        for (int k = 0; k < m; k++) {
+            const double K = halved ? row[k] : 0.0, D = row[halved ? m + k : k];
+            real[k] = -D - K / g;
+            re[k] = -D - K * (x / square);
+            im[k] = K * (y / square);
+        }
+        real[i] += g, re[i] += x, im[i] += y;
+    }
+    return lu_factor(m, a->real, a->order) || lu_factor_complex(m, a->re, a->im, a->order_complex);
+}
+
+static void newton_solve(const eomgen_run *run, const newton_area *a, double g, double *restrict r)
+{
+    const int n = run->n, m = n / 2;
+    if (a->state[HALVED] == 0.0) {
+        lu_solve(n, a->real, a->order, r);
+        return;
+    }
+    const double inverse = 1.0 / g;
+    for (int i = 0; i < m; i++) {
+        double sum = 0.0;
+        for (int k = 0; k < m; k++) {
+            sum += a->J[(m + i) * n + k] * r[k];
+        }
+        r[m + i] += sum * inverse;
+    }
+    lu_solve(m, a->real, a->order, r + m);
+    for (int i = 0; i < m; i++) {
+        r[i] = (r[i] + r[m + i]) * inverse;
+    }
+}
+
+/* The same for g = x + i y and r + i s. */
+static void newton_solve_complex(const eomgen_run *run, const newton_area *a, double x, double y, double *restrict r,
+                                 double *restrict s)
+{
+    const int n = run->n, m = n / 2;
+    if (a->state[HALVED] == 0.0) {
+        lu_solve_complex(n, a->re, a->im, a->order_complex, r, s);
+        return;
+    }
+    const double square = x * x + y * y, u = x / square, v = -y / square;
+    for (int i = 0; i < m; i++) {
+        double p = 0.0, q = 0.0;
+        for (int k = 0; k < m; k++) {
+            p += a->J[(m + i) * n + k] * r[k];
+            q += a->J[(m + i) * n + k] * s[k];
+        }
+        r[m + i] += p * u - q * v, s[m + i] += p * v + q * u;
+    }
+    lu_solve_complex(m, a->re, a->im, a->order_complex, r + m, s + m);
+    for (int i = 0; i < m; i++) {
+        const double p = r[i] + r[m + i], q = s[i] + s[m + i];
+        r[i] = p * u - q * v, s[i] = p * v + q * u;
+    }
+}

@@ -1,0 +1,68 @@
+/* RK4 with steps of one size: W. Kutta, Beitrag zur naeherungsweisen Integration totaler Differentialgleichungen, 1901;
+   between the steps the cubic through both ends. Its error is not watched: max_step is the step. */
+#include "eomgen_steppers.h"
+
+static void rk4_attempt(eomgen_run *run, double h)
+{
+    const int n = run->n;
+    const double t = run->t, *const y0 = run->y_old, *const k0 = run->K;
+    double *const y = run->y, *const k1 = run->K + n, *const k2 = k1 + n, *const k3 = k2 + n;
+    for (int i = 0; i < n; i++) {
+        y[i] = y0[i] + 0.5 * h * k0[i];
+    }
+    eomgen_evaluate(run, t + 0.5 * h, y, k1);
+    for (int i = 0; i < n; i++) {
+        y[i] = y0[i] + 0.5 * h * k1[i];
+    }
+    eomgen_evaluate(run, t + 0.5 * h, y, k2);
+    for (int i = 0; i < n; i++) {
+        y[i] = y0[i] + h * k2[i];
+    }
+    eomgen_evaluate(run, t + h, y, k3);
+    for (int i = 0; i < n; i++) {
+        y[i] = y0[i] + h / 6.0 * (k0[i] + 2.0 * (k1[i] + k2[i]) + k3[i]);
+    }
+    eomgen_evaluate(run, t + h, y, run->f);
+}
+
+/* Only a state that is no number is refused. */
+static double rk4_error(const eomgen_run *run, double h)
+{
+    double sum = h * 0.0;
+    for (int i = 0; i < run->n; i++) {
+        sum += 0.0 * run->f[i];
+    }
+    return sum;
+}
+
+static void rk4_prepare(eomgen_run *run)
+{
+    const int n = run->n;
+    const double h = run->step;
+    for (int i = 0; i < n; i++) {
+        const double change = run->y[i] - run->y_old[i], first = h * run->K[i], last = h * run->f[i];
+        run->F[i] = first;
+        run->F[n + i] = 3.0 * change - 2.0 * first - last;
+        run->F[2 * n + i] = first + last - 2.0 * change;
+    }
+}
+
+static void rk4_interpolate(const eomgen_run *run, double t, double *y)
+{
+    const int n = run->n;
+    const double x = (t - run->t_old) / run->step;
+    for (int i = 0; i < n; i++) {
+        const double *const F = run->F + i;
+        y[i] = run->y_old[i] + x * (F[0] + x * (F[n] + x * F[2 * n]));
+    }
+}
+
+const eomgen_method eomgen_rk4 = {.name = "RK4", .rows_K = 4, .rows_F = 3, .error_order = 4, .attempt = rk4_attempt,
+                                  .error = rk4_error, .prepare = rk4_prepare, .interpolate = rk4_interpolate,
+                                  .fixed = 1};
+
+int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
+    double *out, double *w, double *k)
+{
+    return rk4_step(rhs, n, t, h, x, u, c, out, w, k);
+}

@@ -1,0 +1,166 @@
+# Ensembles: many trajectories of the model from one queue, worked on by any number of threads.
+
+cdef extern from "eomgen_ensembles.h" nogil:
+    ctypedef struct eomgen_ensemble:
+        const eomgen_method *method
+        const eomgen_model *model
+        eomgen_function rhs
+        eomgen_function jacobian
+        eomgen_lane_function lane_rhs
+        int lane_width
+        int n
+        long count
+        const double *x0
+        const double *p
+        const double *u
+        long p_stride, u_stride
+        const double *nodes
+        int n_nodes
+        double rtol, max_step, first_step
+        const double *atol
+        long max_steps
+        const double *t_eval
+        long n_eval
+        double *samples
+        double *x
+        double *t
+        int *status
+        long *steps
+        long *rejected
+        long *evaluations
+        long n_notes
+        double *notes
+        long *noted
+        int *failure
+        double *failure_time
+        long next, done
+        int stop
+    ctypedef struct eomgen_thread:
+        const eomgen_signal *signals
+        eomgen_events *events
+        double *notes
+        long notes_room
+        double *memory
+    long eomgen_ensemble_memory(const eomgen_ensemble *, const eomgen_thread *) noexcept
+    void eomgen_ensemble_work(eomgen_ensemble *, const eomgen_thread *) noexcept
+
+
+cdef const double *reading(cnp.ndarray array) noexcept:
+    return <const double *>cnp.PyArray_DATA(array)
+
+
+cdef class Ensemble:
+    """Trajectories to run and what became of them.
+
+    Parameters
+    ----------
+    method : str
+        One of ``methods``.
+    nodes : (m,) array
+        Start, corners of the signals, end.
+    x0 : (k, n_x) array
+        A row for each trajectory.
+    p, u : (n_p,), (n_u,) or (k, n_p), (k, n_u) arrays
+        The same for all, or a row for each.
+    rtol : float
+    atol : (n_x,) array
+    max_step, first_step : float
+        A first step of 0 is chosen.
+    max_steps : int
+        A trajectory that takes more is given up.
+    t_eval : (m,) array, optional
+        Times at which to keep the states.
+    signals : list
+        Inputs over time, as for a Stepper.
+    events : dict or None
+        As in the plan of a Journey; none may wait for Python.
+    keep : int
+        Events kept of each trajectory.
+
+    Attributes
+    ----------
+    x, t : (k, n_x), (k,) arrays
+        The last state of each and its time.
+    samples : (k, m, n_x) array or None
+    notes : (k, keep, 2 + n_x) array or None
+        Event, time and state of the first events of each; NaN where there were fewer.
+    noted : (k,) array
+        How many events there were.
+    status, failure, failure_time, steps, rejected, evaluations : (k,) arrays
+        0 where the end was reached, 1 at an event that ended the run; the status of the last evaluation that failed and its time.
+    """
+
+    cdef eomgen_ensemble all
+    cdef list held
+    cdef object signals, watched
+    cdef Context context
+    cdef readonly cnp.ndarray x, t, status, steps, rejected, evaluations, failure, failure_time, noted
+    cdef readonly object samples, notes
+
+    def __cinit__(self, str method, nodes, x0, p, u, double rtol, atol, double max_step, double first_step,
+                  long max_steps, t_eval=None, signals=(), events=None, long keep=0):
+        cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
+        cdef eomgen_ensemble *all = &self.all
+        self.signals, self.watched, self.context = tuple(signals), events, Context()
+        x0, p, u = (np.ascontiguousarray(value, dtype=float) for value in (x0, p, u))
+        count = len(x0)
+        for label, value, size in (("x0", x0, n), ("p", p, MODEL.n_p), ("u", u, MODEL.n_u)):
+            if value.shape != (count, size) and (label == "x0" or value.shape != (size,)):
+                raise ValueError(f"{label} must have shape ({count}, {size}), not {value.shape}")
+        nodes, atol = np.array(nodes, dtype=float), np.array(vector(atol, n, "atol", ValueError))
+        asked = np.ascontiguousarray(() if t_eval is None else t_eval, dtype=float)
+        self.held = [x0, p, u, nodes, atol, asked]
+        all.method, all.model = METHODS[methods.index(method)], MODEL
+        all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
+        if all.method.squares > 0:
+            all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
+        if LANES != NULL:
+            all.lane_rhs, all.lane_width = LANES.kernels[index], LANES.width
+        all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
+        all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
+        all.nodes, all.n_nodes = reading(nodes), len(nodes)
+        all.rtol, all.atol, all.max_step, all.first_step = rtol, reading(atol), max_step, first_step
+        all.max_steps, all.t_eval, all.n_eval = max_steps, reading(asked), len(asked)
+        self.x, self.t = np.full((count, n), np.nan), np.full(count, nodes[0])
+        self.status = np.full(count, -101, dtype=np.intc)  # stopped
+        self.failure, self.failure_time = np.zeros(count, dtype=np.intc), np.zeros(count)
+        self.steps, self.rejected, self.evaluations = (np.zeros(count, dtype=np.int_) for _ in range(3))
+        self.samples = None if t_eval is None else np.full((count, len(asked), n), np.nan)
+        all.x, all.t = <double *>cnp.PyArray_DATA(self.x), <double *>cnp.PyArray_DATA(self.t)
+        all.samples = NULL if t_eval is None else <double *>cnp.PyArray_DATA(<cnp.ndarray>self.samples)
+        all.status, all.failure = <int *>cnp.PyArray_DATA(self.status), <int *>cnp.PyArray_DATA(self.failure)
+        self.notes = np.full((count, keep, 2 + n), np.nan) if events else None
+        self.noted = np.zeros(count, dtype=np.int_)
+        all.n_notes, all.noted = keep, <long *>cnp.PyArray_DATA(self.noted)
+        all.notes = <double *>cnp.PyArray_DATA(<cnp.ndarray>self.notes) if events else NULL
+        all.failure_time = <double *>cnp.PyArray_DATA(self.failure_time)
+        all.steps, all.rejected = <long *>cnp.PyArray_DATA(self.steps), <long *>cnp.PyArray_DATA(self.rejected)
+        all.evaluations = <long *>cnp.PyArray_DATA(self.evaluations)
+
+    def work(self):
+        """Run trajectories until none is left, without the GIL; called by every thread."""
+        cdef eomgen_thread own
+        cdef Journey journey
+        held = []
+        own.signals, own.events, own.notes, own.notes_room = make_signals(self.signals, held), NULL, NULL, 0
+        if self.watched:
+            plan = {"nodes": [0.0], "t_eval": [0.0], "dense": False, "watch": None, "events": self.watched}
+            atol = np.ones(self.all.n)
+            journey = Journey(self.all.method.name.decode(), self.context, 0.0, atol, 0.0, 1.0, atol, 1.0, plan=plan)
+            own.events, own.notes, own.notes_room = &journey.events, journey.journey.notes, journey.journey.notes_room
+        memory = np.zeros(eomgen_ensemble_memory(&self.all, &own))
+        own.memory = <double *>cnp.PyArray_DATA(<cnp.ndarray>memory)
+        with nogil:
+            eomgen_ensemble_work(&self.all, &own)
+
+    def stop(self):
+        """Begin no further trajectory and end those under way."""
+        self.all.stop = 1
+
+    @property
+    def done(self):
+        """How many trajectories have ended."""
+        return self.all.done
+
+
+ensemble = Ensemble

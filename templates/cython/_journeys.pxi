@@ -1,0 +1,304 @@
+# Journeys: whole trajectories by eomgen_loop.h, with a look at Python every few milliseconds.
+
+from cpython.exc cimport PyErr_CheckSignals
+
+from time import perf_counter
+
+cdef extern from "eomgen_loop.h" nogil:
+    ctypedef struct eomgen_events:
+        int n, n_model, n_tape
+        eomgen_function values
+        const eomgen_tape *tape
+        int (*outside)(void *, double, const double *, double *) noexcept nogil
+        void *asker
+        const int *direction
+        const long *most
+        const int *action
+        eomgen_function resets, project
+        int n_resets
+        const int *reset_of
+        const int *reset_x
+        double *values_reset
+        double *g
+        double *g_new
+        double *slope
+        double *slope_new
+        double *size
+        double *trial
+        double *y
+        long *count
+        int *leaving
+        double *bracket
+        int *whose
+        int *fired
+        double *latest
+    ctypedef struct eomgen_journey:
+        const double *nodes
+        long n_nodes
+        const double *t_eval
+        long n_eval
+        eomgen_events *events
+        double span
+        long room
+        double *times
+        double *states
+        long pieces_room
+        double *pieces
+        long notes_room
+        double *notes
+        long node, done, stored, n_pieces, n_notes, resets
+    enum: EOMGEN_FULL
+    int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
+    int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
+
+
+cdef long look_out(void *looker, const double *t) noexcept with gil:
+    return (<Journey>looker).look(t[0])
+
+
+cdef int ask_outside(void *asker, double t, const double *y, double *g) noexcept with gil:
+    return (<Journey>asker).ask(t, y, g)
+
+
+cdef class Dense:
+    """The solution of a run: ``f(t)`` for times (k,) gives (n_x, k)."""
+
+    cdef eomgen_run run
+    cdef const eomgen_method *method
+    cdef readonly cnp.ndarray pieces
+
+    @property
+    def ends(self):
+        """First and last time."""
+        return self.pieces[0, 0], self.pieces[len(self.pieces) - 1, 2]
+
+    def __call__(self, t):
+        cdef cnp.ndarray at = np.ascontiguousarray(t, dtype=float)
+        sign = 1.0 if self.pieces[0, 1] >= 0.0 else -1.0
+        which = np.searchsorted(sign * self.pieces[:, 2], sign * at)
+        cdef cnp.ndarray chosen = np.minimum(which, len(self.pieces) - 1).astype(np.intp)
+        cdef cnp.npy_intp k = cnp.PyArray_DIM(at, 0), i
+        cdef int n = self.run.n
+        cdef cnp.ndarray result = rows(k, n)
+        cdef double *piece
+        for i in range(k):
+            piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
+                3 + n * (1 + self.method.rows_F))
+            self.run.t_old, self.run.step, self.run.y_old, self.run.F = piece[0], piece[1], piece + 3, piece + 3 + n
+            self.method.interpolate(&self.run, (<double *>cnp.PyArray_DATA(at))[i],
+                                    <double *>cnp.PyArray_DATA(result) + i * n)
+        return np.ascontiguousarray(result.T)
+
+
+cdef class Journey(Stepper):
+    """A whole integration in C.
+
+    Parameters
+    ----------
+    method, context, t0, y0, t_bound, rtol, atol, max_step, first_step, signals
+        As for Stepper.
+    plan : dict
+        nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
+        watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
+        tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
+        resets: rows (event, state) of the model's kernel.
+
+    Attributes
+    ----------
+    raised : exception or None
+        What a signal, the watch or an event function raised; the run has stopped there.
+    """
+
+    cdef eomgen_journey journey
+    cdef eomgen_events events
+    cdef object watch, pace, outside
+    cdef long seen
+    cdef cnp.ndarray times, states, notes, pieces
+    cdef list stored
+    cdef double looked
+    cdef long stride
+    cdef readonly object raised
+
+    def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
+                  double max_step, double first_step=0.0, signals=(), plan=None):
+        cdef eomgen_journey *journey = &self.journey
+        self.stored, self.raised, self.stride = [[], [], [], []], None, 1
+        nodes = self.keep(plan["nodes"], float)
+        journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(<cnp.ndarray>nodes), len(nodes)
+        journey.span, journey.n_eval = abs(t_bound - t0), -1
+        if plan["t_eval"] is not None:
+            asked = self.keep(plan["t_eval"], float)
+            journey.t_eval, journey.n_eval = <const double *>cnp.PyArray_DATA(<cnp.ndarray>asked), len(asked)
+        journey.pieces_room = 256 if plan["dense"] else 0
+        if plan["events"] is not None:
+            self.expect(**plan["events"])
+        self.allocate(512)
+        self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
+        self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, 1
+
+    cdef keep(self, values, kind):
+        array = np.array(values, dtype=kind)
+        self.held.append(array)
+        return array
+
+    cdef void *work(self, cnp.npy_intp n, kind):
+        array = np.zeros(max(n, 1), dtype=kind)
+        self.held.append(array)
+        return cnp.PyArray_DATA(<cnp.ndarray>array)
+
+    def expect(self, int model, tape, outside, direction, most, action, resets):
+        cdef eomgen_events *ev = &self.events
+        cdef int n = len(direction), n_resets = len(resets)
+        ev.n, ev.n_model, ev.n_resets = n, model, n_resets
+        if model:
+            ev.values = MODEL.kernels[find("events", ValueError)].call
+        if n_resets:
+            ev.resets = MODEL.kernels[find("resets", ValueError)].call
+            if _FACTS.get("n_c", 0) or _FACTS.get("balls"):
+                ev.project = MODEL.kernels[find("project", ValueError)].call
+        if tape is not None:
+            held = Tape(*tape)
+            self.held.append(held)
+            ev.tape, ev.n_tape = &(<Tape>held).tape, len(tape[2])
+        self.outside = list(outside)
+        if self.outside:
+            ev.outside, ev.asker = ask_outside, <void *>self
+        pairs = np.array(resets, dtype=np.intc).reshape(-1, 2)
+        ev.direction = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(direction, np.intc))
+        ev.action = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(action, np.intc))
+        ev.most = <const long *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(most, np.dtype("l")))
+        ev.reset_of = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(pairs[:, 0], np.intc))
+        ev.reset_x = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(pairs[:, 1], np.intc))
+        ev.values_reset = <double *>self.work(n_resets, float)
+        cdef double *numbers = <double *>self.work(15 * n + self.run.n, float)
+        ev.g, ev.g_new, ev.slope, ev.slope_new = numbers, numbers + n, numbers + 2 * n, numbers + 3 * n
+        ev.size, ev.trial, ev.latest = numbers + 4 * n, numbers + 5 * n, numbers + 6 * n
+        ev.bracket, ev.y = numbers + 7 * n, numbers + 15 * n
+        ev.count = <long *>self.work(n, np.dtype("l"))
+        cdef int *whole = <int *>self.work(4 * n, np.intc)
+        ev.leaving, ev.fired, ev.whose = whole, whole + n, whole + 2 * n
+        self.journey.events = ev
+
+    cdef allocate(self, long room):
+        """Room for results, after what is there has been taken out."""
+        cdef eomgen_journey *j = &self.journey
+        cdef int n = self.run.n
+        if j.n_eval >= 0:
+            room = j.n_eval
+        if self.times is None or j.n_eval < 0:
+            self.times, self.states = np.empty(room), rows(room, n)
+            j.room, j.times = room, <double *>cnp.PyArray_DATA(self.times)
+            j.states = <double *>cnp.PyArray_DATA(self.states)
+        if j.pieces_room > 0:
+            j.pieces_room = max(room, 256)
+            self.pieces = rows(j.pieces_room, 3 + n * (1 + self.method.rows_F))
+            j.pieces = <double *>cnp.PyArray_DATA(self.pieces)
+        if j.events != NULL:
+            j.notes_room = 4 * self.events.n + room // 4
+            self.notes = rows(j.notes_room, 2 + n)
+            j.notes = <double *>cnp.PyArray_DATA(self.notes)
+
+    cdef take(self):
+        """Take out what has been stored."""
+        cdef eomgen_journey *j = &self.journey
+        if j.n_eval < 0:
+            self.stored[0].append(self.times[:j.stored])
+            self.stored[1].append(self.states[:j.stored])
+            j.stored = 0
+        if j.n_pieces:
+            self.stored[2].append(self.pieces[:j.n_pieces])
+            j.n_pieces = 0
+        if j.n_notes:
+            self.stored[3].append(self.notes[:j.n_notes])
+            j.n_notes = 0
+
+    def travel(self):
+        """Go on without the GIL until the end (1), a terminal event (2), an event that waits (3), or a failure (< 0)."""
+        cdef int status
+        while True:
+            with nogil:
+                status = eomgen_travel(self.method, &self.run, &self.journey)
+            if status != EOMGEN_FULL:
+                return status
+            room = min(2 * max(self.journey.room, 256), 1 << 16)
+            self.take()
+            self.allocate(room)
+
+    def jump(self, x):
+        """Go on from another state, at an event that waits; a negative number if resets crowd together."""
+        cdef cnp.ndarray state = vector(x, self.run.n, "x", ValueError)
+        cdef int status
+        memcpy(self.run.y, cnp.PyArray_DATA(state), self.run.n * sizeof(double))
+        if self.journey.n_eval < 0 and self.journey.stored + 2 > self.journey.room:
+            self.take()
+            self.allocate(self.journey.room)
+        with nogil:
+            status = eomgen_jump(self.method, &self.run, &self.journey)
+        return status
+
+    def fired(self):
+        """The events that wait."""
+        return [i for i in range(self.events.n) if self.events.fired[i]]
+
+    def results(self):
+        """Times (k,), states (k, n_x), and rows (event, t, state) of events, in order."""
+        cdef eomgen_journey *j = &self.journey
+        if j.n_eval >= 0:
+            pair = [[self.times[:j.stored]], [self.states[:j.stored]]]
+            self.take()
+        else:
+            self.take()
+            pair = self.stored
+        notes = np.concatenate(self.stored[3]) if self.stored[3] else np.empty((0, 2 + self.run.n))
+        times, states = [parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in pair[:2]]
+        return times, states, notes
+
+    def dense(self):
+        """The solution between steps, after results(); None if there is none."""
+        if not self.stored[2]:
+            return None
+        cdef Dense dense = Dense.__new__(Dense)
+        dense.method, dense.run.n, dense.pieces = self.method, self.run.n, np.concatenate(self.stored[2])
+        return dense
+
+    @property
+    def resets(self):
+        return self.journey.resets
+
+    cdef long look(self, double t):
+        now = self.looked
+        try:
+            PyErr_CheckSignals()
+            now = perf_counter()
+            if self.watch is not None:
+                self.watch(t)
+            if self.pace is not None and self.run.steps > self.seen:
+                self.pace(t, copy(self.run.y_old, self.run.n), self.run.steps - self.seen)
+                self.seen = self.run.steps
+        except BaseException as error:
+            self.raised = error
+            return 0
+        cdef double elapsed = now - self.looked
+        self.looked = now
+        if elapsed < 5e-4:
+            self.stride *= 8
+        elif elapsed < 4e-3:
+            self.stride *= 2
+        elif elapsed > 1e-2:
+            self.stride = max(1, <long>(self.stride * (5e-3 / elapsed)))
+        return self.stride
+
+    cdef int ask(self, double t, const double *y, double *g):
+        cdef int k = 0
+        try:
+            x = copy(y, self.run.n)
+            for function in self.outside:
+                g[k] = function(t, x)
+                k += 1
+        except BaseException as error:
+            self.raised = error
+            return 1
+        return 0
+
+
+journey = Journey

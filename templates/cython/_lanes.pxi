@@ -1,0 +1,70 @@
+# Lanes: the columns of a batch -> groups of as many as the processor takes at a time. The kernels' entry points are in
+# LANES.kernels, by the kernel's index (eomgen_lane_function in eomgen.h tells how to call them); NULL: no lanes.
+
+cdef const eomgen_lanes *find_lanes() noexcept:
+    """The widest lanes that were compiled and that this processor has; NULL without any."""
+    cdef int i = 0
+    while MODEL.lanes != NULL and MODEL.lanes[i] != NULL:
+        if MODEL.lanes[i].usable():
+            return MODEL.lanes[i]
+        i += 1
+    return NULL
+
+
+cdef const eomgen_lanes *LANES = find_lanes()
+lane_width = 1 if LANES == NULL else LANES.width  # states that batches take at a time
+
+
+cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp last, int width,
+                        double *target) noexcept nogil:
+    """Columns first, ..., last side by side; the last one fills what lanes are left."""
+    cdef cnp.npy_intp i, k, filled = last - first + 1
+    cdef char *data = piece.data + first * piece.column
+    for i in range(piece.n):
+        for k in range(filled):
+            target[k] = (<double *>(data + k * piece.column))[0]
+        for k in range(filled, width):
+            target[k] = target[filled - 1]
+        target += width
+        data += piece.row
+
+
+cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) noexcept nogil:
+    """What sweep does, a group of columns at a time."""
+    cdef cnp.npy_intp failed = -1, first = 0, last, i, k
+    cdef int width = LANES.width
+    cdef int[WIDEST] codes
+    cdef double *t = batch.side
+    cdef double *u = t + width
+    cdef double *c = u + width * MODEL.n_u
+    cdef double *x = c + width * MODEL.n_const
+    cdef double *y = x + width * batch.n_in
+    cdef double *w = y + width * batch.n_out
+    cdef Piece constants = Piece(<char *>batch.c, MODEL.n_const, sizeof(double), 0)
+    spread(&constants, 0, 0, width, c)
+    while first < batch.columns and (failed < 0 or batch.nan):
+        last = min(first + width, batch.columns) - 1
+        if first == 0 or batch.time.column != 0:
+            spread(&batch.time, first, last, width, t)
+        if first == 0 or batch.inputs.column != 0:
+            spread(&batch.inputs, first, last, width, u)
+        k = 0
+        for i in range(batch.n_pieces):
+            spread(&batch.pieces[i], first, last, width, x + k * width)
+            k += batch.pieces[i].n
+        if batch.lanes(t, x, u, c, y, w, codes) == 0:
+            for i in range(batch.n_out):
+                memcpy(result + i * batch.columns + first, y + i * width, (last - first + 1) * sizeof(double))
+        else:
+            for k in range(last - first + 1):
+                for i in range(batch.n_out):
+                    result[i * batch.columns + first + k] = y[i * width + k] if codes[k] == 0 else NAN
+                if codes[k] != 0 and failed < 0:
+                    failed, status[0] = first + k, codes[k]
+        first += width
+    return failed
+
+
+cdef inline cnp.npy_intp evaluate(const Batch *batch, double *result, int *status) noexcept nogil:
+    """Evaluate all columns, in lanes where the kernel has them."""
+    return sweep(batch, result, status) if batch.lanes == NULL else sweep_lanes(batch, result, status)

@@ -1,0 +1,313 @@
+"""Workspaces against closed forms: planar and spatial serial arms, a planar five-bar, a slider-crank, limits.
+
+Sources: T. Yoshikawa, Manipulability of robotic mechanisms (1985), section 4 (planar 2R arm) and Foundations of
+Robotics (1990), section 4.2 (three joints); C. Gosselin and J. Angeles, Singularity analysis of closed-loop kinematic
+chains (1990), the planar five-bar; all written out here from the geometry.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import models
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+TURN = 2 * np.pi
+BODY = {"mass": 1, "inertia": (0.1, 0.1, 0.1)}
+UPPER, LOWER = 0.5, 0.3  #: links of the arms
+BASE, CRANK, LEFT, RIGHT = 0.25, 0.3, 0.4, 0.35  #: the five-bar
+
+
+def planar_arm() -> eg.Model:
+    m = eg.Model("arm")
+    upper, lower = m.body("upper", **BODY), m.body("lower", **BODY)
+    m.revolute("A", m.ground, upper, coordinate="q1")
+    m.revolute("B", upper.at(UPPER, 0, 0), lower, coordinate="q2", limits={"lower": -2.0, "upper": 2.5})
+    tip = lower.marker("tip", at=(LOWER, 0, 0))
+    for k, name in enumerate("xy"):
+        m.output(name, tip.position[k])
+    m.output("speed", tip.velocity[0])
+    m.initial(q2=0.4)
+    return m
+
+
+def spatial_arm() -> eg.Model:
+    m = eg.Model("spatial_arm")
+    waist, upper, lower = (m.body(name, **BODY) for name in ("waist", "upper", "lower"))
+    m.revolute("A", m.ground, waist, axis="z", coordinate="q1")
+    m.revolute("B", waist, upper, axis="y", coordinate="q2")
+    m.revolute("C", upper.at(UPPER, 0, 0), lower, axis="y", coordinate="q3")
+    tip = lower.marker("tip", at=(LOWER, 0, 0))
+    for k, name in enumerate("xyz"):
+        m.output(name, tip.position[k])
+    m.initial(q3=0.5)
+    return m
+
+
+def five_bar() -> eg.Model:
+    m = eg.Model("five_bar")
+    a, b, d, e = (m.body(name, mass=1, inertia={"zz": 0.1}) for name in ("left", "left_rod", "right", "right_rod"))
+    m.revolute("A", m.ground.at(-BASE / 2, 0, 0), a, coordinate="left_angle")
+    m.revolute("B", a.at(CRANK, 0, 0), b, coordinate="bend")
+    m.revolute("D", m.ground.at(BASE / 2, 0, 0), d, coordinate="right_angle")
+    m.revolute("E", d.at(CRANK, 0, 0), e, coordinate="other_bend")
+    m.revolute("P", b.at(LEFT, 0, 0), e.at(RIGHT, 0, 0), coordinate="p")
+    tip = b.marker("tip", at=(LEFT, 0, 0))
+    m.output("x", tip.position[0])
+    m.output("y", tip.position[1])
+    m.initial(left_angle=2.2, right_angle=0.9)
+    m.guess(bend=-1.2, other_bend=1.2)
+    return m
+
+
+def cross(a: np.ndarray[Any, Any], b: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Of vectors in the plane."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+class FiveBar:
+    """The direct position solution: where two circles meet, on the upper side at the start."""
+
+    def __init__(self, left: np.ndarray[Any, Any], right: np.ndarray[Any, Any]) -> None:
+        one, i = np.array([1.0, 0.0]), np.array([[0.0, -1.0], [1.0, 0.0]])
+        turn = lambda x: np.stack([np.cos(x), np.sin(x)], axis=-1)  # noqa: E731
+        self.A, self.D = -BASE / 2 * one, BASE / 2 * one
+        self.B, self.E = self.A + CRANK * turn(left), self.D + CRANK * turn(right)
+        self.B1, self.E1 = CRANK * turn(left) @ i.T, CRANK * turn(right) @ i.T
+        gap = self.E - self.B
+        self.d = np.linalg.norm(gap, axis=-1)
+        with np.errstate(invalid="ignore"):
+            along = (LEFT**2 - RIGHT**2 + self.d**2) / (2 * self.d)
+            across = np.sqrt(LEFT**2 - along**2)
+        u = gap / self.d[..., None]
+        self.P = self.B + along[..., None] * u + across[..., None] * (u @ i.T)
+        b, e = self.P - self.B, self.P - self.E
+        self.closes = (abs(LEFT - RIGHT) <= self.d) & (self.d <= LEFT + RIGHT)
+        #: from b.(P' - B') = 0 and e.(P' - E') = 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.det = (b * self.B1).sum(-1) * (e * self.E1).sum(-1) / cross(b, e)
+        self.legs = cross(self.B - self.A, b), cross(self.E - self.D, e)
+
+
+@pytest.fixture(scope="module")
+def arm() -> eg.Module:
+    return planar_arm().compile(target="numpy")
+
+
+@pytest.fixture(scope="module")
+def parallel() -> Any:
+    mod = five_bar().compile()
+    return mod.workspace({"left_angle": (0, TURN, 33), "right_angle": (-np.pi, np.pi, 33)}, ["x", "y"])
+
+
+def test_the_annulus_of_a_planar_arm(arm: eg.Module) -> None:
+    whole = np.pi * ((UPPER + LOWER) ** 2 - (UPPER - LOWER) ** 2)
+    off = []
+    for n in (13, 25, 49):
+        ws = arm.workspace({"q1": (0, TURN, n), "q2": (0, TURN / 2, n)}, ["x", "y"])
+        off.append(abs(ws.area() / whole - 1))
+    assert off[0] > 2.5 * off[1] > 6 * off[2] and off[2] < 0.005  # noqa: PT018
+    both = arm.workspace({"q1": (0, TURN, 49), "q2": (-np.pi, np.pi, 97)}, ["x", "y"])
+    assert both.area() == pytest.approx(whole, rel=0.005)  # elbow up and elbow down are one place
+    assert (both.status == "reached").all()
+    q1, q2 = both["q1"], both["q2"]
+    np.testing.assert_allclose(both["x"], UPPER * np.cos(q1) + LOWER * np.cos(q1 + q2), atol=1e-15)
+    np.testing.assert_allclose(both.manipulability, UPPER * LOWER * np.abs(np.sin(q2)), atol=1e-15)
+    np.testing.assert_allclose(1 / both.condition, both.smallest / both.largest, atol=1e-15)
+    flat = np.isin(np.arange(97), (0, 48, 96))  # stretched and folded
+    assert (both.singular == flat).all()
+    assert {one.kind for one in both.singularities} == {"outputs"}
+
+
+def test_singular_positions_between_grid_points_are_found(arm: eg.Module) -> None:
+    ws = arm.workspace({"q1": (0, 1, 3), "q2": (-0.5, 0.63, 6)}, ["x", "y"])
+    assert [one.values["q2"] for one in ws.singularities] == pytest.approx([0, 0, 0], abs=1e-10)
+    assert ws.singularities[0].names == ("x",)  # stretched along x it still moves along y only
+    assert (np.argwhere(ws.singular)[:, 1] // 2 == 1).all()
+    assert np.count_nonzero(ws.singular) == 6
+
+
+@pytest.mark.parametrize("limits", [True, {"q2": (-2, 2.5)}])
+def test_limits(arm: eg.Module, limits: Any) -> None:
+    ws = arm.workspace({"q1": (0, TURN, 5), "q2": (-np.pi, np.pi, 41)}, ["x", "y"], limits=limits)
+    fine = (ws["q2"] >= -2) & (ws["q2"] <= 2.5)
+    assert (ws.reached == fine).all()
+    assert (ws.status[~fine] == "limits").all()
+    assert (np.isnan(ws["x"]) == ~fine).all()
+    one_side = arm.workspace({"q2": (-3, 3, 7)}, "y", limits={"q2": (None, 0.5)})
+    assert (one_side.status == ["reached"] * 4 + ["limits"] * 3).all()
+
+
+def test_a_spatial_arm() -> None:
+    mod = spatial_arm().compile(target="numpy")
+    grid = {"q1": (0, TURN, 25), "q2": (-np.pi / 2, np.pi / 2, 15), "q3": (0, np.pi, 13)}
+    ws = mod.workspace(grid, ["x", "y", "z"])
+    q1, q2, q3 = (ws[name] for name in grid)
+    out = UPPER * np.cos(q2) + LOWER * np.cos(q2 + q3)
+    np.testing.assert_allclose(ws["x"], out * np.cos(q1), atol=1e-14)
+    np.testing.assert_allclose(ws["z"], -UPPER * np.sin(q2) - LOWER * np.sin(q2 + q3), atol=1e-14)
+    np.testing.assert_allclose(ws.manipulability, UPPER * LOWER * np.abs(np.sin(q3) * out), atol=1e-14)
+    assert ws.volume() == pytest.approx(spatial_shell(), rel=0.03)
+    with pytest.raises(eg.UsageError, match=r"area\(\) needs 2 outputs"):
+        ws.area()
+
+
+def spatial_shell() -> float:
+    """Volume of the points (r, z) that the elbow plane reaches, turned about z: 2 pi times the integral of |r|."""
+    side = np.linspace(-0.8, 0.8, 1601)
+    r, z = np.meshgrid(side, side, indexing="ij")
+    far2 = r**2 + z**2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        q3 = np.arccos((far2 - UPPER**2 - LOWER**2) / (2 * UPPER * LOWER))  # 0 .. pi
+        q2 = np.arctan2(-z, r) - np.arctan2(LOWER * np.sin(q3), UPPER + LOWER * np.cos(q3))
+    q2 = np.remainder(q2 + np.pi, TURN) - np.pi
+    inside = np.isfinite(q3) & (np.abs(q2) <= np.pi / 2)
+    reached = inside | inside[::-1]  # half a turn about z brings r to -r
+    return float(np.pi * (np.abs(r) * reached).sum() * (side[1] - side[0]) ** 2)
+
+
+def test_a_five_bar_stays_on_its_branch(parallel: Any) -> None:
+    exact = FiveBar(parallel["left_angle"], parallel["right_angle"])
+    assert 100 < np.count_nonzero(~exact.closes) < 400
+    assert (parallel.reached == exact.closes).all()
+    assert set(parallel.status[~exact.closes]) == {"out of reach"}
+    fine = exact.closes
+    np.testing.assert_allclose(np.moveaxis(parallel.values, 0, -1)[fine], exact.P[fine], atol=1e-9)
+    np.testing.assert_allclose(parallel.manipulability[fine], np.abs(exact.det[fine]), rtol=1e-6, atol=1e-9)
+
+
+def test_singular_positions_of_a_five_bar(parallel: Any) -> None:
+    kinds = {kind: [one for one in parallel.singularities if one.kind == kind] for kind in ("stop", "outputs")}
+    assert len(kinds["stop"]) > 20 < len(kinds["outputs"])
+    for kind, found in kinds.items():
+        left, right = (np.array([one.values[name] for one in found]) for name in parallel.over)
+        exact = FiveBar(left, right)
+        if kind == "stop":  # the rods in one line, stretched or folded
+            ends = np.abs(exact.d[:, None] - [abs(LEFT - RIGHT), LEFT + RIGHT]).min(axis=1)
+            assert ends.max() < 1e-9
+            assert all("P" in one.joints for one in found)
+        else:  # a crank and its rod in one line
+            assert np.min(np.abs(exact.legs), axis=0).max() < 1e-8
+    # every change of sign of det J on the grid has been told
+    exact = FiveBar(parallel["left_angle"], parallel["right_angle"])
+    leg = exact.legs[0] * exact.legs[1]
+    crossed = np.argwhere((leg[1:] * leg[:-1] < 0) & exact.closes[1:] & exact.closes[:-1])
+    assert len(crossed) > 10
+    flagged = [parallel.singular[i, j] and parallel.singular[i + 1, j] for i, j in crossed]
+    assert all(flagged)
+
+
+def test_a_change_point_is_passed_and_named() -> None:
+    m = eg.Model("parallelogram")
+    one, bar, two = (m.body(name, **BODY) for name in ("one", "bar", "two"))
+    m.revolute("A", m.ground, one, coordinate="theta")
+    m.revolute("B", one.at(0.2, 0, 0), bar, coordinate="bend")
+    m.revolute("C", bar.at(0.6, 0, 0), two.at(0.2, 0, 0))
+    m.revolute("D", m.ground.at(0.6, 0, 0), two, coordinate="psi")
+    m.initial(theta=0.5)
+    m.guess(bend=-0.5, psi=0.5)
+    ws = m.compile(target="numpy").workspace({"theta": (-1, 1, 10)}, "psi")
+    np.testing.assert_allclose(ws["psi"], ws["theta"], atol=1e-9)
+    (found,) = ws.singularities
+    assert (found.kind, found.values["theta"]) == ("change point", pytest.approx(0, abs=1e-6))
+    assert list(np.flatnonzero(ws.singular)) == [4, 5]
+    assert ws.jacobian[0, 0] == pytest.approx(np.ones(10))
+
+
+def test_drivers_move_over_time() -> None:
+    crank = eg.load(models.EXAMPLES / "driven_slider_crank.yaml").compile(target="numpy")
+    rate = crank.kinematic_analysis(t=[0.1])["theta_dot"][0]
+    ws = crank.workspace({"t": (0, 0.2, 21)}, ["s", "theta"])
+    theta = ws["theta"]
+    np.testing.assert_allclose(ws["s"], 0.1 * np.cos(theta) + np.sqrt(0.09 - 0.01 * np.sin(theta) ** 2), atol=1e-13)
+    np.testing.assert_allclose(ws.jacobian[1, 0], rate, rtol=1e-9)
+
+
+def test_led_by_a_cut_joint_and_its_reach() -> None:
+    four = models.build("four_bar").compile(target="numpy")
+    ws = four.workspace({"psi": np.linspace(1.0, 2.6, 33)}, ["theta"])
+    top = 2.2459278597319283
+    assert (ws.reached == (ws["psi"] <= top)).all()
+    (stop,) = [one for one in ws.singularities if one.values["psi"] > 1.5]
+    assert (stop.kind, stop.values["psi"]) == ("stop", pytest.approx(top, abs=1e-9))
+    motion = four.kinematic_analysis(psi=np.linspace(1.0, 2.2, 25), psi_dot=1)
+    np.testing.assert_allclose(ws["theta"][:25], motion["theta"], atol=1e-10)
+    np.testing.assert_allclose(ws.jacobian[0, 0, :25], motion["theta_dot"], rtol=1e-8)
+
+
+def test_tables_files_and_pictures(arm: eg.Module, tmp_path: Path) -> None:
+    ws = arm.workspace({"q1": (0, 3, 4), "q2": [0.1, 0.5, 0.7]}, ["x", "y"], limits={"q2": (0, 0.6)})
+    frame = ws.to_pandas()
+    assert frame.index.names == ["q1", "q2"]
+    assert frame.loc[(1.0, 0.5), "x"] == ws["x"][1, 1]
+    assert (frame["status"] == "limits").sum() == 4
+    with np.load(ws.save(tmp_path / "ws"), allow_pickle=False) as data:
+        assert list(data["over"]) == ["q1", "q2"]
+        np.testing.assert_array_equal(data["[x]"], ws["x"])
+        np.testing.assert_array_equal(data["jacobian"], ws.jacobian)
+    rows = ws.save(tmp_path / "ws.csv").read_text().splitlines()
+    assert len(rows) == 13
+    assert rows[0].startswith("q1 [rad],q2 [rad],x,y,")
+    with pytest.raises(eg.UsageError, match=r"written as .npz or .csv"):
+        ws.save(tmp_path / "ws.txt")
+    assert "4 limits" in str(ws)
+    assert len(ws.plot()) == 2
+    assert ws.plot("condition", ax=ws.plot()[0]) is not None
+    with pytest.raises(eg.UsageError, match="coloured by numbers"):
+        ws.plot("status")
+    line = arm.workspace({"q1": (0, 1, 5)}, "x")
+    assert len(line.plot()) == 2
+    import matplotlib.pyplot as plt
+
+    plt.close("all")
+
+
+def test_an_exported_package_has_it(arm: eg.Module, tmp_path: Path) -> None:
+    from eomgen import pipeline
+
+    pipeline.generate(planar_arm(), tmp_path, target="numpy")
+    script = (
+        "import sys; sys.modules['sympy'] = sys.modules['eomgen'] = None\n"
+        "import arm\nprint(arm.workspace({'q1': (0, 3, 13), 'q2': (0.1, 3, 13)}, ['x', 'y']).area())"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == arm.workspace({"q1": (0, 3, 13), "q2": (0.1, 3, 13)}, ["x", "y"]).area()
+
+
+@pytest.mark.parametrize(
+    ("over", "of", "rest", "said"),
+    [
+        ({"q9": (0, 1, 3)}, "x", {}, "no coordinate to vary 'q9'"),
+        ({}, "x", {}, "over names coordinates"),
+        ({"q1": (0, 1, 3)}, "z", {}, "no output or coordinate 'z'"),
+        ({"q1": (0, 1, 3)}, "speed", {}, "depends on velocities"),
+        ({"q1": (0, 1, 3)}, [], {}, "of names outputs"),
+        ({"q1": (0, 1, 1)}, "x", {}, "at least 2"),
+        ({"q1": [0, 2, 1]}, "x", {}, "rising or falling"),
+        ({"q1": (0, 1, 1000), "q2": (0, 1, 1000)}, "x", {}, "1000 x 1000 = 1000000 grid points, more than points="),
+        ({"q1": (0, 1, 30)}, "x", {"points": 10}, "30 = 30 grid points"),
+        ({"q1": (0, 1, 3)}, "x", {"limits": {"q7": (0, 1)}}, "no coordinate to limit 'q7'"),
+        ({"q1": (0, 1, 3)}, "x", {"limits": {"q2": (1, 0)}}, "lower 1 is above upper 0"),
+        ({"q1": (0, 1, 3)}, "x", {"limits": {"q2": 1}}, r"give \(lower, upper\)"),
+    ],
+)
+def test_what_it_refuses(arm: eg.Module, over: Any, of: Any, rest: Any, said: str) -> None:
+    with pytest.raises(eg.UsageError, match=said):
+        arm.workspace(over, of, **rest)
+
+
+def test_too_many_or_unreachable() -> None:
+    four = models.build("four_bar").compile(target="numpy")
+    with pytest.raises(eg.UsageError, match=r"theta, psi cannot all be varied: 1 degrees of freedom, at most 1"):
+        four.workspace({"theta": (0, 1, 3), "psi": (0, 1, 3)}, "bend")
+    with pytest.raises(eg.UsageError, match="no joint of the model has lower or upper limits"):
+        four.workspace({"theta": (0, 1, 3)}, "bend", limits=True)
+    with pytest.raises(eg.PartitionError, match="no point of the grid can be reached from the initial position: stop"):
+        four.workspace({"psi": (2.4, 2.8, 3)}, "theta")

@@ -1,0 +1,53 @@
+"""Runs that are stopped go on where they were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.ensembles import blocks
+
+from .test_simulate_many import angles
+
+
+def test_only_what_is_missing_is_run_again(pendulum: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = pendulum.simulate_many(1, angles(40))
+    folder = tmp_path / "runs"
+    begun: list[int] = []
+    run_block = blocks.run_block
+
+    def stopping(module: Any, cases: Any, *rest: Any) -> Any:
+        if len(begun) == 3:
+            raise KeyboardInterrupt
+        begun.append(cases.count)
+        return run_block(module, cases, *rest)
+
+    monkeypatch.setattr(blocks, "run_block", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        pendulum.simulate_many(1, angles(40), store=folder, block=8)
+    assert len(list(folder.glob("block_*.npz"))) == 3
+    begun.clear()
+    begun.append(0)  # room for two more
+    resumed = pendulum.simulate_many(1, angles(40), store=folder, block=8)
+    assert begun == [0, 8, 8]
+    np.testing.assert_array_equal(resumed.x, whole.x)
+    np.testing.assert_array_equal(resumed.steps, whole.steps)
+    monkeypatch.setattr(blocks, "run_block", None)  # nothing is left to do
+    np.testing.assert_array_equal(pendulum.simulate_many(1, angles(40), store=folder, block=8).x, whole.x)
+
+
+def test_a_store_of_another_ensemble_is_refused(pendulum: Any, tmp_path: Path) -> None:
+    pendulum.simulate_many(1, angles(4), store=tmp_path / "runs")
+    for changed in ({"span": 2}, {"initial": angles(4, seed=1)}, {"parameters": {"g": 1.0}}, {"rtol": 1e-3}):
+        with pytest.raises(eg.UsageError, match="belongs to another ensemble: .* differ"):
+            pendulum.simulate_many(**{"span": 1, "initial": angles(4), **changed}, store=tmp_path / "runs")
+    (tmp_path / "mine.txt").write_text("precious")
+    with pytest.raises(eg.UsageError, match="not empty and holds no ensemble"):
+        pendulum.simulate_many(1, angles(4), store=tmp_path)
+    next((tmp_path / "runs").glob("block_*")).write_bytes(b"torn")
+    with pytest.raises(eg.UsageError, match="cannot be read.*remove it to run its block again"):
+        pendulum.simulate_many(1, angles(4), store=tmp_path / "runs")

@@ -1,0 +1,282 @@
+"""Events: found where closed forms put them, with resets and impacts, by every method and both targets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import eomgen as eg
+
+G = 9.81
+METHODS = ("DOP853", "RK45", "RK23", "LSODA", "Radau")
+TIGHT = {"rtol": 1e-9, "atol": 1e-12}
+
+
+def ball(**floor: Any) -> eg.Model:
+    m = eg.Model("ball", gravity=(0, -G, 0))
+    e = m.parameter("e", 0.9)
+    body = m.body("ball", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="y", coordinate="h")
+    m.initial(h=1.0)
+    m.event("floor", "h", **({"direction": -1, "reset": {"h_dot": -e * m.coordinate("h_dot")}} | floor))
+    m.event("apex", "h_dot", direction=-1)
+    return m
+
+
+def bounces(e: float, end: float) -> np.ndarray:
+    """Times at which a ball dropped from 1 m hits the floor."""
+    times, v = [np.sqrt(2 / G)], np.sqrt(2 * G)
+    while len(times) < 30 and times[-1] + 2 * e * v / G < end:
+        v *= e
+        times.append(times[-1] + 2 * v / G)
+    return np.array(times)
+
+
+@pytest.fixture(scope="module")
+def bouncing() -> Any:
+    return ball().compile()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_ball_bounces_as_in_closed_form(bouncing: Any, method: str) -> None:
+    end = 4.0
+    run = bouncing.simulate((0, end), method=method, dense_output=True, **TIGHT)
+    expected = bounces(0.9, end)
+    np.testing.assert_allclose(run.t_events["floor"], expected, rtol=0, atol=1e-10)
+    assert run.t_events["apex"][0] == 0.0  # SciPy's rule: a value that leaves zero, in its direction
+    np.testing.assert_allclose(run.t_events["apex"][1:], (expected[:-1] + expected[1:]) / 2, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run.x_events["floor"][0], 0.0, atol=1e-11)
+    speeds = np.sqrt(2 * G) * 0.9 ** np.arange(len(expected))
+    np.testing.assert_allclose(run.x_events["floor"][1], -speeds, rtol=1e-8)  # before each reset
+    assert run["h"].min() > -1e-12
+    twice = np.flatnonzero(np.diff(run.t) == 0.0)
+    np.testing.assert_allclose(run["h_dot"][twice + 1], -0.9 * run["h_dot"][twice], rtol=1e-12)
+    times = np.linspace(0, end, 201)
+    asked = bouncing.simulate((0, end), method=method, t_eval=times, **TIGHT)
+    np.testing.assert_array_equal(asked.t, times)
+    last = np.searchsorted(expected, times) - 1
+    after = times - np.where(last < 0, 0.0, expected[last])
+    up = np.where(last < 0, 0.0, np.sqrt(2 * G) * 0.9 ** (last + 1.0))
+    height = np.where(last < 0, 1.0, 0.0) + up * after - G * after**2 / 2
+    np.testing.assert_allclose(asked["h"], height, atol=1e-8)
+    np.testing.assert_allclose(run.at(times)["h"], height, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+def test_parameters_reach_the_reset(bouncing: Any, method: str) -> None:
+    run = bouncing.simulate((0, 1.3), parameters={"e": 0.5}, method=method, **TIGHT)
+    times = bounces(0.5, 1.3)
+    np.testing.assert_allclose(run.t_events["floor"], times, atol=1e-10)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+def test_accumulating_bounces_are_named(bouncing: Any, method: str) -> None:
+    assert np.sqrt(2 / G) * (1 + 2 * 0.9 / 0.1) == pytest.approx(8.57895, abs=1e-5)
+    with pytest.raises(eg.ZenoError, match=r"floor.*near t = 8.5789.*Zeno"):
+        bouncing.simulate((0, 20), method=method)
+    assert issubclass(eg.ZenoError, eg.SimulationError)
+
+
+def test_a_reset_that_leads_nowhere_is_named() -> None:
+    stuck = ball(direction=-1, reset={"h_dot": "0"}).compile()
+    with pytest.raises(eg.ZenoError, match="leads nowhere"):
+        stuck.simulate((0, 2))
+
+
+def test_a_run_ends_at_the_third_bounce() -> None:
+    model = ball(terminal=3)
+    for target in ("cython", "numpy"):
+        run = model.compile(target=target).simulate((0, 10), **TIGHT)
+        assert run.status == 1
+        assert run.t[-1] == pytest.approx(bounces(0.9, 10)[2], abs=1e-10)
+        assert len(run.t_events["floor"]) == 3
+
+
+def test_the_numpy_target_bounces_alike(bouncing: Any) -> None:
+    run = ball().compile(target="numpy").simulate((0, 3), method="RK45", **TIGHT)
+    np.testing.assert_allclose(run.t_events["floor"], bounces(0.9, 3.0), atol=1e-10)
+
+
+def two_bars() -> eg.Model:
+    """A double pendulum whose lower end hits a wall: the impulse reaches both joints."""
+    m = eg.Model("wall", gravity=(0, -G, 0))
+    upper = m.body("upper", mass=1.0, com=(0, -0.5, 0), inertia={"zz": 0.08})
+    lower = m.body("lower", mass=0.7, com=(0, -0.4, 0), inertia={"zz": 0.05})
+    m.revolute("A", m.ground, upper, coordinate="a")
+    m.revolute("B", upper.at(0, -1, 0), lower, coordinate="b")
+    tip = lower.marker("tip", at=(0, -0.8, 0))
+    m.event("wall", tip.position[0] + 0.3, restitution=0.6)
+    m.output("gap", tip.position[0] + 0.3)
+    m.output("rate", tip.velocity[0])
+    m.initial(a=0.9, b=0.2)
+    return m
+
+
+def test_an_impact_obeys_newtons_law_and_momentum() -> None:
+    model = two_bars()
+    mod = model.compile()
+    run = mod.simulate((0, 2.0), rtol=1e-10, atol=1e-12)
+    hits = run.t_events["wall"]
+    assert len(hits) >= 2
+    assert run["gap"].min() > -1e-9
+    for t, before in zip(hits, run.x_events["wall"].T, strict=True):
+        after = run.x[:, np.flatnonzero(run.t == t)[-1]]
+        h, q = 1e-6, before[:2]
+        slope = np.array([(gap(mod, q + h * e) - gap(mod, q - h * e)) / (2 * h) for e in np.eye(2)])
+        jump, M = (after - before)[2:], mod.mass_matrix(q)
+        assert slope @ after[2:] == pytest.approx(-0.6 * (slope @ before[2:]), rel=1e-6)
+        impulse = M @ jump
+        assert abs(impulse @ np.array([-slope[1], slope[0]])) < 1e-7 * np.linalg.norm(impulse)  # along the gap alone
+    again = mod.simulate((0, 2.0), rtol=1e-10, atol=1e-12, method="LSODA")
+    np.testing.assert_allclose(again.t_events["wall"][:2], hits[:2], atol=1e-7)
+    other = mod.simulate_impacts((0, hits[1] + 0.01), {"gap": 0.6}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose([t for t, _ in other.impacts], hits[:2], atol=1e-8)
+
+
+def gap(mod: Any, q: np.ndarray) -> float:
+    return float(mod.outputs(0.0, np.concatenate([q, np.zeros(2)]))[0])
+
+
+def test_a_reset_in_a_loop_is_brought_back_onto_it(tmp_path: Path) -> None:
+    source = (Path(__file__).parents[2] / "examples" / "slider_crank.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "kicked.yaml"
+    file.write_text(
+        source + "\nevents: {kick: {expression: sin(theta), direction: 1, reset: {theta_dot: 1.1*theta_dot}}}\n"
+    )
+    mod = eg.load(file).compile()
+    run = mod.simulate((0, 2), {"theta": 0.3, "theta_dot": 10.0}, rtol=1e-9, atol=1e-11)
+    assert len(run.t_events["kick"]) >= 2
+    assert run.residuals.raw_velocity < 1e-6
+    k = int(np.flatnonzero(np.diff(run.t) == 0.0)[0])
+    assert run["theta_dot"][k + 1] == pytest.approx(1.1 * run["theta_dot"][k], rel=0.1)
+    theta = run.x_events["kick"][mod.q_names.index("theta")]
+    np.testing.assert_allclose(theta, 2 * np.pi * np.round(theta / (2 * np.pi)), atol=1e-9)
+    assert np.abs(mod.velocity_constraints(run.x[:, k + 1])).max() < 1e-9
+
+
+@pytest.fixture(scope="module")
+def swing() -> Any:
+    return eg.load(Path(__file__).parents[2] / "examples" / "pendulum.yaml").compile()
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "LSODA"])
+def test_texts_functions_and_mappings(swing: Any, method: str) -> None:
+    name = swing.q_names[0]
+
+    def through(t: float, x: np.ndarray) -> float:
+        return float(x[0])
+
+    options = {"method": method, **TIGHT}
+    texts = swing.simulate((0, 10), events=[name, f"{name}_dot", through], **options)
+    theirs = solve_ivp(
+        swing.rhs, (0, 10), swing.x0(), method="DOP853", events=[through, lambda t, x: x[1]], rtol=1e-11, atol=1e-13
+    )
+    np.testing.assert_allclose(texts.t_events[name], theirs.t_events[0], atol=1e-7)
+    np.testing.assert_allclose(texts.t_events["through"], texts.t_events[name], atol=1e-10)
+    first = texts.t_events[1]
+    np.testing.assert_allclose(first[first > 1e-6], theirs.t_events[1][theirs.t_events[1] > 1e-6], atol=1e-6)
+    rising = {"up": {"expression": f"{name} - 0*t", "direction": 1, "terminal": 2}}
+    run = swing.simulate((0, 10), events=rising, **options)
+    up = [t for t in theirs.t_events[0] if theirs.y_events[0][list(theirs.t_events[0]).index(t)][1] > 0]
+    assert run.status == 1
+    assert run.t[-1] == run.t_events["up"][-1] == pytest.approx(up[1], abs=1e-7)
+
+
+def test_events_are_kept_in_files(swing: Any, tmp_path: Path) -> None:
+    run = swing.simulate((0, 5), events={"bottom": swing.q_names[0]})
+    again = eg.load_trajectory(run.save(tmp_path / "run.npz"))
+    np.testing.assert_array_equal(again.t_events["bottom"], run.t_events["bottom"])
+    with pytest.raises(eg.UsageError, match="did you mean bottom"):
+        run.t_events["botom"]
+
+
+@pytest.mark.parametrize(
+    ("events", "words"),
+    [
+        ("thteta", "no name in event"),
+        ("__import__('os')", "no place in an expression"),
+        (3.0, "must be a name, an expression or a function"),
+        ({"a": {"expression": "t - 1", "direction": 2}}, "direction must be 1, -1 or 0"),
+        ({"a": {"expresion": "t - 1"}}, "did you mean expression"),
+    ],
+)
+def test_wrong_events(swing: Any, events: Any, words: str) -> None:
+    with pytest.raises(eg.UsageError, match=words):
+        swing.simulate((0, 1), events=events)
+
+
+def test_what_one_step_hides(swing: Any) -> None:
+    """Both zeros of a value that dips below zero within a step, and one that only touches it."""
+    long = {"method": "RK4", "step": 0.5}
+    dips = swing.simulate((0, 2), events={"dip": "(t - 1.2)**2 - 0.01"}, **long)
+    np.testing.assert_allclose(dips.t_events["dip"], [1.1, 1.3], atol=1e-9)
+    falls = swing.simulate((0, 2), events={"dip": {"expression": "(t - 1.2)**2 - 0.01", "direction": -1}}, **long)
+    np.testing.assert_allclose(falls.t_events["dip"], [1.1], atol=1e-9)
+    touches = swing.simulate((0, 2), events={"graze": "(t - 1.2)**2"}, **long)
+    assert len(touches.t_events["graze"]) <= 2
+    np.testing.assert_allclose(touches.t_events["graze"], 1.2, atol=1e-6)
+
+
+def test_a_zero_at_the_start_is_as_in_scipy(swing: Any) -> None:
+    x0 = swing.x0()
+    for sign in (1.0, -1.0):
+        for direction in (-1, 0, 1):
+
+            def leaves(t: float, x: np.ndarray, sign: float = sign) -> float:
+                return sign * t
+
+            leaves.direction = direction  # type: ignore[attr-defined]
+            theirs = solve_ivp(swing.rhs, (0, 1), x0, method="DOP853", events=leaves)
+            ours = swing.simulate((0, 1), x0, events=leaves)
+            np.testing.assert_allclose(ours.t_events[0], theirs.t_events[0], atol=1e-14)
+
+
+def test_simultaneous_events_and_order(swing: Any) -> None:
+    run = swing.simulate((0, 2), events={"b": "t - 1", "a": "t - 0.5", "c": "2*t - 2"}, method="RK4", step=0.9)
+    np.testing.assert_allclose([run.t_events[k][0] for k in "abc"], [0.5, 1.0, 1.0], atol=1e-14)
+    ended = swing.simulate((0, 2), events={"b": "t - 1", "a": {"expression": "t - 0.95", "terminal": True}})
+    assert ended.t[-1] == pytest.approx(0.95, abs=1e-14)
+    assert len(ended.t_events["b"]) == 0
+
+
+def test_what_a_function_raises_comes_out(swing: Any) -> None:
+    def broken(t: float, x: np.ndarray) -> float:
+        raise LookupError("no table here")
+
+    with pytest.raises(LookupError, match="no table here"):
+        swing.simulate((0, 1), events=broken)
+
+
+def test_files_and_python_mean_the_same(bouncing: Any, tmp_path: Path) -> None:
+    file = tmp_path / "ball.yaml"
+    file.write_text(ball().to_yaml(), encoding="utf-8")
+    again = eg.load(file)
+    assert again.to_yaml() == ball().to_yaml()
+    assert again.compile().metadata["events"] == bouncing.metadata["events"]
+
+
+def test_faults_are_told_with_their_lines(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.yaml"
+    file.write_text(
+        ball().to_yaml().replace("events:", "events:\n  h: {expression: h_ddot}\n  far: {direction: 2, terminal: -1}")
+    )
+    with pytest.raises(eg.ModelError) as told:
+        eg.load(file).compile()
+    text = str(told.value)
+    for words in (
+        "events.h: the name 'h' is taken",
+        "the acceleration 'h_ddot' cannot stand in an event",
+        "events.far.expression: is missing",
+        "events.far.direction: 2 is not 1, -1 or 0",
+        "events.far.terminal: -1 is not true, false or a whole number",
+    ):
+        assert words in text
+    assert f"{file}:" in text
+    other = ball(direction=-1, reset={"hdot": 1})
+    other.event("hit", "h", restitution=1.5)
+    with pytest.raises(eg.ModelError, match="no coordinate or velocity 'hdot'(.|\n)*1.5 is not between 0 and 1"):
+        other.compile()
