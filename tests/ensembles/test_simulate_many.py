@@ -252,7 +252,8 @@ def test_functions_of_time_are_refused(crank: Any) -> None:
 
 def test_an_interrupt_is_honoured_soon(tmp_path: Path) -> None:
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import signal, sys; sys.path.insert(0, sys.argv[1])\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it\n"
         "from ensembles.conftest import compiled; from ensembles.test_simulate_many import TIGHT, angles\n"
         "mod = compiled('double_pendulum', 'cython'); print('ready', flush=True)\n"
         "mod.simulate_many(1e4, angles(4000), **TIGHT)"
