@@ -261,12 +261,15 @@ def test_an_interrupt_is_honoured_soon(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(Path(__file__).parents[1])], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    assert process.stdout is not None
-    assert process.stdout.readline() == b"ready\n"
-    time.sleep(1.0)
-    start = time.perf_counter()
-    process.send_signal(signal.SIGINT)
-    errors = process.communicate(timeout=30)[1]
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ready\n"
+        time.sleep(1.0)
+        start = time.perf_counter()
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=30)[1]
+    finally:
+        process.kill()
     assert time.perf_counter() - start < 5.0  # the machine may be busy
     assert process.returncode != 0
     assert b"KeyboardInterrupt" in errors
