@@ -23,6 +23,7 @@ VERBS = {
     "modes": "Natural frequencies, mode shapes and damping ratios about an equilibrium.",
     "equilibrium": "Find a static equilibrium, with parameters that make it one.",
     "sensitivity": "Derivatives of a run by parameters, inputs and initial values.",
+    "consistent": "The state on the constraints that differs least from a rough one.",
     "reactions": "Forces and moments in all joints, and which are undetermined.",
     "inverse": "Forces of chosen drives that make a motion, loops closed.",
     "impact": "State after an impact, impulses and energy lost.",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import UsageError
+from ..runtime.names import require
 from .analysis import Prepared, analysis_options
 from .options import require_folder
 from .screen import finite, print_heading, print_json, print_table, stage
@@ -29,11 +31,12 @@ SHOWN = 10  #: failures listed
 )
 @click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the numbers drawn.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the numbers drawn.")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M times.")
 @click.option("--statistics", is_flag=True, help="Keep mean, deviation, least and greatest only.")
 @click.option("--solver", metavar="NAME", help="Integrator; that of the file by default.")
+@click.option("--step", type=float, metavar="H", help="Size of the steps of RK4 in s.")
 @click.option("--rtol", type=float, metavar="X", help="Relative tolerance.")
 @click.option("--atol", type=float, metavar="X", help="Absolute tolerance.")
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Runs at a time; all processors by default.")
@@ -45,15 +48,19 @@ SHOWN = 10  #: failures listed
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
 def ensemble(
     work: Prepared, cases: Path | None, vary: tuple[str, ...], count: int | None, seed: int, end: float | None,
-    samples: int | None, statistics: bool, solver: str | None, rtol: float | None, atol: float | None,
-    threads: int | None, cluster: str | None, store: Path | None, plot: tuple[str, str] | None, out: Path | None,
-    as_json: bool,
+    samples: int | None, statistics: bool, solver: str | None, step: float | None, rtol: float | None,
+    atol: float | None, threads: int | None, cluster: str | None, store: Path | None,
+    plot: tuple[str, str] | None, out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Run a model many times: from a table of cases, or with values drawn at random."""
     if out is not None and out.suffix not in (".npz", ".csv"):
         raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
     for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
         require_folder(word, path)
+    if out is not None and out.suffix == ".csv":
+        require("pandas", "pandas", "--out FILE.csv")
+    if cases is not None and count is not None:
+        raise UsageError("--count is for values drawn by --vary; --cases has as many runs as rows")
     module = work.module
     values = _read(cases) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
@@ -67,8 +74,9 @@ def ensemble(
     times = None if samples is None else _even(end or float(last), samples)
     with stage("integrate"):
         found = module.simulate_many(
-            end, *(group or None for group in sorted_values.values()), method=solver, t_eval=times, threads=threads,
-            reduce="statistics" if statistics else None, cluster=_cluster(cluster), store=store, rtol=rtol, atol=atol,
+            end, *(group or None for group in sorted_values.values()), method=solver, step=step, t_eval=times,
+            threads=threads, reduce="statistics" if statistics else None, cluster=_cluster(cluster), store=store,
+            rtol=rtol, atol=atol,
         )  # fmt: skip
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -110,11 +118,13 @@ def _cluster(given: str | None) -> int | str | None:
 
 def _read(path: Path) -> dict[str, list[float]]:
     """The columns of a table of cases."""
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         rows = [row for row in csv.reader(file) if row]
     if len(rows) < 2:
         raise UsageError(f"--cases {path}: a line of names and a line for each run are needed")
     names = [name.strip() for name in rows[0]]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise UsageError(f"--cases {path}: the names {', '.join(twice)} stand there twice")
     columns: dict[str, list[float]] = {name: [] for name in names}
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
@@ -139,5 +149,9 @@ def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
             limits = float(low), float(high)
         except ValueError:
             raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers") from None
+        if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
+        if name.strip() in drawn:
+            raise UsageError(f"--vary {name.strip()} is given twice")
         drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
     return drawn

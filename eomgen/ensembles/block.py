@@ -55,6 +55,8 @@ class Plan:
     t_eval : (m,) array or None
     inputs : dict
         Inputs that vary over time: name -> (times, values), Signal or expression.
+    constants : tuple of str
+        Inputs given as constants, in place of signals that the model may declare.
     events : object
         As a user gives them, without functions.
     keep_events : int
@@ -69,6 +71,7 @@ class Plan:
     inputs: dict[str, Any]
     events: Any
     keep_events: int
+    constants: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,7 @@ def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
 
 def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
     core: Any = eager(module.core)
-    forcing = Forcing(module.layout, plan.inputs)
+    forcing = find_forcing(module, plan)
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
     settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
     ensemble = core.ensemble(
@@ -154,6 +157,23 @@ def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Pl
     samples, notes = (None if x is None else x.transpose(2, 1, 0) for x in (ensemble.samples, ensemble.notes))
     numbers = {name: getattr(ensemble, name) for name in ("t", "status", "failure", "failure_time", *COUNTS)}
     return Block(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
+
+
+def find_forcing(module: Module, plan: Plan) -> Forcing:
+    """The inputs of all runs; those that are constant count as 0 here."""
+    return Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
+
+
+def inputs_at(module: Module, cases: Cases, plan: Plan, t: Array, x: Array) -> Array:
+    """Inputs (n_u, k) of every run at times (k,) and states (n_x, k)."""
+    u = np.array(np.broadcast_to(cases.u if cases.u.ndim > 1 else cases.u[:, None], (module.n_u, cases.count)))
+    forcing = find_forcing(module, plan)
+    for i, signal in forcing.varying.items():
+        u[i] = signal(t, x)  # type: ignore[arg-type]
+    for i, formula in forcing.formulas.items():
+        for k in range(cases.count):
+            u[i, k] = formula.function(cases.column(k)["p"])(float(t[k]), x[:, k])
+    return u
 
 
 def find_events(module: Module, plan: Plan) -> Events:
@@ -178,7 +198,16 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
     """Let threads run the trajectories of an ensemble; an interrupt ends them within a few steps."""
     from threading import Thread
 
-    workers = [Thread(target=ensemble.work, daemon=True) for _ in range(threads)]
+    raised: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            ensemble.work()
+        except BaseException as error:
+            raised.append(error)
+            ensemble.stop()
+
+    workers = [Thread(target=run, daemon=True) for _ in range(threads)]
     try:
         for worker in workers:
             worker.start()
@@ -193,6 +222,8 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
             if worker.ident is not None:
                 worker.join()
         raise
+    if raised:
+        raise raised[0]
 
 
 def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
@@ -205,30 +236,28 @@ def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan
     samples = None if sizes is None else np.full(sizes, np.nan)
     x, t = np.full((n, count), np.nan), np.full(count, plan.span[0])
     block = Block(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
-    times = None if plan.t_eval is None else np.unique(np.append(plan.t_eval, plan.span[1]))
-    if times is not None and plan.span[1] < plan.span[0]:
-        times = times[::-1]
     for k in range(count):
         bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
+        constants = {name: float(bound.u[module.u_names.index(name)]) for name in plan.constants}
         try:
             run = bound.simulate(
-                plan.span, x0[k], inputs=plan.inputs, method=plan.method, t_eval=times, progress=False,
-                events=plan.events, **plan.options,
+                plan.span, x0[k], inputs={**constants, **plan.inputs}, method=plan.method, progress=False,
+                events=plan.events, dense_output=samples is not None, **plan.options,
             )  # fmt: skip
+            if samples is not None and plan.t_eval is not None:
+                sign = 1.0 if plan.span[1] >= plan.span[0] else -1.0
+                there = sign * (plan.t_eval - run.t[-1]) <= 0.0
+                samples[:, there, k] = run.at(plan.t_eval[there]).x
         except UsageError:
             raise
         except EomgenError as error:
-            block.status[k], block.words[k] = FAILED, str(error)
+            status[k], block.words[k] = FAILED, str(error)
             continue
-        block.x[:, k], block.t[k], block.evaluations[k] = run.x[:, -1], run.t[-1], run.nfev
-        block.steps[k] = 0 if times is not None else len(run.t) - 1
-        if block.samples is not None and plan.t_eval is not None:
-            stored = np.isin(run.t, plan.t_eval)
-            block.samples[:, : stored.sum(), k] = run.x[:, stored]
-        block.status[k] = run.status
+        x[:, k], t[k], evaluations[k], steps[k] = run.x[:, -1], run.t[-1], run.nfev, len(run.t) - 1
+        status[k] = run.status if steps[k] <= plan.max_steps else TOO_MANY_STEPS
         if notes is not None:
             _take_notes(notes[:, :, k], run.t_events, run.x_events)
-            block.noted[k] = sum(map(len, run.t_events))
+            noted[k] = sum(map(len, run.t_events))
         if watch is not None:
             watch(k + 1)
     return block

@@ -11,10 +11,10 @@ import numpy as np
 from ..errors import UsageError
 from ..runtime.names import require
 from .block import LOST, MEANING, Block, Plan, find_events
-from .blocks import Kept, keep, reduce_block
+from .blocks import RUNS, Kept, keep, reduce_block
 from .cases import Cases
 from .handle import Handle
-from .reductions import Reduction
+from .reductions import Custom, Reduction
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -54,7 +54,11 @@ def open_client(cluster: Any) -> Iterator[Any]:
         ):
             yield client
     elif isinstance(cluster, str):
-        with distributed.Client(cluster) as client:
+        try:
+            client = distributed.Client(cluster)
+        except (OSError, ValueError) as error:
+            raise UsageError(f"cluster {cluster}: no scheduler answers there ({error})") from None
+        with client:
             yield client
     else:
         raise UsageError(
@@ -128,4 +132,6 @@ def _lost(module: Module, cases: Cases, plan: Plan, reduction: Reduction, error:
     x, t = np.full((sizes[0], k), np.nan), np.full(k, plan.span[0])
     block = Block(x, t, samples, status, failure, np.zeros(k), steps, rejected, evaluations, noted, notes)
     words = dict.fromkeys(range(k), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
+    if isinstance(reduction, Custom):  # the function has nothing to work on
+        return {f"runs_{name}": getattr(block, name) for name in RUNS}, words
     return keep(module, cases, plan, reduction, block, words)

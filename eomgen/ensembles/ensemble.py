@@ -12,7 +12,7 @@ from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from .block import EVENT, MEANING, Plan, find_events
 from .cases import Cases
-from .reductions import names_of, summarise, with_outputs
+from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
     import pandas
@@ -34,13 +34,13 @@ class Ensemble:
     """The result of :meth:`Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
-    velocities and outputs.  Runs that failed hold NaN.
+    velocities and outputs.  Runs that failed hold NaN; ``reached`` has the states they came to.
 
     Attributes
     ----------
     count : int
         Number of runs, k.
-    x : (n_x, k) array or None
+    x, reached : (n_x, k) array or None
         Last states, projected onto the constraints; None where a reduction kept none.
     samples : (n_x, m, k) array or None
         States at ``t``.
@@ -69,6 +69,7 @@ class Ensemble:
         runs: dict[str, Any],
         kept: dict[str, Any],
         words: dict[int, str],
+        reduction: Reduction,
     ) -> None:
         self._module, self._cases, self._plan, self._words = module, cases, plan, words
         self.count = cases.count
@@ -77,10 +78,14 @@ class Ensemble:
         self.t_end, self.status = runs["t"], runs["status"]
         self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
         self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
-        self._notes = kept.pop("notes", None)
+        self._notes = kept.get("notes") if isinstance(reduction, States) else None
         self._failure, self._failure_time = runs["failure"], runs["failure_time"]
-        self.x, self.samples = kept.pop("x", None), kept.pop("samples", None)
-        self.reduced = kept
+        self.reached = self.samples = self.x = None
+        if isinstance(reduction, States):
+            self.reached, self.samples = kept.get("x"), kept.get("samples")
+            self.x = None if self.reached is None else np.where(self.ok, self.reached, np.nan)
+            kept = {}
+        self.reduced, self._statistics = kept, isinstance(reduction, Statistics)
 
     @property
     def ok(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -108,19 +113,22 @@ class Ensemble:
         if name not in self.names:
             raise unknown("column", name, self.names)
         row = self.names.index(name)
-        if "mean" in self.reduced:
+        if self._statistics:
             return np.asarray(self.reduced["mean"][row])
         if self.x is None:
             raise UsageError(f"this ensemble kept what its reduction made ({', '.join(self.reduced)}), not {name!r}")
         states = self.x[:, None] if self.samples is None else self.samples
         if row < len(self.x):
             found = states[row]
+        elif self.samples is None:
+            found = self._outputs(self.x, self.t_end)[None, row]
         else:
-            found = np.stack([self._outputs(states[:, j], float(t))[row] for j, t in enumerate(self.t)])
+            times = np.repeat(self.t[:, None], self.count, axis=1)
+            found = np.stack([self._outputs(states[:, j], t)[row] for j, t in enumerate(times)])
         return np.asarray(found[0] if self.samples is None else found)
 
-    def _outputs(self, x: Array, t: float) -> Array:
-        return with_outputs(self._module, self._cases, x, t)
+    def _outputs(self, x: Array, t: Array) -> Array:
+        return with_outputs(self._module, self._cases, self._plan, x, t)
 
     def events(self, name: str) -> tuple[Array, Array]:
         """Times (m, k) of an event in each run, and the projected states (n_x, m, k) there; NaN where it was not."""
@@ -136,20 +144,20 @@ class Ensemble:
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Mean, deviation, least and greatest of every state and output at the end, over the runs that got there."""
-        if "mean" in self.reduced:
+        if self._statistics:
             rows = [self.reduced[key][:, -1] for key in ("mean", "variance", "least", "greatest")]
         elif self.x is None:
             raise UsageError("this ensemble kept no states to summarise")
         else:
-            parts = summarise(self._outputs(np.where(self.status == 0, self.x, np.nan), self._plan.span[1]))
-            spread = parts["squares"] / max(float(parts["count"]) - 1.0, 1.0)
+            parts = summarise(self._outputs(self.x, self.t_end))
+            spread = parts["squares"] / np.maximum(parts["count"] - 1.0, 1.0)
             rows = [parts["mean"], spread, parts["least"], parts["greatest"]]
         keys = ("mean", "deviation", "least", "greatest")
         values = np.array([rows[0], np.sqrt(rows[1]), *rows[2:]]).T.tolist()
         return {name: dict(zip(keys, row, strict=True)) for name, row in zip(self.names, values, strict=True)}
 
     def case(self, k: int) -> dict[str, Any]:
-        """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs."""
+        """The arguments that make ``Module.simulate`` repeat run k: initial, parameters, inputs, events."""
         if not -self.count <= k < self.count:
             raise UsageError(f"there are runs 0 to {self.count - 1}, not {k}")
         cases, column = self._cases, self._cases.column(k)
@@ -157,8 +165,11 @@ class Ensemble:
             initial: Any = cases.states[:, k]
         else:
             initial = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
-        inputs = dict(zip(self._module.u_names, column["u"].tolist(), strict=True)) | self._plan.inputs
-        return {"initial": initial, "parameters": column["p"], "inputs": inputs}
+        declared = set(self._module.metadata.get("signals", {})) - set(self._plan.constants)
+        constants = dict(zip(self._module.u_names, column["u"].tolist(), strict=True))
+        inputs = {name: value for name, value in constants.items() if name not in declared} | self._plan.inputs
+        watched = {} if self._plan.events is None else {"events": self._plan.events}
+        return {"initial": initial, "parameters": column["p"], "inputs": inputs, **watched}
 
     def trajectory(self, k: int, **options: Any) -> Trajectory:
         """Run k again, with all its steps; options as for ``Module.simulate``."""
@@ -174,7 +185,7 @@ class Ensemble:
         if cases.p.ndim > 1:
             columns |= {name: row for name, row in zip(self._module.p_names, cases.p, strict=True) if np.ptp(row)}
         if self.x is not None:
-            end = self._outputs(self.x, self._plan.span[1])
+            end = self._outputs(self.x, self.t_end)
             columns |= dict(zip(self.names, end, strict=True))
         return pd.DataFrame(columns)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .block import Block, Plan
+from .block import EVENT, Block, Plan, inputs_at
 from .cases import Cases
 
 if TYPE_CHECKING:
@@ -59,13 +59,14 @@ class Statistics:
     """
 
     def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
-        """count (g, m), mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
+        """count, mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
         if plan.t_eval is None or block.samples is None:
-            states, times = np.where(block.status == 0, block.x, np.nan)[:, None, :], np.array([plan.span[1]])
+            ended = (block.status == 0) | (block.status == EVENT)
+            states, times = np.where(ended, block.x, np.nan)[:, None, :], block.t[None]
         else:
-            states, times = block.samples, plan.t_eval
+            states, times = block.samples, np.repeat(plan.t_eval[:, None], cases.count, axis=1)
         grains = []
-        values = [with_outputs(module, cases, states[:, j], float(t)) for j, t in enumerate(times)]
+        values = [with_outputs(module, cases, plan, states[:, j], t) for j, t in enumerate(times)]
         for start in range(0, cases.count, GRAIN):
             parts = [summarise(x[:, start : start + GRAIN]) for x in values]
             grains.append({name: np.stack([part[name] for part in parts], axis=-1) for name in parts[0]})
@@ -100,11 +101,12 @@ class Custom:
         made = self.function(block)
         if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
             raise UsageError(f"the function of reduce must return a mapping of names to arrays, not {made!r}")
-        return {name: np.asarray(value) for name, value in made.items()}
+        return {f"made_{name}": np.asarray(value) for name, value in made.items()}
 
     def join(self, parts: Sequence[Arrays]) -> Arrays:
         """A list of what was made of each block, for each name."""
-        return {name: [part[name] for part in parts] for name in parts[0]}
+        names = dict.fromkeys(name for part in parts for name in part)
+        return {name.removeprefix("made_"): [part[name] for part in parts if name in part] for name in names}
 
 
 def choose_reduction(reduce: Any) -> Reduction:
@@ -120,19 +122,21 @@ def choose_reduction(reduce: Any) -> Reduction:
     raise UsageError(f"reduce must be 'states', 'statistics', 'events' or a function of a block, not {reduce!r}")
 
 
-def with_outputs(module: Module, cases: Cases, x: Array, t: float) -> Array:
-    """States and outputs (n, k), as ``names_of`` has them."""
-    if not module.n_y:
-        return x
+def with_outputs(module: Module, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:
+    """States (n_x, k) at times (k,) with their outputs, as ``names_of`` has them; NaN where one cannot be evaluated."""
     further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
+    if not further:
+        return x
     y = np.full((module.n_y, x.shape[1]), np.nan)
     good = np.flatnonzero(np.isfinite(x).all(axis=0))
-    if cases.p.ndim == 1 and good.size:
-        u = cases.u if cases.u.ndim == 1 else cases.u[:, good]
-        y[:, good] = module.outputs(np.full(good.size, t), x[:, good], p=cases.p, u=u)
-    elif good.size:
+    if not good.size:
+        return np.concatenate([x, y[further]])
+    outputs, u = module.kernels.timed("outputs", nan=True), inputs_at(module, cases, plan, t, x)
+    if cases.p.ndim == 1:
+        y[:, good] = outputs(t[good], x[:, good], p=cases.p, u=np.ascontiguousarray(u[:, good]))
+    else:
         for k in good:
-            y[:, k] = module.outputs(t, x[:, k], **cases.column(int(k)))
+            y[:, k] = outputs(float(t[k]), x[:, k], p=cases.column(int(k))["p"], u=u[:, k])
     return np.concatenate([x, y[further]])
 
 
@@ -142,18 +146,16 @@ def names_of(module: Module) -> tuple[str, ...]:
 
 
 def summarise(values: Array) -> Arrays:
-    """Count (), mean, sum of squared deviations, least and greatest (n,) over the columns that are finite."""
-    good = values[:, np.isfinite(values).all(axis=0)]
-    count = good.shape[1]
-    nothing = np.full(len(values), np.nan)
-    if not count:
-        return {"count": np.array(0), "mean": nothing, "squares": nothing, "least": nothing, "greatest": nothing}
-    mean = good.mean(axis=1)
-    squares = ((good - mean[:, None]) ** 2).sum(axis=1)
-    return {
-        "count": np.array(count), "mean": mean, "squares": squares, "least": good.min(axis=1),
-        "greatest": good.max(axis=1),
-    }  # fmt: skip
+    """Count, mean, sum of squared deviations, least and greatest (n,) over what is finite in each row."""
+    finite = np.isfinite(values)
+    count = finite.sum(axis=1)
+    some = count > 0
+    mean = np.where(some, np.where(finite, values, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)
+    squares = (np.where(finite, values - np.where(some, mean, 0.0)[:, None], 0.0) ** 2).sum(axis=1)
+    least = np.where(finite, values, np.inf).min(axis=1, initial=np.inf)
+    greatest = np.where(finite, values, -np.inf).max(axis=1, initial=-np.inf)
+    extremes = {"least": np.where(some, least, np.nan), "greatest": np.where(some, greatest, np.nan)}
+    return {"count": count, "mean": mean, "squares": np.where(some, squares, np.nan), **extremes}
 
 
 def merge(one: Arrays, other: Arrays) -> Arrays:

@@ -23,7 +23,8 @@ from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
 from .cases import Cases, collect_cases
 from .ensemble import Ensemble
-from .reductions import Reduction, choose_reduction
+from .reductions import GRAIN, Reduction, choose_reduction
+from .store import stored_length
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -49,6 +50,7 @@ def simulate_many(
     store: str | Path | None = None,
     block: int | None = None,
     max_steps: int = 1_000_000,
+    step: float | None = None,
     progress: bool | None = None,
     **options: Any,
 ) -> Ensemble:
@@ -70,7 +72,7 @@ def simulate_many(
     count : int, optional
         Number of runs, where no array tells it.
     method : str, optional
-        DOP853, RK45 or RK23 run in compiled code; any other method of ``simulate`` runs one after the other.
+        DOP853, RK45, RK23, RK4 and Radau run in compiled code; other methods of ``simulate`` one run after the other.
     t_eval : (m,) array, optional
         Times to store; the end alone by default.
     events : str, list of str, or mapping of names to expressions, optional
@@ -92,6 +94,8 @@ def simulate_many(
         Runs handled together; chosen by default.
     max_steps : int
         Give up a run that takes more.
+    step : float, optional
+        Size of the steps of RK4 (s), and only of it.
     progress : bool, optional
         Show progress on stderr; by default for long runs on a terminal.
     **options
@@ -111,8 +115,9 @@ def simulate_many(
     check_names("option of simulate_many", options, OPTIONS)
     tables, constants = _separate(inputs)
     cases = collect_cases(module, initial, parameters, constants, count)
-    plan = _plan(module, span, method, t_eval, tables, max_steps, options, (events, keep_events))
     reduction = choose_reduction(reduce)
+    named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
+    plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, options, (events, keep_events))
     threads = _positive("threads", threads, os.cpu_count() or 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
     size = module.n_x * 8 * (1 if plan.t_eval is None else len(plan.t_eval))
@@ -125,7 +130,12 @@ def simulate_many(
 
             client = stack.enter_context(open_client(cluster))
             workers = count_workers(client)
-        parts = split(cases.count, _positive("block", block, choose_size(cases.count, size, workers or 1)))
+        length = _positive("block", block, choose_size(cases.count, size, workers or 1))
+        if store is not None and block is None:
+            length = stored_length(store) or length
+        if reduce == "statistics":  # whole grains, so that rounding does not depend on blocks
+            length = -(-length // GRAIN) * GRAIN
+        parts = split(cases.count, length)
         store_of = None if store is None else _open_store(store, module, cases, plan, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
@@ -159,12 +169,12 @@ def _gather(
     runs = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
     made = [{name: x for name, x in arrays.items() if not name.startswith("runs_")} for arrays, _ in ordered]
     words = {start + k: text for (start, _), (_, told) in zip(parts, ordered, strict=True) for k, text in told.items()}
-    return Ensemble(module, cases, plan, runs, reduction.join(made), words)
+    return Ensemble(module, cases, plan, runs, reduction.join(made), words, reduction)
 
 
 def _plan(
-    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any], max_steps: int,
-    options: dict[str, Any], watched: tuple[Any, int],
+    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any],
+    constants: tuple[str, ...], max_steps: int, step: float | None, options: dict[str, Any], watched: tuple[Any, int],
 ) -> Plan:  # fmt: skip
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     start, end = find_span(span, float(declared["end"]))
@@ -172,11 +182,15 @@ def _plan(
     if not isinstance(method, str):
         raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
     Forcing(module.layout, tables).require_finite()
+    if (method == "RK4") != (step is not None):
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    if step is not None:
+        options = {**options, "max_step": step, "first_step": step}
     chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     times = None if t_eval is None else ordered_times(t_eval, start, end)
     most, keep = _positive("max_steps", max_steps, 1), _positive("keep_events", watched[1], 1)
-    plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep)
+    plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep, constants)
     find_events(module, plan)
     return plan
 
@@ -187,7 +201,7 @@ def _separate(inputs: Any) -> tuple[dict[str, Any], Any]:
         return {}, inputs
     tables = {
         name: x for name, x in inputs.items()
-        if isinstance(x, (Signal, str)) or (isinstance(x, tuple) and len(x) == 2 and np.ndim(x[0]) == 1)
+        if isinstance(x, (Signal, str)) or (isinstance(x, (tuple, list)) and len(x) == 2 and np.ndim(x[0]) == 1)
     }  # fmt: skip
     for name, value in inputs.items():
         if callable(value) and name not in tables:
@@ -214,7 +228,7 @@ def _open_store(
 
     def _plain(x: Any) -> Any:
         if isinstance(x, Signal):
-            return [x.interpolation, x.times.tolist(), x.values.tolist()]
+            return [x.interpolation, x.corners, x.times.tolist(), x.values.tolist()]
         return x if isinstance(x, str) else np.asarray(x).tolist()
 
     file = getattr(eager(module.core), "__file__", None)
@@ -224,6 +238,19 @@ def _open_store(
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
         "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,
-        "reduce": getattr(reduce, "__qualname__", reduce) or "states", "block": parts[0][1],
+        "keep_events": plan.keep_events, "constants": list(plan.constants), "reduce": _identify(reduce),
+        "block": parts[0][1],
     }  # fmt: skip
     return Store(folder, identity)
+
+
+def _identify(reduce: Any) -> str:
+    """Which reduction it is; of a function, what it does."""
+    if not callable(reduce):
+        return str(reduce or "states")
+    code = getattr(reduce, "__code__", None)
+    if code is None:
+        return repr(type(reduce)) + repr(getattr(reduce, "__dict__", {}))
+    held = [cell.cell_contents for cell in reduce.__closure__ or ()]
+    parts = (reduce.__module__, reduce.__qualname__, code.co_code, code.co_consts, code.co_names, held)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()

@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -68,14 +69,22 @@ class Store:
     def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:
         """The arrays of a block, or None if it was not finished."""
         try:
-            with np.load(self._path(index), allow_pickle=False) as data:
+            with self._path(index).open("rb") as file, np.load(file, allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data.files}
         except FileNotFoundError:
             return None
-        except (ValueError, OSError, EOFError, KeyError) as error:
+        except (ValueError, OSError, EOFError, KeyError, BadZipFile) as error:
             raise UsageError(f"{self._path(index)} cannot be read: {error}; remove it to run its block again") from None
         words = json.loads(str(arrays.pop("words")))
         return arrays, {int(k): text for k, text in words.items()}
+
+
+def stored_length(folder: str | Path) -> int | None:
+    """Runs of a block of the ensemble that a folder holds; None if it holds none."""
+    try:
+        return int(json.loads((Path(folder) / "manifest.json").read_text(encoding="utf-8"))["block"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _write(path: Path, data: bytes) -> None:

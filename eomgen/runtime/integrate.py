@@ -191,7 +191,7 @@ def integrate(
                 break
         else:
             x, k, start = y[:, -1], k + 1, nodes[k + 1]
-    if crowded >= CROWD:
+    if crowded >= max(CROWD, 2 * len(events)):
         raise Events.crowded_near(start, resets, [event.name for event in events if event.action != GO_ON])
     joined = (
         pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None

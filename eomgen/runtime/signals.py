@@ -98,7 +98,8 @@ class Signal:
 
     def encode(self) -> tuple[int, Array, Array]:
         """Order, times and values as the compiled loop reads them."""
-        return self.order, self.times, self.coefficients if self.order == 3 else self.values
+        order = 2 if self.order == 0 and not self.corners else self.order  # read at t, inside a step
+        return order, self.times, self.coefficients if self.order == 3 else self.values
 
 
 class Lapse(NamedTuple):
@@ -242,7 +243,7 @@ class Forcing:
     def corners(self, start: float, end: float, every_jump: bool = False) -> list[float]:
         """Times strictly between start and end at which to restart the integrator, in its direction.
 
-        Where they are more than KINKS, only some; with ``every_jump`` still all those of tables of order 0.
+        Where they are more than KINKS, only some, unless ``every_jump``: compiled loops take any number.
         """
         low, high = min(start, end), max(start, end)
 
@@ -251,9 +252,8 @@ class Forcing:
             return sorted({float(t) for signal in signals for t in signal.kinks() if low < t < high})
 
         jumps, bends = found(True), found(False)
-        parts = [bends] if every_jump else [sorted({*jumps, *bends})]
-        kept = {t for part in parts for t in (part if len(part) <= KINKS else part[:: -(-len(part) // KINKS)])}
-        return sorted(kept | (set(jumps) if every_jump else set()), reverse=end < start)
+        every = sorted({*jumps, *bends}, reverse=end < start)
+        return every if every_jump or len(every) <= KINKS else every[:: -(-len(every) // KINKS)]
 
     def jacobian(self, t: float, x: Array, rhs: Callable[..., Array]) -> Array | None:
         """What inputs that depend on the state add to the Jacobian: df/du du/dx, by differences; None if nothing."""

@@ -6,7 +6,7 @@
 extern "C" {
 #endif
 
-#define EOMGEN_ABI 1
+#define EOMGEN_ABI 2
 
 /* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed). */
 enum {

@@ -51,8 +51,8 @@ cdef enum:
     WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
-if MODEL.abi != 1:
-    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 1: generate both again")
+if MODEL.abi != 2:
+    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 2: generate both again")
 
 metadata = MODEL.metadata.decode()
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])

@@ -290,6 +290,8 @@ cdef class Journey(Stepper):
 
     cdef int ask(self, double t, const double *y, double *g):
         cdef int k = 0
+        if self.raised is not None:
+            return 1
         try:
             x = copy(y, self.run.n)
             for function in self.outside:

@@ -34,6 +34,7 @@ KEYS = {
         "name", "method", "t", "names", "impulses", "energy_lost", "x", "rates_before", "rates_after", "constraints",
         "constraint_impulses",
     },
+    "consistent": {"name", "method", "t", "x", "rough", "change"},
     "sensitivity": {"name", "method", "t", "names", "held", "steps", "final", "files"},
 }  # fmt: skip
 
@@ -88,6 +89,21 @@ def test_no_equilibrium(call: Call, model_file) -> None:
     result = call("equilibrium", path, "--target", "numpy")
     assert result.code == 1
     assert "no equilibrium of 'fall' found from this guess: the generalized force along s is still -9.81" in result.err
+
+
+def test_consistent(call: Call) -> None:
+    words = ("consistent", CRANK, "--target", "numpy", "--json")
+    rough = ("--set", "theta=0.3", "--set", "B=-0.2", "--set", "s=0.4", "--set", "theta_dot=5")
+    held = call(*words, *rough, "--hold", "theta").json
+    assert held["x"]["theta"] == held["rough"]["theta"] == 0.3
+    theta, B, s = (held["x"][name] for name in ("theta", "B", "s"))
+    # r sin theta + l sin(theta + B) = 0 and s = r cos theta + l cos(theta + B) with r = 0.1, l = 0.35
+    assert abs(0.1 * np.sin(theta) + 0.35 * np.sin(theta + B)) < 1e-12
+    assert abs(s - 0.1 * np.cos(theta) - 0.35 * np.cos(theta + B)) < 1e-12
+    light, heavy = (abs(call(*words, *rough, "--weight", f"s={w}").json["change"]["s"]) for w in ("1e-4", "1e4"))
+    assert heavy < 0.1 * light
+    assert call("consistent", CRANK, "--weight", "s", "--target", "numpy").code == 2
+    assert "a rough state has" in call("consistent", CRANK, "--set", "C=1", "--target", "numpy").err
 
 
 def test_sensitivity(call: Call, tmp_path) -> None:

@@ -252,7 +252,8 @@ def test_functions_of_time_are_refused(crank: Any) -> None:
 
 def test_an_interrupt_is_honoured_soon(tmp_path: Path) -> None:
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import signal, sys; sys.path.insert(0, sys.argv[1])\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it\n"
         "from ensembles.conftest import compiled; from ensembles.test_simulate_many import TIGHT, angles\n"
         "mod = compiled('double_pendulum', 'cython'); print('ready', flush=True)\n"
         "mod.simulate_many(1e4, angles(4000), **TIGHT)"
@@ -260,12 +261,15 @@ def test_an_interrupt_is_honoured_soon(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(Path(__file__).parents[1])], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
-    assert process.stdout is not None
-    assert process.stdout.readline() == b"ready\n"
-    time.sleep(1.0)
-    start = time.perf_counter()
-    process.send_signal(signal.SIGINT)
-    errors = process.communicate(timeout=30)[1]
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"ready\n"
+        time.sleep(1.0)
+        start = time.perf_counter()
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=30)[1]
+    finally:
+        process.kill()
     assert time.perf_counter() - start < 5.0  # the machine may be busy
     assert process.returncode != 0
     assert b"KeyboardInterrupt" in errors
@@ -287,3 +291,104 @@ def test_what_an_ensemble_offers(pendulum: Any, tmp_path: Path) -> None:
     with pytest.raises(KeyError, match="theta2"):
         ensemble["theta3"]
     assert "6 runs" in repr(ensemble)
+
+
+def test_inputs_given_win_over_declared_signals_and_reach_the_outputs() -> None:
+    m = eg.Model("driven")
+    m.prismatic("s", m.ground, m.body("a", mass=2.0), axis="x")
+    m.torque("drive", "s", m.input("push", signal="5*sin(3*t)"))
+    m.input("other")
+    m.output("force", "push")
+    module = m.compile()
+    declared = module.simulate_many(2, {"s_dot": [0.0, 1.0]}, t_eval=[1.0, 2.0], **TIGHT)
+    np.testing.assert_allclose(declared["s_dot"][-1] - [0.0, 1.0], 5 / 3 * (1 - np.cos(6.0)) / 2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(declared["force"], 5 * np.sin([[3.0, 3.0], [6.0, 6.0]]), rtol=1e-12)
+    again = module.simulate(2, **declared.case(1), **TIGHT)
+    np.testing.assert_allclose(again["s_dot"][-1], declared["s_dot"][-1, 1], rtol=0, atol=1e-9)
+    constant = module.simulate_many(2, inputs={"push": [1.0, 3.0]}, **TIGHT)
+    np.testing.assert_allclose(constant["s_dot"], [1.0, 3.0], rtol=1e-9)
+    np.testing.assert_array_equal(constant["force"], [1.0, 3.0])
+    assert module.simulate(2, **constant.case(1), **TIGHT)["s_dot"][-1] == constant["s_dot"][1]
+    texts = module.simulate_many(2, {"s": [0.0, 1.0]}, inputs={"push": "10*t + s"}, t_eval=[2.0], **TIGHT)
+    np.testing.assert_allclose(texts["force"][0], 20.0 + texts["s"][0], rtol=1e-12)
+
+
+def test_outputs_of_a_run_that_an_event_ended_are_those_at_the_event(pendulum: Any) -> None:
+    m = eg.Model("falling", gravity=(0, -10, 0))
+    m.prismatic("h", m.ground, m.body("a", mass=1.0), axis="y")
+    m.output("when", "t")
+    module = m.compile()
+    floor = {"floor": {"expression": "h", "terminal": 1}}
+    ensemble = module.simulate_many(5, {"h": [1.25, 5.0, 1000.0]}, events=floor, **TIGHT)
+    np.testing.assert_allclose(ensemble["when"], [0.5, 1.0, 5.0], rtol=1e-9)
+    np.testing.assert_allclose(ensemble.to_pandas()["when"], [0.5, 1.0, 5.0], rtol=1e-9)
+    assert ensemble.summary()["when"]["least"] == pytest.approx(0.5)
+    np.testing.assert_array_equal(module.simulate(5, **ensemble.case(0), **TIGHT).t[-1], ensemble.t_end[0])
+    statistics = module.simulate_many(5, {"h": [1.25, 5.0, 1000.0]}, events=floor, reduce="statistics", **TIGHT)
+    assert statistics["when"] == pytest.approx((0.5 + 1.0 + 5.0) / 3)
+    for other in ("LSODA", "RK45"):
+        some = module.simulate_many(5, {"h": [1.25, 1000.0]}, events=floor, t_eval=[0.1, 4.0], method=other, **TIGHT)
+        np.testing.assert_allclose(some.t_end, [0.5, 5.0], rtol=1e-6)
+        np.testing.assert_allclose(some.samples[0], [[1.2, 999.95], [np.nan, 920.0]], rtol=1e-6)
+
+
+def test_an_output_that_cannot_be_evaluated_is_nan_in_its_run_alone() -> None:
+    m = eg.Model("rooted")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.output("root", "sqrt(s)")
+    module = m.compile()
+    starts = {"s": [4.0, -1.0, 9.0]}
+    np.testing.assert_array_equal(module.simulate_many(1, starts)["root"], [2.0, np.nan, 3.0])
+    made = module.simulate_many(1, starts, reduce="statistics")
+    row = {name: k for k, name in enumerate(made.names)}
+    assert made.reduced["count"][:, 0].tolist() == [3, 3, 2]
+    assert made.reduced["mean"][row["root"], 0] == 2.5
+    assert made.reduced["mean"][row["s"], 0] == 4.0
+
+
+def test_fixed_steps_and_runs_that_fail(pendulum: Any) -> None:
+    with pytest.raises(eg.UsageError, match="method RK4 needs step="):
+        pendulum.simulate_many(1, angles(3), method="RK4")
+    made = pendulum.simulate_many(1, angles(3), method="RK4", step=0.01)
+    assert (made.steps == 100).all()
+    alone = pendulum.simulate(1, **made.case(2), method="RK4", step=0.01)
+    np.testing.assert_array_equal(alone.x[:, -1], made.x[:, 2])
+    failed = pendulum.simulate_many(1, angles(3), max_steps=2)
+    assert np.isnan(failed["theta1"]).all()
+    assert np.isfinite(failed.reached).all()
+
+
+def test_any_name_serves_a_reduction_of_ones_own(pendulum: Any, tmp_path: Path) -> None:
+    def keep(block: Any) -> dict[str, Any]:
+        return {"mean": block.x.mean(), "x": block.x[0], "file": 1.0, "runs_t": block.t}
+
+    made = pendulum.simulate_many(1, angles(5), reduce=keep, store=tmp_path / "runs")
+    assert set(made.reduced) == {"mean", "x", "file", "runs_t"}
+    assert made.x is None
+    with pytest.raises(eg.UsageError, match="kept what its reduction made"):
+        made["theta1"]
+    with pytest.raises(eg.UsageError, match="belongs to another ensemble: reduce differ"):
+        pendulum.simulate_many(1, angles(5), reduce=lambda block: {"x": block.x[1]}, store=tmp_path / "runs")
+
+
+def test_what_a_thread_raises_comes_out() -> None:
+    from eomgen.ensembles.block import work
+
+    class Broken:
+        done = 0
+
+        def work(self) -> None:
+            raise MemoryError("no room")
+
+        def stop(self) -> None:
+            self.done = 1
+
+    with pytest.raises(MemoryError, match="no room"):
+        work(Broken(), 2, None)
+
+
+def test_statistics_have_the_same_bits_in_any_blocks(pendulum: Any) -> None:
+    made = [pendulum.simulate_many(1, angles(600), reduce="statistics", block=n).reduced for n in (1, 100, 300, 4096)]
+    for other in made[1:]:
+        for name, value in other.items():
+            np.testing.assert_array_equal(value, made[0][name])

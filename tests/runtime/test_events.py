@@ -280,3 +280,44 @@ def test_faults_are_told_with_their_lines(tmp_path: Path) -> None:
     other.event("hit", "h", restitution=1.5)
     with pytest.raises(eg.ModelError, match="no coordinate or velocity 'hdot'(.|\n)*1.5 is not between 0 and 1"):
         other.compile()
+
+
+def test_a_reset_at_the_very_end_and_at_a_corner() -> None:
+    m = eg.Model("kicked")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", m.input("u"))
+    m.event("kick", "t - 1", reset={"s_dot": "s_dot + 2"})
+    mod = m.compile()
+    assert mod.simulate(1.0)["s_dot"][-1] == 2.0
+    table = ([0.0, 1.0, 2.0], [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(mod.simulate(2.0, inputs={"u": table})["s_dot"][-1], 2.5, rtol=1e-9)
+
+
+def test_many_bodies_that_bounce_almost_together_are_no_zeno() -> None:
+    m = eg.Model("hail", gravity=(0, -10, 0))
+    for i in range(14):
+        m.prismatic(f"J{i}", m.ground, m.body(f"b{i}", mass=1.0), axis="y", coordinate=f"h{i}")
+        m.event(f"f{i}", f"h{i}", direction=-1, reset={f"h{i}_dot": f"-0.5*h{i}_dot"})
+    run = m.compile().simulate(0.6, {f"h{i}": 1 + 1e-12 * i for i in range(14)})
+    speeds = [run[f"h{i}_dot"][-1] for i in range(14)]
+    fall = np.sqrt(0.2)
+    np.testing.assert_allclose(speeds, 0.5 * 10 * fall - 10 * (0.6 - fall), rtol=1e-8)
+
+
+@pytest.mark.parametrize("corners", [True, False])
+def test_held_tables_with_and_without_corners(corners: bool) -> None:
+    m = eg.Model("held")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", m.input("u"))
+    signal = eg.Signal([0, 1, 2, 3], [0, 1, 5, 2], "zero-order", corners=corners)
+    run = m.compile().simulate(3, inputs={"u": signal}, max_step=0.01)
+    assert run["s_dot"][-1] == pytest.approx(6.0, abs=1e-9 if corners else 0.1)
+
+
+def test_a_long_linear_table_is_stepped_on_at_every_corner() -> None:
+    m = eg.Model("noisy")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", m.input("u"))
+    t, u = np.linspace(0, 3, 3001), np.random.default_rng(0).normal(size=3001)
+    run = m.compile().simulate(3, inputs={"u": (t, u)})
+    assert run["s_dot"][-1] == pytest.approx(np.trapezoid(u, t), abs=1e-12)

@@ -19,7 +19,7 @@ typedef struct {
 /* One input over time: u = value of a table at t, or constant where n is 0. Outside the table its end values hold. */
 typedef struct {
     int n;                /* points; 1 for a tape */
-    int order;            /* 0 holds the last value, 1 linear, 3 cubic */
+    int order;            /* 0 holds the last value, 1 linear, 3 cubic; 2 as 0, but read at t even inside a part */
     const double *times;  /* n, increasing */
     const double *values; /* n values; for order 3, 4 coefficients a point: value, slope, curvature / 2, third / 6 */
     const eomgen_tape *tape; /* an expression of t, x and parameters instead of a table, or NULL */

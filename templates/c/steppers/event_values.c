@@ -30,7 +30,11 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
 /* Rates of the values along the motion, by a short way along x'. */
 static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, double *slope)
 {
-    const double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs, h = 1e-5 * length;
+    double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs;
+    if (length == 0.0) { /* at the end of a part, where no step is chosen */
+        length = run->t != run->t_old ? run->t - run->t_old : run->direction * 1e-6 * fmax(fabs(run->t), 1.0);
+    }
+    const double h = 1e-5 * length;
     for (int i = 0; i < run->n; i++) {
         ev->y[i] = run->y[i] + h * run->f[i];
     }

@@ -61,7 +61,7 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
     ev->crowded = fabs(run->t - ev->last_reset) < CROWDED * j->span ? ev->crowded + 1 : 0;
     ev->last_reset = run->t;
     j->resets++;
-    return eomgen_depart(run, ev) || ev->crowded >= CROWD ? EOMGEN_ZENO : 0;
+    return eomgen_depart(run, ev) || ev->crowded >= (2 * ev->n > CROWD ? 2 * ev->n : CROWD) ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */
@@ -105,7 +105,12 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         keep_piece(method, run, j, t);
     }
     while (j->done < j->n_eval && run->direction * (j->t_eval[j->done] - t) <= 0.0) {
-        eomgen_between(method, run, j->t_eval[j->done], j->states + j->stored * run->n);
+        double *const row = j->states + j->stored * run->n;
+        if (j->t_eval[j->done] == run->t && !stop) {
+            memcpy(row, run->y, (size_t)run->n * sizeof(double));
+        } else {
+            eomgen_between(method, run, j->t_eval[j->done], row);
+        }
         j->times[j->stored++] = j->t_eval[j->done++];
     }
     if (stop) {

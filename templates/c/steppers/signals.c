@@ -22,7 +22,7 @@ double eomgen_table_value(const eomgen_signal *s, double t)
         }
     }
     const double x = t - s->times[low], *const v = s->values + low * size;
-    if (s->order == 0) {
+    if (s->order == 0 || s->order == 2) {
         return v[0];
     }
     if (s->order == 1) {
