@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EomgenError, UsageError
+from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
 from ..runtime.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
 from ..runtime.events import WAIT, Events
@@ -248,7 +248,7 @@ def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan
                 sign = 1.0 if plan.span[1] >= plan.span[0] else -1.0
                 there = sign * (plan.t_eval - run.t[-1]) <= 0.0
                 samples[:, there, k] = run.at(plan.t_eval[there]).x
-        except UsageError:
+        except (UsageError, MissingDependencyError):
             raise
         except EomgenError as error:
             status[k], block.words[k] = FAILED, str(error)

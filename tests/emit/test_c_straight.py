@@ -108,7 +108,7 @@ def test_null_result_is_not_wanted_and_nan_is_reported(systems, compiled):
 def test_the_table_describes_the_model(systems, compiled):
     system = systems.slider_crank()
     library = compiled(system)
-    assert library.table.abi == 1
+    assert library.table.abi == 2
     assert library.table.name == b"crank"
     assert library.metadata == system.program().metadata
     assert library.metadata["kernels"]["rhs"] == [6]
