@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from ..program import KERNELS, Block, Program
+from ..program.loops import LARGE
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files
 from .c_layout import driver_files, work_areas
@@ -112,8 +113,12 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
 
 
 def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
-    """Where in the work array the right-hand side leaves its state [q; v] on the constraints; 0 where it does not."""
+    """Where in the work array the right-hand side leaves its state [q; v] on the constraints; 0 where it does not.
+
+    Large mechanisms alone need it, to pass configurations of lost rank; others keep the steps of SciPy.
+    """
     closes = any(d.name == "rhs" for d in program.drivers) and program.has_loops and program.projects
+    closes = closes and program.sizes.n_v > LARGE
     return next(start for name, start, _ in areas if name == "X") if closes else 0
 
 
