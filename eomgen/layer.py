@@ -11,6 +11,7 @@ STEPPERS = (
     *("control", "signals", "tape"),
     *("plain", "rk4_step", "rk4"),
     *("lu", "newton", "radau", "radau_step"),
+    "taylor",
     *("event_values", "event_zero", "crossings", "loop"),
 )
 
@@ -24,7 +25,7 @@ LAYER = {
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
-    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
+    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23", "taylor_terms")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),

@@ -62,7 +62,10 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
 _TOLERANCE = click.FloatRange(min=0, min_open=True)
 _SOLVER = (
     click.option(
-        "--solver", metavar="NAME", callback=_find_solver, help="Integrator: DOP853, RK45, RK23, Radau, BDF or LSODA."
+        "--solver",
+        metavar="NAME",
+        callback=_find_solver,
+        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF or LSODA.",
     ),
     click.option("--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
     click.option("--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),

@@ -11,12 +11,13 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_blocks, lane_files
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
+from .c_series import series_file
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
 
 #: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h")
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_series.h", "eomgen_processor.h")
 
 
 def emit_c(program: Program) -> SourceSet:
@@ -33,7 +34,9 @@ def emit_c(program: Program) -> SourceSet:
     printed = _print(program)
     parts = distribute(program, printed)
     calls = used_calls(program)
+    series = series_file(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
+    context["series"] = bool(series)
     further = {
         f"{program.name}_part{k}.c": render(
             "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
@@ -46,6 +49,7 @@ def emit_c(program: Program) -> SourceSet:
             f"{program.name}.c": render("c/model.c.j2", context),
             **further,
             **lane_files(program, context),
+            **series,
             **function_files(program, calls),
             f"{program.name}.h": render("c/model.h.j2", context),
             **{name: read_template(f"c/{name}") for name in ("eomgen.h", *NUMBERS)},

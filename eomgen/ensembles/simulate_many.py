@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..runtime.compiled import can_run
 from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
@@ -72,7 +73,7 @@ def simulate_many(
     count : int, optional
         Number of runs, where no array tells it.
     method : str, optional
-        DOP853, RK45, RK23, RK4 and Radau run in compiled code; other methods of ``simulate`` one run after the other.
+        DOP853, RK45, RK23, RK4, Radau and Taylor run in compiled code; other methods of ``simulate`` one run after the other.
     t_eval : (m,) array, optional
         Times to store; the end alone by default.
     events : str, list of str, or mapping of names to expressions, optional
@@ -181,7 +182,9 @@ def _plan(
     method = declared["method"] if method is None else method
     if not isinstance(method, str):
         raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
-    Forcing(module.layout, tables).require_finite()
+    forcing = Forcing(module.layout, tables)
+    forcing.require_finite()
+    can_run(module, method, forcing)  # refuses what no other method stands in for
     if (method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     if step is not None:

@@ -36,8 +36,32 @@ MESSAGES = {
 
 
 def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
-    """Whether a run needs nothing but the module's own steppers."""
-    return method in getattr(module.core, "methods", ()) and not forcing.foreign
+    """Whether a run needs nothing but the module's own steppers.
+
+    Raises
+    ------
+    UsageError
+        Method Taylor where it cannot be: nobody else has it.
+    """
+    there = method in getattr(module.core, "methods", ())
+    if method == "Taylor":
+        if not there:
+            raise UsageError(no_series(module.name))
+        if not forcing.stepwise:
+            raise UsageError(
+                "method Taylor takes inputs that are constant between corners: numbers, and tables that hold their values "
+                '(interpolation "zero-order"); for others take DOP853'
+            )
+    return there and not forcing.foreign
+
+
+def no_series(name: str) -> str:
+    """Why a module has no Taylor method."""
+    return (
+        f"{name} has no Taylor series: the method is there with target='cython' for trees of bodies whose equations are "
+        "smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too long; take "
+        "DOP853"
+    )
 
 
 def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:

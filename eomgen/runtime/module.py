@@ -315,7 +315,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         return text(self)
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("DOP853", "RK45", "RK23", "Radau"):
+        if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
             from .steppers import find_solver
 
             return find_solver(self, name)

@@ -184,6 +184,12 @@ class Forcing:
         for index, formula in self.formulas.items():
             self.varying[index] = formula.function(module.p)
 
+    @property
+    def stepwise(self) -> bool:
+        """Whether all inputs are constant between corners."""
+        held = all(isinstance(s, Signal) and s.order == 0 and s.corners for s in self.varying.values())
+        return held and not self.formulas
+
     def encode(self) -> list[tuple[Any, ...]]:
         """The inputs that vary, as the compiled loop takes them."""
         tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal)]

@@ -70,7 +70,8 @@ def simulate(
         A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
         velocities) each step of the first three starts on the constraints where the last came near
-        them.  Implicit ones get the exact Jacobian.  RK4 takes steps of one size, in compiled code only.
+        them.  Implicit ones get the exact Jacobian.  In compiled code only: RK4, which takes steps of one size, and
+        Taylor, of orders up to 20 and without rejected steps, for smooth trees of a few bodies at tight tolerances.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional

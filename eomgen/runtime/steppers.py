@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UsageError
 from ..numeric.scales import Array
-from .compiled import stepper_options
+from .compiled import no_series, stepper_options
 from .late import eager
 from .names import require
 from .tolerances import IMPLICIT
@@ -22,6 +23,8 @@ def find_solver(module: Module, name: str) -> Any:
     core = eager(module.core)
     if name in getattr(core, "methods", ()):
         return solver_class(core, name)
+    if name == "Taylor":
+        raise UsageError(no_series(module.name))
     return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
 
 
@@ -30,21 +33,23 @@ def solver_class(core: Any, name: str) -> Any:
     """The OdeSolver subclass of a method: ``solve_ivp(module.rhs, span, x0, method=module.DOP853)``.
 
     It takes the same steps as SciPy's own to rounding.  Given any other function than the module's ``rhs``, or another
-    Jacobian than the module's, it is SciPy's own.  A failed evaluation shortens the step.
+    Jacobian than the module's, it is SciPy's own; SciPy has no Taylor.  A failed evaluation shortens the step.
 
     Parameters
     ----------
     core : Core
         Of a module with compiled steppers.
-    name : {'DOP853', 'RK45', 'RK23', 'Radau'}
+    name : {'DOP853', 'RK45', 'RK23', 'Radau', 'Taylor'}
 
     Raises
     ------
     MissingDependencyError
         SciPy is not installed.
+    UsageError
+        From the class: Taylor for another function than the module's ``rhs``.
     """
     scipy = require("scipy.integrate", "scipy", f"method {name}")
-    own: Any = getattr(scipy, name)
+    own: Any = getattr(scipy, name, _only_for_modules)
     rhs = core.timed
 
     class Solver(scipy.OdeSolver):  # type: ignore[name-defined, misc]
@@ -119,6 +124,11 @@ def solver_class(core: Any, name: str) -> Any:
 
     Solver.__name__ = Solver.__qualname__ = name
     return Solver
+
+
+def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
+    """In place of a class that SciPy does not have."""
+    raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
 def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:

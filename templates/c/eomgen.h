@@ -6,7 +6,7 @@
 extern "C" {
 #endif
 
-#define EOMGEN_ABI 2
+#define EOMGEN_ABI 3
 
 /* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed). */
 enum {
@@ -42,6 +42,14 @@ typedef struct {
     const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
 } eomgen_lanes;
 
+/* Taylor coefficients of the motion through x at t: row m of out, n_x doubles, is the derivative of order m over m!, for
+   m = 0 .. order. Returns a status, as above. */
+typedef struct {
+    int most;   /* the highest order */
+    int n_work; /* length of w */
+    int (*expand)(double t, const double *x, const double *u, const double *c, int order, double *out, double *w);
+} eomgen_series;
+
 typedef struct {
     int abi;
     const char *name;
@@ -55,6 +63,7 @@ typedef struct {
     const char *metadata; /* JSON: names, units, values */
     const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
     int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
+    const eomgen_series *series; /* NULL: none, as where the equations are not smooth or solve loops */
 } eomgen_model;
 
 /* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */

@@ -34,6 +34,8 @@ cdef extern from "eomgen.h" nogil:
         int (*usable)() noexcept nogil
         const eomgen_lane_function *kernels
     ctypedef const eomgen_lanes *eomgen_lanes_pointer
+    ctypedef struct eomgen_series:
+        int n_work
     ctypedef struct eomgen_model:
         int abi
         const char *name
@@ -43,6 +45,7 @@ cdef extern from "eomgen.h" nogil:
         const char *metadata
         const eomgen_lanes_pointer *lanes
         int closed_at
+        const eomgen_series *series
     const eomgen_model *eomgen_model_table() noexcept
 
 cdef enum:
@@ -51,8 +54,8 @@ cdef enum:
     WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
-if MODEL.abi != 2:
-    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 2: generate both again")
+if MODEL.abi != 3:
+    raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 3: generate both again")
 
 metadata = MODEL.metadata.decode()
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])

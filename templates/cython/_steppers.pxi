@@ -42,12 +42,14 @@ cdef extern from "eomgen_steppers.h" nogil:
         void *looker
         eomgen_function jacobian
         long differentiations, factorizations
+        const eomgen_series *series
         int stopped
     ctypedef struct eomgen_method:
         const char *name
-        int rows_K, rows_F, error_order, squares
+        int rows_K, rows_F, error_order, squares, expands
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
-    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau
+    const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor
+    long eomgen_further(const eomgen_method *, long, const eomgen_series *)
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
                      double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
@@ -57,10 +59,23 @@ cdef extern from "eomgen_steppers.h" nogil:
     const char **eomgen_operations
 
 ctypedef const eomgen_method *method_pointer
-cdef method_pointer[5] METHODS
+cdef method_pointer[6] METHODS
 METHODS[0], METHODS[1], METHODS[2] = &eomgen_dop853, &eomgen_rk45, &eomgen_rk23
-METHODS[3], METHODS[4] = &eomgen_rk4, &eomgen_radau
-methods = tuple([METHODS[i].name.decode() for i in range(5) if METHODS[i].squares == 0 or "jacobian" in names])
+METHODS[3], METHODS[4], METHODS[5] = &eomgen_rk4, &eomgen_radau, &eomgen_taylor
+
+
+cdef method_pointer find_method(str name) except NULL:
+    """The method of a name, if the model has what it needs."""
+    for i in range(6):
+        if METHODS[i].name.decode() == name and name in methods:
+            return METHODS[i]
+    raise ValueError(f"no method {name}")
+
+
+methods = tuple([
+    METHODS[i].name.decode() for i in range(6)
+    if (METHODS[i].squares == 0 or "jacobian" in names) and (not METHODS[i].expands or MODEL.series != NULL)
+])
 
 
 cdef class Tape:
@@ -197,14 +212,15 @@ cdef class Stepper:
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
-        self.method = METHODS[methods.index(method)]
+        self.method = find_method(method)
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
-            length += self.method.squares * n * n + 16 + n
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
+        self.run.series = MODEL.series
+        length += eomgen_further(self.method, n, MODEL.series)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -219,9 +235,7 @@ cdef class Stepper:
         run.next = run.failure_state + n
         run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
         run.K = run.next + n
-        run.F = run.K + n * self.method.rows_K
-        if self.method.squares > 0:
-            run.F += self.method.squares * n * n + 16 + n
+        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, MODEL.series)
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)

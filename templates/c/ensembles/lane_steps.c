@@ -12,7 +12,7 @@ enum { W = EOMGEN_WIDTH };
 typedef struct {
     eomgen_lane_function rhs;
     const eomgen_signal *signals;
-    int n_u, n;
+    int n_u, n, order; /* order: of a Taylor step */
     double rtol;
     const double *atol;
     real t, t_old, step, hold; /* hold: as in eomgen_run */

@@ -5,13 +5,30 @@
 
 #include "eomgen_steppers.h"
 
-void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
+int eomgen_look(eomgen_run *run)
 {
     if (--run->look_in == 0) {
         run->look_in = run->look(run->looker, &run->t);
         run->stopped = run->look_in <= 0;
     }
-    if (run->stopped) {
+    return run->stopped;
+}
+
+void eomgen_note(eomgen_run *run, int status, double t, const double *y)
+{
+    int finite = 1;
+    for (int i = 0; i < run->n; i++) {
+        finite = finite && isfinite(y[i]);
+    }
+    if (finite || run->failure == 0) { /* a state that an earlier failure made tells nothing */
+        run->failure = status, run->failure_time = t;
+        memcpy(run->failure_state, y, (size_t)run->n * sizeof(double));
+    }
+}
+
+void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
+{
+    if (eomgen_look(run)) {
         for (int i = 0; i < run->n; i++) {
             k[i] = NAN;
         }
@@ -25,15 +42,10 @@ void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
     if (status == 0) {
         return;
     }
-    int finite = 1;
     for (int i = 0; i < run->n; i++) {
-        finite = finite && isfinite(y[i]);
         k[i] = NAN;
     }
-    if (finite || run->failure == 0) { /* a state that an earlier failure made tells nothing */
-        run->failure = status, run->failure_time = t;
-        memcpy(run->failure_state, y, (size_t)run->n * sizeof(double));
-    }
+    eomgen_note(run, status, t, y);
 }
 
 static double stepper_norm(const double *x, const double *y, const eomgen_run *run)
@@ -80,7 +92,7 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
     run->interpolates = 0;
     eomgen_evaluate(run, run->t, run->y, run->f);
     keep_closed(run);
-    if (!(run->h_abs > 0.0)) {
+    if (!(run->h_abs > 0.0) && !method->expands) {
         run->h_abs = first_step(method, run);
     }
     if (method->begin != NULL) {

@@ -57,6 +57,8 @@ typedef struct {
     void *looker;
     eomgen_function jacobian;     /* of implicit methods */
     long differentiations, factorizations;
+    const eomgen_series *series;  /* of Taylor's method */
+    int order;                    /* of its next step */
     int stopped;                  /* look said so: results of evaluations are NaN from then on, and no step is taken */
 } eomgen_run;
 
@@ -72,11 +74,18 @@ typedef struct {
     void (*interpolate)(const eomgen_run *run, double t, double *y);
     int fixed; /* steps are all max_step long, but for the last */
     int squares; /* of implicit methods: n x n matrices after the rows in run->K, then 16 + n numbers */
+    int expands; /* takes the model's series, whose work follows the rows in run->K */
     void (*begin)(eomgen_run *run);
     int (*step)(eomgen_run *run); /* in place of attempt and error */
 } eomgen_method;
 
-extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau;
+/* Doubles that a method needs in run->K after its rows. */
+static inline long eomgen_further(const eomgen_method *method, long n, const eomgen_series *series)
+{
+    return (method->squares > 0 ? method->squares * n * n + 16 + n : 0) + (method->expands ? series->n_work : 0);
+}
+
+extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor;
 
 enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEPS = -104 };
 
@@ -93,6 +102,12 @@ static inline double eomgen_stretch(double error, int order)
 void eomgen_force(eomgen_run *run, double t, const double *y);
 extern const char *const eomgen_operations[]; /* names of the codes, then NULL */
 void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out);
+
+/* Look in if it is time, and say whether the run is stopped. */
+int eomgen_look(eomgen_run *run);
+
+/* Remember a failure at (t, y). */
+void eomgen_note(eomgen_run *run, int status, double t, const double *y);
 
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k);

@@ -1,0 +1,274 @@
+"""Stage emit: the terms of a right-hand side -> a C function of the Taylor coefficients of the motion.
+
+Coefficients are made order by order.  Those of a product of order k are a_0 b_k + a_k b_0 and a sum over lower orders only;
+these sums come first, all together and in vector registers, so that little is left to wait for each other.
+"""
+
+from __future__ import annotations
+
+from ..program import Program
+from ..program.series import MOST_ORDER, Series, Term, make_series
+from .angles import print_angles
+from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
+from .sources import render
+from .straight import references
+
+#: Doubles of one row of coefficients: sums may read a zero behind them.
+ROW = MOST_ORDER + 2
+#: Sums made in one loop: their partial sums fit in the registers.
+TOGETHER = 14
+
+
+def series_file(program: Program) -> dict[str, str]:
+    """``<name>_series.c``; none without a series."""
+    series = make_series(program)
+    if series is None:
+        return {}
+    block = next(b for b in program.blocks if b.name == "rhs")
+    printer = _Printer(series, references(program, block.inputs))
+    context = {
+        "name": program.name,
+        "n": len(series.rates),
+        "first": printer.first(),
+        "states": printer.states(),
+        "sums": printer.sums(),
+        "chain": printer.chain(),
+        "rates": printer.rates(),
+        "most": MOST_ORDER,
+        "n_work": printer.rows * ROW,
+        "kept": printer.kept,
+        "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
+    }
+    return {f"{program.name}_series.c": render("c/series.c.j2", context)}
+
+
+class _Printer:
+    """Statements of the order 0 and of order k; ``a3`` is the value of term 3, ``b3`` its coefficient of order k."""
+
+    def __init__(self, series: Series, texts: dict[int, str]) -> None:
+        self._series, self._terms, self._texts = series, series.terms, texts
+        self._places: dict[tuple[str, int], int] = {}  #: forward, weighted or reversed row of a term -> its place
+        self._pairs: dict[tuple[tuple[str, int], int], str] = {}  #: rows multiplied -> name of the sum
+        self._depth: dict[int, int] = {}  #: how many operations a coefficient waits for
+        self.kept: list[str] = []  #: statements before the orders: reciprocals
+        needed = self._needed()
+        self._lines = {i: self._rule(i, t) for i, t in enumerate(self._terms) if i in needed}
+        self.rows = len(self._places)
+
+    def _needed(self) -> set[int]:
+        """Terms that change and that x' is made of, with what their recurrences need, and all states."""
+        found = {i for i, t in enumerate(self._terms) if t.kind == "state"}
+        open_ends = list(self._series.rates)
+        while open_ends:
+            i = open_ends.pop()
+            term = self._terms[i]
+            if term.varies and (i not in found or term.kind == "state"):
+                found.add(i)
+                open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
+        return found
+
+    # what the recurrences are written with
+
+    def _row(self, kind: str, i: int) -> int:
+        return self._places.setdefault((kind, i), len(self._places))
+
+    def _sum(self, left: int, right: int, weighted: bool = False) -> str:
+        """Sum of left_j right_(k-j) for 0 < j < k, times j if weighted."""
+        row = ("weighted" if weighted else "forward", left)
+        if not weighted and (("forward", right), left) in self._pairs:
+            return self._pairs[("forward", right), left]
+        self._row(*row)
+        self._row("reversed", right)
+        return self._pairs.setdefault((row, right), f"s{len(self._pairs)}")
+
+    def _reciprocal(self, name: str, text: str) -> str:
+        self.kept.append(f"const real {name} = {text};")
+        return name
+
+    def _zero(self, i: int) -> str:
+        """The value of a term."""
+        term = self._terms[i]
+        if term.kind == "number":
+            return literal(term.value)
+        if term.kind == "time":
+            return "t"
+        return f"x[{int(term.value)}]" if term.kind == "state" else self._texts.get(term.node, f"a{i}")
+
+    def _rule(self, i: int, term: Term) -> str:
+        """The coefficient of order k of a term as a C expression; sums and rows it needs are noted."""
+        self._depth[i] = 1 + max((self._depth.get(k, 0) for k in term.operands), default=0)
+        rule = getattr(self, f"_{term.kind}", self._function)
+        return str(rule(i, term, *term.operands))
+
+    def _changes(self, i: int) -> bool:
+        return self._terms[i].varies
+
+    def _time(self, i: int, term: Term) -> str:
+        return "same(k == 1 ? 1.0 : 0.0)"
+
+    def _state(self, i: int, term: Term) -> str:
+        return f"f{int(term.value)}*inverse"
+
+    def _add(self, i: int, term: Term, p: int, q: int) -> str:
+        return " + ".join(f"b{k}" for k in (p, q) if self._changes(k))
+
+    def _sub(self, i: int, term: Term, p: int, q: int) -> str:
+        return f"b{p} - b{q}" if self._changes(p) and self._changes(q) else f"b{p}" if self._changes(p) else f"-b{q}"
+
+    def _neg(self, i: int, term: Term, p: int) -> str:
+        return f"-b{p}"
+
+    def _mul(self, i: int, term: Term, p: int, q: int) -> str:
+        if not (self._changes(p) and self._changes(q)):
+            return f"{self._zero(q)}*b{p}" if self._changes(p) else f"{self._zero(p)}*b{q}"
+        if p == q:
+            return f"{self._sum(p, p)} + 2.0*{self._zero(p)}*b{p}"
+        early, late = (p, q) if self._depth[p] <= self._depth[q] else (q, p)
+        return f"{self._sum(p, q)} + {self._zero(late)}*b{early} + {self._zero(early)}*b{late}"
+
+    def _div(self, i: int, term: Term, p: int, q: int) -> str:
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(q)}")
+        if not self._changes(q):
+            return f"b{p}*{inverse}"
+        rest, last = self._sum(i, q), f"a{i}*b{q}"
+        if not self._changes(p):
+            return f"-({rest} + {last})*{inverse}"
+        late = self._depth[q] > self._depth[p]
+        return f"(b{p} - {rest} - {last})*{inverse}" if late else f"(b{p} - ({rest} + {last}))*{inverse}"
+
+    def _sqrt(self, i: int, term: Term, p: int) -> str:
+        return f"(b{p} - {self._sum(i, i)})*{self._reciprocal(f'r{i}', f'0.5 / a{i}')}"
+
+    def _log(self, i: int, term: Term, p: int) -> str:
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(p)}")
+        return f"(b{p} - inverse*{self._sum(i, p, True)})*{inverse}"
+
+    def _pow(self, i: int, term: Term, p: int, q: int) -> str:
+        inverse, e = self._reciprocal(f"r{i}", f"1.0 / {self._zero(p)}"), self._zero(q)
+        weighted, plain = self._sum(p, i, True), self._sum(p, i)
+        return f"(({e} + 1.0)*inverse*{weighted} - {plain} + {e}*b{p}*a{i})*{inverse}"
+
+    def _function(self, i: int, term: Term, p: int) -> str:
+        """Those whose rate is the operand's times another term: exp, sin, cos, sinh, cosh, tan, tanh."""
+        other = i if term.kind == "exp" else term.other
+        text = f"inverse*{self._sum(p, other, True)} + b{p}*{self._zero(other)}"
+        return f"-({text})" if term.kind == "cos" else text
+
+    def _inverse(self, i: int, term: Term, p: int) -> str:
+        """Those whose rate is the operand's divided by another term: asin, acos, atan."""
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(term.other)}")
+        sign = "-" if term.kind == "acos" else ""
+        return f"({sign}b{p} - inverse*{self._sum(i, term.other, True)})*{inverse}"
+
+    _asin = _acos = _atan = _inverse
+
+    def _atan2(self, i: int, term: Term, y: int, x: int) -> str:
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(term.other)}")
+        sums, ends = f"-{self._sum(i, term.other, True)}", ""
+        if self._changes(y):
+            sums, ends = f"{self._sum(y, x, True)} {sums}", f" + b{y}*{self._zero(x)}"
+        if self._changes(x):
+            sums, ends = f"{sums} - {self._sum(x, y, True)}", f"{ends} - b{x}*{self._zero(y)}"
+        return f"(inverse*({sums}){ends})*{inverse}"
+
+    # the statements
+
+    def first(self) -> list[str]:
+        """Values of all terms, the angles' sin and cos together, and the beginnings of the rows."""
+        made = [i for i, t in enumerate(self._terms) if self._zero(i) == f"a{i}"]
+        late: set[int] = set()
+        angles: dict[int, int] = {}
+        for i in made:
+            operands, circular = self._terms[i].operands, self._terms[i].kind in ("sin", "cos")
+            if circular and late.isdisjoint(operands):
+                angles.setdefault(operands[0], len(angles))
+            if circular or not late.isdisjoint(operands):
+                late.add(i)
+        early = set(angles)
+        for i in reversed(made):
+            if i in early:
+                early.update(self._terms[i].operands)
+        lines = [self._value(i, {}) for i in made if i in early]
+        lines += print_angles([self._zero(i) for i in angles]) if angles else []
+        lines += [self._value(i, angles) for i in made if i not in early]
+        lines += [f"EOMGEN_REJECT({self._zero(i)} <= 0.0)" for i in self._series.checks]
+        for (kind, i), place in self._places.items():
+            if kind == "reversed":
+                lines.append(f"w[{place * ROW + MOST_ORDER}] = {self._real(i)};")
+            else:
+                lines.append(f"w[{place * ROW + 1}] = same(0.0);")
+        return [*lines, *(f"real f{k} = {self._real(i)};" for k, i in enumerate(self._series.rates))]
+
+    def _real(self, i: int) -> str:
+        text = self._zero(i)
+        return f"same({text})" if self._terms[i].kind == "number" else text
+
+    def _value(self, i: int, angles: dict[int, int]) -> str:
+        kind, operands = self._terms[i].kind, self._terms[i].operands
+        if kind in ("sin", "cos") and operands[0] in angles:
+            return f"const real a{i} = {'sines' if kind == 'sin' else 'cosines'}[{angles[operands[0]]}];"
+        numbers = all(self._terms[k].kind == "number" for k in operands)
+        show = self._zero if kind in ARITHMETIC and not numbers else self._real
+        texts = list(map(show, operands))
+        if kind in CONDITION_PATTERNS:
+            value = f"choose({CONDITION_PATTERNS[kind].format(*texts)}, same(1.0), same(0.0))"
+        else:
+            value = (
+                f"choose({texts[0]} != 0.0, {texts[1]}, {texts[2]})"
+                if kind == "select"
+                else PATTERNS[kind].format(*texts)
+            )
+        return f"const real a{i} = {value};"
+
+    def states(self) -> list[str]:
+        """Coefficients of order k of the states and of time."""
+        lines = []
+        for i, term in enumerate(self._terms):
+            if i in self._lines and term.kind in ("state", "time"):
+                lines.append(f"const real b{i} = {self._lines[i]};")
+                lines += [f"out[k*N + {int(term.value)}] = b{i};"] if term.kind == "state" else []
+        return lines
+
+    def sums(self) -> list[list[str]]:
+        """Loops over lower orders, some sums in each: the statement of one j, and what follows."""
+        pairs = list(self._pairs.items())
+        groups = []
+        for start in range(0, len(pairs), TOGETHER):
+            chosen = pairs[start : start + TOGETHER]
+            rows = dict.fromkeys(row for (left, right), _ in chosen for row in (left, ("reversed", right)))
+            names = {row: f"{row[0]}{row[1]}" for row in rows}
+            lines = [f"part p{name} = EMPTY;" for _, name in chosen]
+            lines.append("for (int j = 1; j < k; j += PARTS) {")
+            for row, name in names.items():
+                at = self._places[row] * ROW
+                where = f"{at + MOST_ORDER} - k + j" if row[0] == "reversed" else f"{at} + j"
+                lines.append(f"    const part {name} = PART(w + {where});")
+            lines += [f"    p{name} += {names[left]}*{names['reversed', right]};" for (left, right), name in chosen]
+            lines.append("}")
+            groups.append(lines + [f"const real {name} = TOTAL(p{name});" for _, name in chosen])
+        return groups
+
+    def chain(self) -> list[str]:
+        """Coefficients of order k of all other terms."""
+        lines = []
+        for i, text in self._lines.items():
+            if self._terms[i].kind not in ("state", "time"):
+                lines.append(f"const real b{i} = {text};")
+            lines += self._stores(i)
+        return lines
+
+    def _stores(self, i: int) -> list[str]:
+        """A coefficient of order k into its rows; a sum may read one behind the last."""
+        lines = []
+        for kind, text in (("forward", f"b{i}"), ("weighted", f"(double)k*b{i}"), ("reversed", f"b{i}")):
+            at = self._places.get((kind, i), -1) * ROW
+            if at >= 0 and kind == "reversed":
+                lines.append(f"w[{at + MOST_ORDER} - k] = {text};")
+            elif at >= 0:
+                lines += [f"w[{at} + k] = {text};", f"w[{at + 1} + k] = same(0.0);"]
+        return lines
+
+    def rates(self) -> list[str]:
+        """Coefficients of order k of x'."""
+        terms = self._terms
+        return [f"f{k} = {f'b{i}' if terms[i].varies else 'same(0.0)'};" for k, i in enumerate(self._series.rates)]

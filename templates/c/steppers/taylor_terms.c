@@ -1,0 +1,101 @@
+/* Taylor's method: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor
+   methods, Experimental Mathematics 14, 2005, section 3: the order by the tolerance, the step by the decay of the last two
+   terms, so that none is tried in vain. Rows of run->K are coefficients. */
+#ifndef EOMGEN_TAYLOR
+#define EOMGEN_TAYLOR
+enum { TAYLOR_LEAST = 4, TAYLOR_MOST = 20 };
+
+static int taylor_order(double rtol, int most)
+{
+    const int order = (int)ceil(1.0 - 0.5 * log(rtol));
+    most = most < TAYLOR_MOST ? most : TAYLOR_MOST;
+    return order < TAYLOR_LEAST ? TAYLOR_LEAST : order > most ? most : order;
+}
+
+/* log2 of a positive number, within 6e-5, and 2^a, within 1e-5 of it: enough for the size of a step, and quick. */
+static inline double taylor_log2(double a)
+{
+    uint64_t word;
+    memcpy(&word, &a, sizeof a);
+    const double exponent = (double)(int)((word >> 52) & 2047) - 1023.0;
+    word = (word & 0xfffffffffffffu) | 0x3ff0000000000000u;
+    memcpy(&a, &word, sizeof a);
+    a -= 1.0;
+    return exponent + a + a * (1.0 - a) * (0.44245418 + a * (-0.27016007 + a * (0.15202092 - a * 0.04584151)));
+}
+
+static inline double taylor_exp2(double a)
+{
+    const double whole = floor(a);
+    a -= whole;
+    const uint64_t word = (uint64_t)((int64_t)whole + 1023) << 52;
+    double power;
+    memcpy(&power, &word, sizeof power);
+    return power * (1.0 + a + a * (a - 1.0) * (0.30691046 + a * (0.06561149 + a * 0.01371135)));
+}
+
+/* The step in which terms of order p - 1 and p, of these sizes for a step of 1 in parts of the tolerance, both come down to
+   it, and some safety; NaN where one is not finite. */
+static inline double taylor_reach(double before, double last, int p)
+{
+    if (!(before + last < 1e300)) {
+        return NAN;
+    }
+    const double first = -taylor_log2(before) / (p - 1), second = -taylor_log2(last) / p;
+    return taylor_exp2((first < second ? first : second) - 1.0098865286222744 / (p - 1)); /* 0.7 / log(2) */
+}
+#endif
+
+/* The largest term of order m over all states, for a step of 1, in parts of the tolerance; NaN counts as the largest. */
+static real taylor_size(const RUN *run, int m)
+{
+    const real *const row = run->K + m * run->n;
+    real largest = same(0.0);
+    for (int i = 0; i < run->n; i++) {
+        const real part = abs_of(row[i]) / (run->atol[i] + abs_of(run->y[i]) * run->rtol);
+        largest = choose(part <= largest, largest, part);
+    }
+    return largest;
+}
+
+/* The polynomial at h from its start. */
+static void taylor_sum(const RUN *run, real h, real *restrict y)
+{
+    const int n = run->n;
+    const real *row = run->K + run->order * n;
+    for (int i = 0; i < n; i++) {
+        y[i] = row[i];
+    }
+    for (int m = run->order; m-- > 0;) {
+        row -= n;
+        for (int i = 0; i < n; i++) {
+            y[i] = y[i] * h + row[i];
+        }
+    }
+}
+
+/* Terms over the part of the step that has passed. */
+static void taylor_prepare(RUN *run)
+{
+    const int n = run->n;
+    real power = same(1.0);
+    for (int m = 1; m <= TAYLOR_MOST; m++) {
+        power = power * run->step;
+        for (int i = 0; i < n; i++) {
+            run->F[(m - 1) * n + i] = m <= run->order ? power * run->K[m * n + i] : same(0.0);
+        }
+    }
+}
+
+static void taylor_interpolate(const RUN *run, real t, real *y)
+{
+    const int n = run->n;
+    const real x = (t - run->t_old) / run->step;
+    for (int i = 0; i < n; i++) {
+        real sum = same(0.0);
+        for (int m = TAYLOR_MOST; m-- > 0;) {
+            sum = (sum + run->F[m * n + i]) * x;
+        }
+        y[i] = sum + run->y_old[i];
+    }
+}

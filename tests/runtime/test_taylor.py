@@ -1,0 +1,176 @@
+"""Taylor's method: every recurrence, steps without rejection, and what it shares with the other steppers."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import eomgen as eg
+
+#: Forces on a unit mass at x moving at v, each with an operation of its own, as text and for mpmath.
+FORCES = {
+    "products": ("-x*v*(1 + x) - x**3 - 2*v**2*x", lambda m, x, v, t: -x * v * (1 + x) - x**3 - 2 * v**2 * x),
+    "quotients": ("1/(2 + x) + v/(3 + x*v) - x/2", lambda m, x, v, t: 1 / (2 + x) + v / (3 + x * v) - x / 2),
+    "sqrt": ("-sqrt(1 + x**2 + v**2)", lambda m, x, v, t: -m.sqrt(1 + x**2 + v**2)),
+    "exp, log": ("exp(-x*v) - log(2 + x)", lambda m, x, v, t: m.exp(-x * v) - m.log(2 + x)),
+    "sin, cos": ("sin(x + v) - 2*cos(x*v)*x", lambda m, x, v, t: m.sin(x + v) - 2 * m.cos(x * v) * x),
+    "sin alone": ("-sin(3*x)", lambda m, x, v, t: -m.sin(3 * x)),
+    "tan": ("-tan(x/2) - 0.1*v", lambda m, x, v, t: -m.tan(x / 2) - v / 10),
+    "tanh": ("-tanh(2*x*(1 + v**2))", lambda m, x, v, t: -m.tanh(2 * x * (1 + v**2))),
+    "sinh, cosh": ("-sinh(x)/cosh(v/2)", lambda m, x, v, t: -m.sinh(x) / m.cosh(v / 2)),
+    "asin": ("-asin(0.4*x + 0.1*v)", lambda m, x, v, t: -m.asin(m.mpf(0.4) * x + m.mpf(0.1) * v)),
+    "acos": ("acos(0.3*x) - 2*x", lambda m, x, v, t: m.acos(m.mpf(0.3) * x) - 2 * x),
+    "atan": ("-atan(3*x*(1 + v))", lambda m, x, v, t: -m.atan(3 * x * (1 + v))),
+    "atan2": ("atan2(v, 2 + x) - x", lambda m, x, v, t: m.atan2(v, 2 + x) - x),
+    "atan2, one fixed": ("atan2(1, 2 + x) - atan2(x, 3)", lambda m, x, v, t: m.atan2(1, 2 + x) - m.atan2(x, 3)),
+    "real powers": ("(2 + x)**1.7 - (3 + v)**(-0.5) - 4", lambda m, x, v, t: (2 + x) ** m.mpf(1.7) - (3 + v) ** m.mpf(-0.5) - 4),
+    "powers through 0": ("-x**5 - v**3/7", lambda m, x, v, t: -(x**5) - v**3 / 7),
+    "a power below 0": ("(2 + x)**(-3) - x", lambda m, x, v, t: (2 + x) ** (-3) - x),
+    "time": ("sin(2*t)*x - t*v/5 - x", lambda m, x, v, t: m.sin(2 * t) * x - t * v / 5 - x),
+}  # fmt: skip
+
+
+NAMES = list(FORCES)
+START_OF_ALL = np.repeat([0.4, 0.3], len(FORCES))
+
+
+@pytest.fixture(scope="module")
+def masses() -> Any:
+    """A mass of 1 kg on a line for each force, in one model."""
+    m = eg.Model("masses")
+    for k, (text, _) in enumerate(FORCES.values()):
+        body = m.body(f"body{k}", mass=1.0)
+        m.prismatic(f"J{k}", m.ground, body, axis="x", coordinate=f"x{k}")
+        own = re.sub(r"\bx\b", f"x{k}", re.sub(r"\bv\b", f"x{k}_dot", text))
+        m.torque(f"F{k}", f"J{k}", own)
+    return m.compile()
+
+
+@pytest.fixture(scope="module")
+def motion(masses: Any) -> Any:
+    """All of them from x = 0.4 m, v = 0.3 m/s."""
+    return masses.simulate(
+        1.5, START_OF_ALL, method="Taylor", rtol=1e-13, atol=1e-15, t_eval=[0.7, 1.5], dense_output=True
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_recurrence(masses: Any, motion: Any, name: str) -> None:
+    """mpmath's integrator at 25 digits; nothing else watches what the last orders are."""
+    k, n = NAMES.index(name), masses.n_q
+    with mpmath.workdps(25):
+        force = FORCES[name][1]
+        exact = mpmath.odefun(
+            lambda t, y: [y[1], force(mpmath, y[0], y[1], t)],
+            0,
+            [mpmath.mpf(0.4), mpmath.mpf(0.3)],
+            tol=mpmath.mpf(1e-18),
+        )
+        for column, t in enumerate((0.7, 1.5)):
+            expected = np.array([float(y) for y in exact(t)])
+            assert np.abs(motion.x[[k, n + k], column] - expected).max() < 5e-13
+
+
+def test_values_between_the_steps_are_as_good(masses: Any, motion: Any) -> None:
+    times = np.linspace(0, 1.5, 37)
+    exact = masses.simulate(1.5, START_OF_ALL, method="Taylor", rtol=1e-13, atol=1e-15, t_eval=times).x
+    assert np.abs(motion.at(times).x - exact).max() < 1e-12
+
+
+@pytest.fixture(scope="module")
+def swing() -> Any:
+    return eg.load(Path("examples/double_pendulum.yaml")).compile()
+
+
+START = np.array([1.0, 0.3, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9, 1e-12])
+def test_the_error_follows_the_tolerance_in_few_steps(swing: Any, rtol: float) -> None:
+    exact = swing.simulate(3, START, rtol=1e-13, atol=1e-15).x[:, -1]
+    run = swing.simulate(3, START, method="Taylor", rtol=rtol, atol=rtol / 100)
+    assert np.abs(run.x[:, -1] - exact).max() < 20 * rtol + 1e-12
+    assert run.nfev == len(run.t)  # one series a step, and x' at the start; none is tried in vain
+    assert len(run.t) < 140
+
+
+def test_backwards_and_in_parts(swing: Any) -> None:
+    """Back to the start; a first step and a longest one are kept to."""
+    tight = {"method": "Taylor", "rtol": 1e-12, "atol": 1e-14}
+    there = swing.simulate((0, 2), START, **tight, max_step=0.05, first_step=1e-3)
+    assert np.diff(there.t).max() <= 0.05 + 1e-15 and abs(there.t[1] - 1e-3) < 1e-15
+    back = swing.simulate((2, 0), there.x[:, -1], **tight)
+    assert np.abs(back.x[:, -1] - START).max() < 1e-10
+
+
+def test_events_and_resets_are_found_on_its_polynomials() -> None:
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    body = m.body("ball", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="y", coordinate="h")
+    m.event("floor", "h", restitution=0.5)
+    mod = m.compile()
+    run = mod.simulate(1, {"h": 1.0}, method="Taylor")
+    fall = np.sqrt(2 / 9.81)
+    assert np.abs(run.t_events["floor"][:2] - [fall, 2 * fall]).max() < 1e-12
+
+
+def test_solve_ivp_takes_it(swing: Any) -> None:
+    found = solve_ivp(
+        swing.rhs, (0, 3), START, method=swing.Taylor, rtol=1e-11, atol=1e-13, dense_output=True,
+        events=lambda t, x: x[0],
+    )  # fmt: skip
+    ours = swing.simulate(3, START, method="Taylor", rtol=1e-11, atol=1e-13, t_eval=[1.234, 3.0], events=["theta1"])
+    assert np.abs(found.y[:, -1] - ours.x[:, -1]).max() < 1e-12
+    assert np.abs(found.sol(1.234) - ours.x[:, 0]).max() < 1e-12
+    assert np.abs(found.t_events[0] - ours.t_events["theta1"]).max() < 1e-10
+    with pytest.raises(eg.UsageError, match="takes the rhs of its module"):
+        solve_ivp(lambda t, x: -x, (0, 1), [1.0], method=swing.Taylor)
+
+
+def test_held_inputs_are_steps_and_others_refused() -> None:
+    m = eg.Model("cart")
+    body = m.body("cart", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.input("u")
+    m.torque("push", "J", "u - sin(s)")
+    mod = m.compile()
+    held = eg.Signal([0, 0.5, 1.2], [1.0, -1.0, 0.5], "zero-order")
+    tight = {"rtol": 1e-12, "atol": 1e-14, "inputs": {"u": held}}
+    assert np.abs(mod.simulate(2, method="Taylor", **tight).x[:, -1] - mod.simulate(2, **tight).x[:, -1]).max() < 1e-10
+    for given in ("sin(t)", ([0, 1], [0, 1]), lambda t, x: 1.0):
+        with pytest.raises(eg.UsageError, match="constant between corners"):
+            mod.simulate(1, inputs={"u": given}, method="Taylor")
+
+
+def test_models_without_series_say_so() -> None:
+    loops = eg.load(Path("examples/four_bar.yaml")).compile()
+    with pytest.raises(eg.UsageError, match="four_bar has no Taylor series"):
+        loops.simulate(1, method="Taylor")
+    with pytest.raises(eg.UsageError, match="no Taylor series"):
+        loops.Taylor  # noqa: B018
+    m = eg.Model("stop")
+    body = m.body("mass", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.torque("push", "J", "-max(s, 0)")
+    for target in ("cython", "numpy"):
+        with pytest.raises(eg.UsageError, match="no Taylor series"):
+            m.compile(target=target).simulate(1, method="Taylor")
+
+
+def test_failures_name_their_cause() -> None:
+    """A motion that ends in a finite time: x' = x^2 has 1/(1 - t)."""
+    m = eg.Model("burst")
+    body = m.body("mass", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.torque("push", "J", "2*s**3")  # s'' = 2 s^3, s = 1/(1 - t) from s = s' = 1
+    mod = m.compile()
+    run = mod.simulate(0.9, {"s": 1.0, "s_dot": 1.0}, method="Taylor", rtol=1e-12, atol=1e-14)
+    assert abs(run.x[0, -1] - 10) < 1e-9
+    with pytest.raises(eg.SimulationError, match="Taylor stopped at t = 1 s"):
+        mod.simulate(2, {"s": 1.0, "s_dot": 1.0}, method="Taylor")
