@@ -1,7 +1,7 @@
 """Stage program: the right-hand side -> terms whose Taylor coefficients along the motion follow from each other.
 
-Each operation has a recurrence for its coefficient of order k from lower ones of its result and those of its operands up to
-k: A. Griewank, A. Walther, Evaluating Derivatives, 2008, section 13.2; A. Jorba, M. Zou, Experimental Mathematics 14, 2005.
+Each operation has a recurrence for its coefficient of order k, from lower ones and its operands' up to k:
+A. Griewank, A. Walther, Evaluating Derivatives, 2008, section 13.2; A. Jorba, M. Zou, Exp. Mathematics 14, 2005.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.
 MOST_ORDER = 20
-#: Right-hand sides of more terms have no series: compiling it takes longer than it saves.
-MOST_TERMS = 4000
+#: Right-hand sides of more terms have no series: DOP853 is faster then, as work grows with the square of the order.
+MOST_TERMS = 600
 #: Integer powers up to this are products.
 MOST_FACTORS = 16
 #: Functions whose rates are made of each other; each needs the other.

@@ -49,8 +49,8 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
             raise UsageError(no_series(module.name))
         if not forcing.stepwise:
             raise UsageError(
-                "method Taylor takes inputs that are constant between corners: numbers, and tables that hold their values "
-                '(interpolation "zero-order"); for others take DOP853'
+                "method Taylor takes inputs that are constant between corners: numbers, and tables that hold their "
+                'values (interpolation "zero-order"); for others take DOP853'
             )
     return there and not forcing.foreign
 
@@ -58,9 +58,9 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
 def no_series(name: str) -> str:
     """Why a module has no Taylor method."""
     return (
-        f"{name} has no Taylor series: the method is there with target='cython' for trees of bodies whose equations are "
-        "smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too long; take "
-        "DOP853"
+        f"{name} has no Taylor series: the method is there with target='cython' for trees of bodies whose equations "
+        "are smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too long; "
+        "take DOP853"
     )
 
 

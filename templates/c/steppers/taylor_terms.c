@@ -53,7 +53,7 @@ static real taylor_size(const RUN *run, int m)
     real largest = same(0.0);
     for (int i = 0; i < run->n; i++) {
         const real part = abs_of(row[i]) / (run->atol[i] + abs_of(run->y[i]) * run->rtol);
-        largest = choose(part <= largest, largest, part);
+        largest = choose((part <= largest) | (largest != largest), largest, part);
     }
     return largest;
 }
