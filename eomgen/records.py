@@ -8,7 +8,7 @@ made without compiling.  Fields, defaults, ``replace``, ``fields``, equality, ha
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass
@@ -22,7 +22,7 @@ else:
 
 
 def _freeze(kind: type) -> type:
-    made = dataclasses.dataclass(init=False, repr=False, eq=False)(kind)
+    made: Any = dataclasses.dataclass(init=False, repr=False, eq=False)(kind)
     fields = dataclasses.fields(made)
     if not all(field.init and field.compare and field.hash is None for field in fields):
         raise TypeError(f"a field of {kind.__qualname__} needs the standard library's dataclass")
@@ -55,11 +55,10 @@ def _freeze(kind: type) -> type:
     for method in (__repr__, __eq__, __hash__):
         if own.get(method.__name__) is None:  # Python itself sets __hash__ to None beside an __eq__
             setattr(made, method.__name__, method)
-    for method in (__setattr__, __delattr__):
-        setattr(made, method.__name__, method)
+    made.__setattr__, made.__delattr__ = __setattr__, __delattr__
     if "__init__" not in own:
-        setattr(made, "__init__", _Init(made, fields))
-    return made
+        made.__init__ = _Init(made, fields)
+    return cast("type", made)
 
 
 class _Init:
@@ -70,7 +69,7 @@ class _Init:
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
         if vars(self.kind).get("__init__") is self:
-            setattr(self.kind, "__init__", _compile_init(self.kind, self.fields))
+            self.kind.__init__ = _compile_init(self.kind, self.fields)
         return vars(self.kind)["__init__"].__get__(instance, owner)
 
 
@@ -84,8 +83,8 @@ def _compile_init(kind: type, fields: tuple[dataclasses.Field[Any], ...]) -> Any
             body[field.name] = dataclasses.field(default_factory=field.default_factory)
     if hasattr(kind, "__post_init__"):
         body["__post_init__"] = None
-    body |= {"__doc__": "", "__module__": kind.__module__}
-    twin = dataclasses.dataclass(frozen=True, repr=False, eq=False)(type(kind.__name__, (), body))
+    body |= {"__doc__": kind.__doc__ or kind.__name__, "__module__": kind.__module__}
+    twin: Any = dataclasses.dataclass(frozen=True, repr=False, eq=False)(type(kind.__name__, (), body))
     made = vars(twin)["__init__"]
     made.__qualname__ = f"{kind.__qualname__}.__init__"
     return made

@@ -168,21 +168,21 @@ def _build(
     product: str, objects: Callable[[], list[str]], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
     """Compile every file, meanwhile make the further objects, link, publish."""
-    tell: Callable[[str], Any] = progress or (lambda line: None)
     with cache.attempt(key) as directory:
         folder = directory / "sources"
         folder.mkdir(mode=0o700)
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
         files = {file: Path("sources", file) for file in flags if file}
-        compile_and_link(directory, name, files, flags, product, compiler, options.jobs, objects, tell)
+        compile_and_link(directory, name, files, flags, product, compiler, options.jobs, objects, progress)
         recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
 def compile_and_link(
     directory: Path, name: str, files: Mapping[str, Path], flags: Mapping[str, Sequence[str]], product: str,
-    compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[str]] = list, tell: Progress = str,
+    compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[str]] = list,
+    tell: Progress | None = None,
 ) -> None:  # fmt: skip
     """Compile C files into a library.
 
@@ -207,14 +207,15 @@ def compile_and_link(
         Told what is being done.
     """
     compiled = {file: f"{file}.o" for file in files}
+    say: Callable[[str], Any] = tell or (lambda line: None)
 
     def compile_one(file: str) -> None:
-        tell(f"compiling {file}")
+        say(f"compiling {file}")
         command = [*compiler.command, *flags[file], "-c", str(files[file]), "-o", compiled[file]]
         _command(command, directory, directory / files[file])
 
     further = _run_all(compile_one, list(files), jobs or os.cpu_count() or 1, objects)
-    tell(f"linking {name}")
+    say(f"linking {name}")
     words = [*compiler.command, *compiled.values(), *further, "-o", product, *flags[""]]
     _command(words, directory, directory / product)
     for file in compiled.values():

@@ -86,7 +86,7 @@ def _build(
     words = ["-DEOMGEN_LATE", *(w for w in words if not w.startswith("-DEOMGEN_LANES=")), f"-DEOMGEN_LANES={width}"]
     called = [file for file in sources if file.startswith((f"{built.name}_tables.", f"{built.name}_native_"))]
     files = [*lane_files(sources), *(file for file in called if file.endswith(".c"))]
-    flags = {**{file: words for file in files}, "": recipe["flags"][""]}
+    flags = {**dict.fromkeys(files, words), "": recipe["flags"][""]}
     with cache.attempt(key) as directory:
         product = f"{built.name}_lanes.so"
         compile_and_link(directory, built.name, {file: sources[file] for file in files}, flags, product, compiler)

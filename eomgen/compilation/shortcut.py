@@ -39,7 +39,8 @@ class Shortcut:
     """
 
     def __init__(self, fingerprint: str | None, options: Options) -> None:
-        self.cache, self.note = Cache(cache_directory()), None
+        self.cache = Cache(cache_directory())
+        self.note: Path | None = None
         if fingerprint is None or options.native:  # what "native" means takes the compiler as long to say
             return
         compiler = find_compiler(options.compiler)
@@ -48,7 +49,7 @@ class Shortcut:
             "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
             "lanes": lane_width(),
         }  # fmt: skip
-        self.note: Path | None = self.cache.shortcuts / compute_key(parts)
+        self.note = self.cache.shortcuts / compute_key(parts)
 
     def find(self) -> Artifact | None:
         """The build, if it was noted and is there."""

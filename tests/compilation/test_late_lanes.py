@@ -194,7 +194,9 @@ def test_of_an_entry_that_is_gone_they_go_plainly(write: Any) -> None:
 def test_a_compiler_that_fails_is_quoted(write: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compiler = tmp_path / "cc"
     gcc = find_compiler().path
-    compiler.write_text(f'#!/bin/sh\ncase "$*" in *-DEOMGEN_LATE*) echo not today >&2; exit 1;; esac\nexec {gcc} "$@"\n')
+    compiler.write_text(
+        f'#!/bin/sh\ncase "$*" in *-DEOMGEN_LATE*) echo not today >&2; exit 1;; esac\nexec {gcc} "$@"\n'
+    )
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
     goes_plainly(eg.load(write("fails")).compile(), "not today")
