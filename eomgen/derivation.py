@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from .kinematics import Kinematics
 from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .kinematics.state import acceleration_name
+from .records import dataclass
 
 if TYPE_CHECKING:
     from .program.choice import Choice

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .graph.vectors import Mat3, Vec3
+from .records import dataclass
 
 GROUND = -1
 

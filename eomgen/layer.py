@@ -19,6 +19,7 @@ STEPPERS = (
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
     "_batches.pxi": ("cython/_batches.pxi",),
+    "_calls.pxi": ("cython/_calls.pxi",),
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "_journeys.pxi": ("cython/_journeys.pxi",),

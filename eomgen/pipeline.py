@@ -213,11 +213,10 @@ def _load(
     seconds: dict[str, float] | None = None,
 ) -> Core:
     """Emit, compile and load."""
-    from .emit import emit_c, emit_numpy
-
     seconds = {} if seconds is None else seconds
     if target == "numpy":
         from .compilation.numpy_module import load_numpy
+        from .emit import emit_numpy
         from .emit.numpy_functions import twins
 
         if options:
@@ -228,18 +227,28 @@ def _load(
             return cast("Core", load_numpy(sources, equations.name, twins(program)))
     from .compilation import Options, compile_sources, load_core
     from .compilation.native_faults import blame_source
+    from .compilation.shortcut import Shortcut
+    from .program.fingerprint import fingerprint
 
     allowed = Options.__dataclass_fields__
     unknown = [name for name in options if name not in allowed]
     if unknown:
         raise UsageError(f"no option {', '.join(unknown)}; there are: {', '.join(allowed)}")
+    chosen = Options(**options)
     with _timed(seconds, "emit"):
-        sources = emit_c(program)
+        shortcut = Shortcut(fingerprint(program), chosen)
+        artifact = shortcut.find()
+        if artifact is None:
+            from .emit import emit_c
+
+            sources = emit_c(program)
     with _timed(seconds, "compile"):
-        try:
-            artifact = compile_sources(sources, equations.name, Options(**options))
-        except ToolchainError as error:
-            raise blame_source(error, equations.kinematics.graph.functions.values()) or error from None
+        if artifact is None:
+            try:
+                artifact = compile_sources(sources, equations.name, chosen)
+            except ToolchainError as error:
+                raise blame_source(error, equations.kinematics.graph.functions.values()) or error from None
+            shortcut.keep(artifact)
     with _timed(seconds, "load"):
         return cast("Core", load_core(artifact))
 

@@ -17,7 +17,7 @@ from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
 from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags
-from .processor import choose_lanes
+from .processor import choose_lanes, lane_files
 
 Progress = Callable[[str], None]
 
@@ -85,7 +85,9 @@ def compile_sources(
     headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
     sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
-    flags = _plan(sources, options, compiler, width, extension=True)
+    late = lane_files(sources) if options.lanes is None and not options.native else {}
+    now = {file: text for file, text in sources.items() if file not in late}
+    flags = _plan(now, options, compiler, 0 if late else width, extension=True)
     parts = {
         "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
         "layer": describe_layer(layer, headers, compiler),
@@ -166,27 +168,58 @@ def _build(
     product: str, objects: Callable[[], list[str]], options: Options, compiler: CompilerInfo, progress: Progress | None,
 ) -> CacheEntry:  # fmt: skip
     """Compile every file, meanwhile make the further objects, link, publish."""
-    tell: Callable[[str], Any] = progress or (lambda line: None)
     with cache.attempt(key) as directory:
         folder = directory / "sources"
         folder.mkdir(mode=0o700)
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
-        files = [file for file in flags if file]
-        compiled = [f"{file}.o" for file in files]
-
-        def compile_one(file: str) -> None:
-            tell(f"compiling {file}")
-            command = [*compiler.command, *flags[file], "-c", f"sources/{file}", "-o", f"{file}.o"]
-            _command(command, directory, folder / file)
-
-        further = _run_all(compile_one, files, options.jobs or os.cpu_count() or 1, objects)
-        tell(f"linking {name}")
-        _command([*compiler.command, *compiled, *further, "-o", product, *flags[""]], directory, directory / product)
-        for file in compiled:
-            (directory / file).unlink()
+        files = {file: Path("sources", file) for file in flags if file}
+        compile_and_link(directory, name, files, flags, product, compiler, options.jobs, objects, progress)
         recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
         return cache.publish(directory, key, kind, name, product, recipe)
+
+
+def compile_and_link(
+    directory: Path, name: str, files: Mapping[str, Path], flags: Mapping[str, Sequence[str]], product: str,
+    compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[str]] = list,
+    tell: Progress | None = None,
+) -> None:  # fmt: skip
+    """Compile C files into a library.
+
+    Parameters
+    ----------
+    directory : Path
+        Where to work; of what is made nothing but the product stays there.
+    name : str
+        Of the model.
+    files : mapping of str to Path
+        Name and place of every C file.
+    flags : mapping of str to sequence of str
+        Of each of them by name, and under "" those of the linker.
+    product : str
+        Name of the library.
+    compiler : CompilerInfo
+    jobs : int, optional
+        Files compiled at a time.
+    objects : callable, optional
+        Makes further object files meanwhile.
+    tell : callable, optional
+        Told what is being done.
+    """
+    compiled = {file: f"{file}.o" for file in files}
+    say: Callable[[str], Any] = tell or (lambda line: None)
+
+    def compile_one(file: str) -> None:
+        say(f"compiling {file}")
+        command = [*compiler.command, *flags[file], "-c", str(files[file]), "-o", compiled[file]]
+        _command(command, directory, directory / files[file])
+
+    further = _run_all(compile_one, list(files), jobs or os.cpu_count() or 1, objects)
+    say(f"linking {name}")
+    words = [*compiler.command, *compiled.values(), *further, "-o", product, *flags[""]]
+    _command(words, directory, directory / product)
+    for file in compiled.values():
+        (directory / file).unlink()
 
 
 def _run_all(

@@ -95,6 +95,11 @@ class Cache:
     def _attempts(self) -> Path:
         return self.root / "attempts"
 
+    @property
+    def shortcuts(self) -> Path:
+        """Folder of notes that tell keys of builds; see :mod:`.shortcut`."""
+        return self.root / "shortcuts"
+
     def find(self, key: str) -> CacheEntry | None:
         """The entry of a key if it is there and every file is as it was published; notes that it was used."""
         directory = self._entries / key
@@ -222,6 +227,7 @@ class Cache:
                 total -= entry.size
                 removed.append(entry)
         self.sweep()
+        self._forget()
         return removed
 
     def clear(self) -> int:
@@ -230,7 +236,15 @@ class Cache:
         for directory in directories:
             self._remove(directory)
         self.sweep()
+        self._forget()
         return len(directories)
+
+    def _forget(self) -> None:
+        """Remove the notes of builds that are gone."""
+        for note in self.shortcuts.iterdir() if self.shortcuts.is_dir() else ():
+            with suppress(OSError, ValueError):
+                if not (self._entries / note.read_text(encoding="ascii")).is_dir():
+                    note.unlink()
 
     def sweep(self, grace: float = GRACE) -> int:
         """Remove the attempts that nobody has touched for `grace` seconds; returns their number."""

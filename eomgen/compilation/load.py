@@ -6,7 +6,9 @@ import importlib.machinery
 import importlib.util
 import sys
 import threading
+from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from ..errors import ToolchainError
 from .build import Artifact
@@ -51,5 +53,17 @@ def load_core(artifact: Artifact) -> ModuleType:
                 f"the compiled model {artifact.path} cannot be loaded: {error}. If it has gone, compile again; else "
                 "clear the cache first"
             ) from error
+        offer_lanes(module, artifact.path)
         sys.modules[name] = module
         return module
+
+
+def offer_lanes(core: Any, file: Path) -> None:
+    """Let a core from the cache have its lanes when a batch first needs them."""
+
+    def find() -> int:
+        from .late_lanes import find_lanes  # rarely needed
+
+        return find_lanes(file)
+
+    core.offer_lanes(find)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import platform
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 
 from ..errors import UsageError
@@ -30,6 +30,11 @@ def _is_x86() -> bool:
     return platform.machine().lower() in ("x86_64", "amd64")
 
 
+def lane_files(files: Iterable[str]) -> dict[str, int]:
+    """The lane files among these, with their widths."""
+    return {file: int(found[1]) for file in files if (found := re.search(r"_lanes(\d+)\.c$", file))}
+
+
 def choose_lanes(sources: Mapping[str, str], wanted: int | None = None) -> tuple[dict[str, str], int]:
     """Leave out the lane files of other widths than the one wanted, by default that of this processor.
 
@@ -47,6 +52,6 @@ def choose_lanes(sources: Mapping[str, str], wanted: int | None = None) -> tuple
     if wanted in (4, 8) and not _is_x86():
         raise UsageError(f"lanes must be None, 0 or 2 on {platform.machine()}, not {wanted}")
     width = lane_width() if wanted is None else wanted
-    widths = {file: int(found[1]) for file in sources if (found := re.search(r"_lanes(\d+)\.c$", file))}
+    widths = lane_files(sources)
     kept = {file: text for file, text in sources.items() if widths.get(file, width) == width}
     return kept, width if width in widths.values() else 0

@@ -7,12 +7,12 @@ held as symbols under their own names; the kinematics stage replaces those of cu
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 
 POSITION, VELOCITY = "position", "velocity"
 

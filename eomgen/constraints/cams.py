@@ -9,11 +9,11 @@ sqrt(r^2 + r'^2) (Norton, Cam Design and Manufacturing Handbook, ch. 7; Litvin a
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, sqrt
+from ..records import dataclass
 from .base import Condition, Constraint, View
 from .profiles import Profile
 

@@ -7,13 +7,13 @@ Mechanical Systems, sec. 3.5); velocity and acceleration follow from the derivat
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Condition, Constraint, View
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ..graph.core import Expr, atan2, cos, sin
 from ..graph.differentiate import jvp
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
+from ..records import dataclass
 
 TRIALS = 5
 CLOSE = 1e-9

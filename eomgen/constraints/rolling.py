@@ -7,13 +7,13 @@ ch. I; Goldstein, Classical Mechanics, sec. 1.3): two equations that cannot be i
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import VELOCITY, Condition, Constraint, View
 
 #: What is wrong where the lowest point of a disc is not defined.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ..frames import Frame, Marker
@@ -11,6 +11,7 @@ from ..graph import vectors as vec
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
+from ..records import dataclass
 from .checks import check_names, unknown_key
 from .description import Entry, items
 from .fields import JOINT, JOINT_DATA, JOINT_OPTIONS, KINDS, MOTION, Field, joint_fields

@@ -10,12 +10,12 @@ import importlib.util
 import os
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..graph.functions import Function, NativeCode
 from ..numeric.functions import Orders, Twin, up_to
+from ..records import dataclass
 from .description import Entry, items
 from .names import fault_of_name
 from .native_signature import find_signature

@@ -9,13 +9,14 @@ as a symbol named like ``vx(rod.tip)`` whose meaning is in :attr:`Mechanism.quan
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from ..errors import ModelError, Problem
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .description import place_of
 
 if TYPE_CHECKING:

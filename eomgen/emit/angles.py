@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from ..graph.core import Graph
+from ..records import dataclass
 from .straight import Piece
 
 CIRCULAR = ("sin", "cos")

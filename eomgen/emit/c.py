@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 from ..program import KERNELS, Block, Program
 from ..program.loops import LARGE
 from .c_functions import declarations, function_files, used_calls
-from .c_lanes import lane_blocks, lane_files
+from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
 from .c_series import series_file
@@ -31,6 +32,8 @@ def emit_c(program: Program) -> SourceSet:
         further files ``<name>_part1.c``, ..., so that they can be compiled side by side; tables stand in
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
+    in_lanes = lane_kernels(program)
+    program = replace(program, metadata={**program.metadata, "lanes": in_lanes})
     printed = _print(program)
     parts = distribute(program, printed)
     calls = used_calls(program)
@@ -65,7 +68,7 @@ def _print(program: Program) -> list[Printed]:
 
 
 def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
-    twins, in_lanes = program.twins, lane_blocks(program)
+    twins, in_lanes = program.twins, program.metadata["lanes"]
     areas, n_work = work_areas(program, max((p.work for p in printed[1:]), default=0))
     n_const = len(program.parameters) + len(program.hoisted) + printed[0].work
     sizes = program.sizes
@@ -101,7 +104,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
             {
                 "name": k.name,
                 "call": f"{twins.get(k.name, k.name)}_block" if isinstance(k, Block) else f"{k.name}_driver",
-                "lanes": twins.get(k.name, k.name) in in_lanes,
+                "lanes": k.name in in_lanes,
                 "n_in": k.n_in,
                 "n_out": k.n_out,
                 "ports": [port.name for port in k.ports],

@@ -29,6 +29,12 @@ def lane_blocks(program: Program) -> dict[str, Block]:
     return {b.name: b for b in program.blocks if b.name in wanted & public}
 
 
+def lane_kernels(program: Program) -> list[str]:
+    """Names of the public functions that have lanes."""
+    blocks, twins = lane_blocks(program), program.twins
+    return [k.name for k in program.kernels if twins.get(k.name, k.name) in blocks]
+
+
 def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     """The header with the text of the functions, and a file for each width; none without such functions."""
     blocks = lane_blocks(program)

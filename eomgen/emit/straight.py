@@ -6,12 +6,12 @@ Language-independent; :mod:`.c_text` and :mod:`.numpy_text` print the pieces.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
 from ..graph.traverse import LEAVES
 from ..program import Program
+from ..records import dataclass
 
 CONDITIONS = frozenset({"lt", "le", "eq", "not", "and", "or"})
 

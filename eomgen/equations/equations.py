@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
 from ..kinematics.turned import Turned
+from ..records import dataclass
 
 Rows = tuple[tuple[Expr, ...], ...]
 

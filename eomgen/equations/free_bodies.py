@@ -7,7 +7,6 @@ body axes, so that A_k = X A_p + S a + S' v + V_k x S v, and I A_k + V_k x* I V_
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ..describe.mechanism import JointSpec
 from ..frames import GROUND, Frame
@@ -18,6 +17,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.inertia import Wrench
 from ..kinematics.loads import applied_wrenches, drive_inertias
+from ..records import dataclass
 
 Rows = tuple[tuple[Expr, ...], ...]
 

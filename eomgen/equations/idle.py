@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
+from ..records import dataclass
 
 FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of a message
 

@@ -8,7 +8,6 @@ freedom is released one column of its motion subspace at a time, which eliminate
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ..frames import GROUND
 from ..graph import vectors as vec
@@ -23,6 +22,7 @@ from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inerti
 from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
 from ..kinematics.turned import Block, falling, turn_back, turn_forces, turn_links
+from ..records import dataclass
 from .equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]

@@ -6,12 +6,12 @@ A force element sees the mechanism's motion through a :class:`View`, which the k
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 
 
 class View(Protocol):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Force, Load, MarkerLoad, View
 
 Row6 = tuple[Expr, Expr, Expr, Expr, Expr, Expr]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Force, Load, MarkerLoad, View
 from .friction import Friction
 from .normal_laws import HuntCrossley

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Force, Load, MarkerLoad, View
 from .paths import Line, Path
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
+from ..records import dataclass
 from .base import Force, Load, View
 from .paths import Path
 

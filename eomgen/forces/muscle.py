@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph.core import Expr, sin, sqrt
+from ..records import dataclass
 from .base import Force, Load, View
 from .paths import Path
 

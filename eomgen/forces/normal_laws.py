@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..graph.core import Expr
+from ..records import dataclass
 from .branches import beyond_zero
 
 #: Names of the formulas for the dissipation from a coefficient of restitution; see :func:`dissipation_of`.

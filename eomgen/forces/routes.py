@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Load, MarkerLoad, View
 from .branches import where
 from .paths import Line, Path

@@ -7,11 +7,11 @@ one argument, ``map(1,0)`` the derivative of ``map`` along its first.  The chain
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ModelError, Problem
 from ..numeric.functions import Curve, Orders, Surface, Twin
+from ..records import dataclass
 
 if TYPE_CHECKING:
     from .core import Graph

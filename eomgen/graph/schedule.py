@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
+from ..records import dataclass
 from .core import Expr, Graph
 from .traverse import LEAVES, common_graph, reachable
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 
 
 class Coordinate(NamedTuple):

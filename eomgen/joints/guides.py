@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph import vectors as vec
@@ -12,6 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .base import Closure, Coordinate, Joint, Shape
 from .rotations import euler, euler_rates
 

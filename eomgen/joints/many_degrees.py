@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .base import Closure, Coordinate, Joint
 from .closures import along, parallel_axes, same_orientation
 from .rotations import about, unit

@@ -6,12 +6,12 @@ They have no coordinates and always close a loop (Shabana, ch. 7: basic constrai
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .base import Closure, Joint
 from .closures import along, parallel_axes, same_orientation
 

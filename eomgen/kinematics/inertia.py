@@ -5,13 +5,12 @@ Written so that few operations are left: a turn about a coordinate axis touches 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..describe.mechanism import Body
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 
 Wrench = tuple[Vec3, Vec3]  # moment about the origin, force
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cached_property
 
 from ..describe.mechanism import Mechanism
@@ -16,6 +16,7 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from ..joints.rods import Distance, RevoluteSpherical
+from ..records import dataclass
 from .couplings import couple
 from .flaws import find_flaws
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..describe.mechanism import JointSpec, Mechanism
@@ -11,6 +10,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute, symbols_of
+from ..records import dataclass
 from .state import State
 from .tree import Poses
 from .turns import sum_of_turns

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import get_close_matches
 
 import numpy as np
@@ -26,6 +26,7 @@ from ..numeric.assembly import RESTARTS
 from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
+from ..records import dataclass
 from .candidates import rate_candidates
 from .driving import close_driven, follow_drivers
 from .flaws import require_finite

@@ -8,12 +8,13 @@ distances) instead.  For a planar chain these are absolute angles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, cos, sin
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .inertia import SpatialInertia, Wrench
 from .rates import JointRates
 from .tree import Link, Twist, link_twists

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jvp
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .kinematics import Kinematics
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -12,6 +12,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
+from ..records import dataclass
 from .kinematics import Kinematics
 from .mobility import Mobility
 from .notes import find_notes

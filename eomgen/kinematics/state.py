@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 from ..describe.mechanism import Mechanism
@@ -12,6 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian
 from ..joints import Ball
 from ..joints.rotations import parameter_rates
+from ..records import dataclass
 from .topology import Topology
 
 

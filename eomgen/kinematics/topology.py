@@ -9,13 +9,13 @@ always cut, joints that cannot be cut (a point on a curve) never.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from ..constraints import CoordinateDriver
 from ..describe.checks import UNHELD
 from ..describe.mechanism import JointSpec, Mechanism
 from ..errors import ModelError
 from ..frames import GROUND
+from ..records import dataclass
 
 
 @dataclass(frozen=True)

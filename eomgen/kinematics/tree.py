@@ -6,13 +6,12 @@ in link axes at the link's origin (Featherstone, RBDA, ch. 2, with body coordina
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .inertia import SpatialInertia, body_inertia
 from .topology import Topology
 

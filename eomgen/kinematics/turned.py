@@ -10,13 +10,14 @@ such a joint falls freely: gravity is left out of h and added to v'.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .kinematics import Kinematics
 from .tree import Link
 

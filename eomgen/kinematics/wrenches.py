@@ -8,7 +8,6 @@ moment about the body's origin).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +18,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
+from ..records import dataclass
 from .couplings import couple
 from .kinematics import Kinematics
 from .motion import Motion

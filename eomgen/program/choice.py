@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from ..equations import METHODS, TreeEquations
 from ..graph.count import count
 from ..kinematics import Kinematics
+from ..records import dataclass
 from .factor import factoring_operations, factorize, is_unrolled, solve
 from .program import Limits
 

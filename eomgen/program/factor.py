@@ -8,9 +8,9 @@ reciprocal per pivot, and zeros of M that the pattern does not know fold as ever
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ..graph.core import Expr
+from ..records import dataclass
 
 #: A pivot at most this part of its own diagonal entry means that no inertia is behind some motion.
 SINGULAR = 1e-13

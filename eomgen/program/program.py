@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import prod
 from typing import Any
 
 from ..equations.equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
+from ..records import dataclass
 from .kernels import Sizes
 
 #: Blocks that only trees have whose accelerations are known without their mass matrix.

@@ -7,9 +7,9 @@ cost the same each, however many there are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from ..graph.core import Expr
+from ..records import dataclass
 
 Row = dict[int, Expr]  #: column -> entry; zeros left out
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from ..equations.equations import LinearSystem
 from ..equations.slopes import ForceSlopes
@@ -11,6 +10,7 @@ from ..errors import UsageError
 from ..graph.core import Expr, Graph
 from ..kinematics.turned import Turned
 from ..kinematics.wrenches import JointWrenches
+from ..records import dataclass
 
 Row = tuple[Expr, ...]
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from ..errors import Problem
+from ..records import dataclass
 from .placement import IDENTITY, NOTHING, Inertia, Placement
 from .ties import Tie
 

@@ -6,8 +6,9 @@ A tie holds y = a0 + a1 x + a2 x^2 + ..., where y and x are sums of factors time
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
+
+from ..records import dataclass
 
 Parts = tuple[tuple[str, float], ...]
 

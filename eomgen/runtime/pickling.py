@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module, machinery, util
 from pathlib import Path
 from types import ModuleType
@@ -84,5 +85,16 @@ def _find_core(name: str, file: str) -> ModuleType:
     if core is None:
         raise ToolchainError(f"the compiled code of the pickled module is gone: {file}; compile the model again")
     loader.exec_module(core)
+    if compiled:
+        core.offer_lanes(partial(_find_lanes, path))
     sys.modules[name] = core
     return core
+
+
+def _find_lanes(file: Path) -> int:
+    """The lanes of a module in the cache; 0 where there is no eomgen, as for a module that came with its own."""
+    try:
+        late = import_module("eomgen.compilation.late_lanes")
+    except ImportError:
+        return 0
+    return int(late.find_lanes(file))

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Vec3
+from ..records import dataclass
 
 
 class Dimension(NamedTuple):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar
 
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
+from ..records import dataclass
 from .base import Dimension, Solid
 
 

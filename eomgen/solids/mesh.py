@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from ..errors import UsageError
+from ..records import dataclass
 
 SIZE = 200_000_000  #: bytes of a file
 

@@ -11,12 +11,16 @@ otherwise. So any number of threads may call one object at once. Only ``failure`
 of any thread. Batches and long kernels run without the GIL.
 """
 cimport numpy as cnp
+from cpython.object cimport PyObject
 from cpython.pycapsule cimport PyCapsule_New
 from libc.math cimport NAN
 from libc.stdint cimport uintptr_t
 from libc.string cimport memcmp, memcpy
 
 import json
+from sys import intern
+from _thread import allocate_lock
+
 import numpy as np
 cnp.import_array()
 
@@ -52,6 +56,7 @@ cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
     WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
+    MANY = 4096  # columns after which lanes that must be compiled first are worth it
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
 if MODEL.abi != 3:
@@ -139,6 +144,8 @@ cdef class Context:
 include "_batches.pxi"
 include "_lanes.pxi"
 
+ctypedef object (*vectorcall)(object, PyObject *const *, size_t, PyObject *)
+
 
 cdef class Kernel:
     """A kernel of the model, bound to a context; call it with arrays.
@@ -164,11 +171,11 @@ cdef class Kernel:
         With ``nan``: (status, t, x) of the last failure. Assign None to forget it.
     """
 
+    cdef vectorcall quick
     cdef eomgen_function call
-    cdef eomgen_lane_function lanes
     cdef const double *c
     cdef const double *u
-    cdef int n_in, n_out, ndim
+    cdef int index, n_in, n_out, ndim
     cdef bint long, tolerant
     cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
     cdef object fail, error
@@ -176,11 +183,11 @@ cdef class Kernel:
     cdef public object failure
 
     def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
-        cdef int index = find(name, error)
+        enable_quick_calls(self)
+        self.index = find(name, error)
         self.name, self.context, self.fail, self.nan, self.error = name, context, fail, bool(nan), error
-        self.call = MODEL.kernels[index].call
-        self.lanes = LANES.kernels[index] if LANES != NULL else NULL
-        self.n_in, self.n_out = MODEL.kernels[index].n_in, MODEL.kernels[index].n_out
+        self.call = MODEL.kernels[self.index].call
+        self.n_in, self.n_out = MODEL.kernels[self.index].n_in, MODEL.kernels[self.index].n_out
         self.c = <const double *>cnp.PyArray_DATA(context.c)
         self.u = <const double *>cnp.PyArray_DATA(context.u)
         self.tolerant = nan
@@ -273,8 +280,10 @@ cdef class Kernel:
         cdef cnp.ndarray result = self.target(out, held, columns)
         cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
         cdef cnp.npy_intp plain = length_of_all
-        if columns >= 0 and self.lanes != NULL:
-            batch.lanes = self.lanes
+        if columns >= 0 and LATE is not None:
+            self.wait_for_lanes(columns)
+        if columns >= 0 and LANES != NULL and LANES.kernels[self.index] != NULL:
+            batch.lanes = LANES.kernels[self.index]
             length_of_all += WIDEST + LANES.width * (plain + 1 + MODEL.n_const)
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
@@ -294,6 +303,15 @@ cdef class Kernel:
         if out is not None and out is not result:
             out[...] = result
         return result if out is None else out
+
+    cdef int wait_for_lanes(self, cnp.npy_intp columns) except -1:
+        """Count columns that lanes could take, and have the lanes made when there were many."""
+        global BATCHED
+        if self.name in IN_LANES:
+            BATCHED += columns
+            if BATCHED >= MANY:
+                take_lanes()
+        return 0
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):
         """Describe an input of shape (n,) or (n, k) by a piece; columns is k, -1 for a vector, -2 while unknown."""
@@ -328,34 +346,7 @@ cdef class Kernel:
         return cnp.PyArray_EMPTY(ndim, dims, cnp.NPY_DOUBLE, 0)
 
 
-cdef class Timed(Kernel):
-    """A kernel of time and state: ``f(t, x, p=None, u=None, out=None)``."""
-
-    def __call__(self, t, x, p=None, u=None, out=None):
-        """Evaluate at time t, a float or (k,), and state x, (n,) or (n, k) for k states as columns.
-
-        p (n_p,) and u, (n_u,) or (n_u, k), replace the context's; out is a float64 array of the result's shape,
-        ``shape`` or ``(*shape, k)``.
-        """
-        return self.evaluate(t, x, p, u, out)
-
-
-cdef class State(Kernel):
-    """A kernel of the state alone: ``f(x, p=None, u=None, out=None, t=0.0)``."""
-
-    def __call__(self, x, p=None, u=None, out=None, t=0.0):
-        """Evaluate at state x; arguments as for Timed."""
-        return self.evaluate(t, x, p, u, out)
-
-
-cdef class Motion(Kernel):
-    """A kernel of coordinates, velocities, accelerations: ``f(q, v, a, p=None, u=None, out=None, t=0.0)``."""
-
-    def __call__(self, q, v, a, p=None, u=None, out=None, t=0.0):
-        """Evaluate at q (n_q,), v and a (n_v,), or with a last axis k; other arguments as for Timed."""
-        cdef int n_v = _FACTS.get("n_v", self.n_in // 3)
-        return self.general(t, [("q", self.n_in - 2 * n_v, q), ("v", n_v, v), ("a", n_v, a)], p, u, out)
-
+include "_calls.pxi"
 
 context, timed, state, motion = Context, Timed, State, Motion
 

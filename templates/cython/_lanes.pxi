@@ -14,6 +14,38 @@ cdef const eomgen_lanes *find_lanes() noexcept:
 cdef const eomgen_lanes *LANES = find_lanes()
 lane_width = 1 if LANES == NULL else LANES.width  # states that batches take at a time
 
+# Lanes that are not in this library yet: `LATE` makes or finds the library that has them and gives the address of their
+# table, or 0. A model whose runs are single ones never pays for them.
+cdef object LATE = None
+cdef object LATE_TURN = allocate_lock()
+cdef cnp.npy_intp BATCHED = 0  # columns evaluated without lanes
+cdef frozenset IN_LANES = frozenset(_FACTS.get("lanes", ()))
+
+
+def offer_lanes(find):
+    """Have ``find()`` called for lanes when they are needed; it gives the address of an eomgen_lanes, or 0."""
+    global LATE
+    if LANES == NULL and IN_LANES:
+        LATE = find
+
+
+def take_lanes():
+    """Have the lanes that were offered now; other threads that want them wait."""
+    global LANES, LATE, lane_width
+    cdef const eomgen_lanes *found
+    with LATE_TURN:
+        if LATE is None:
+            return
+        try:
+            found = <const eomgen_lanes *><uintptr_t>LATE()
+        except Exception:
+            LATE = None  # not again and again; after an interrupt it is tried again
+            raise
+        LATE = None
+        if found != NULL and found.usable():
+            lane_width = found.width
+            LANES = found
+
 
 cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp last, int width,
                         double *target) noexcept nogil:

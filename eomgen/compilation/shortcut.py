@@ -1,0 +1,102 @@
+"""Shortcut: a program that was compiled before -> its Artifact, without writing its sources again.
+
+Sources follow from the program, from the code that writes them and from the templates; flags from the options, the
+compiler and the code that chooses them.  A note in the cache under the digest of all of these tells the key of the
+build.  It is no more than a hint where to look: the entry itself is checked as ever.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from .build import Artifact
+from .cache import Cache, cache_directory, compute_key
+from .compiler import find_compiler
+from .cython_layer import describe_interpreter
+from .options import Options
+from .processor import lane_width
+
+#: What sources, layer and flags follow from, apart from the program: packages and modules of eomgen.
+WRITERS = ("graph", "numeric", "program", "emit", "compilation", "templates", "layer.py")
+
+
+class Shortcut:
+    """Where the build of a program is noted.
+
+    Parameters
+    ----------
+    fingerprint : str or None
+        Of the program; None: nothing is looked up or noted.
+    options : Options
+    """
+
+    def __init__(self, fingerprint: str | None, options: Options) -> None:
+        self.cache = Cache(cache_directory())
+        self.note: Path | None = None
+        if fingerprint is None or options.native:  # what "native" means takes the compiler as long to say
+            return
+        compiler = find_compiler(options.compiler)
+        parts = {
+            "kind": "shortcut", "program": fingerprint, "writers": digest_writers(), "options": asdict(options),
+            "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
+            "lanes": lane_width(),
+        }  # fmt: skip
+        self.note = self.cache.shortcuts / compute_key(parts)
+
+    def find(self) -> Artifact | None:
+        """The build, if it was noted and is there."""
+        start = time.perf_counter()
+        if self.note is None:
+            return None
+        try:
+            key = self.note.read_text(encoding="ascii")
+        except (OSError, ValueError):
+            return None
+        entry = self.cache.find(key) if len(key) == 64 and key.isalnum() else None
+        if entry is None or entry.kind != "extension":
+            return None
+        return Artifact(entry.product, entry.key, entry.directory, time.perf_counter() - start, True, entry.name)
+
+    def keep(self, artifact: Artifact) -> None:
+        """Note a build; a cache that cannot be written still serves."""
+        if self.note is None:
+            return
+        with suppress(OSError):
+            self.note.parent.mkdir(mode=0o700, exist_ok=True)
+            attempt = self.note.with_name(f".{self.note.name}.{os.getpid()}")
+            attempt.write_text(artifact.key, encoding="ascii")
+            os.replace(attempt, self.note)
+
+
+@cache
+def digest_writers() -> str:
+    """SHA-256 of the code and templates that sources, layer and flags follow from."""
+    found = hashlib.sha256()
+    for path in _files():
+        text = path.read_bytes()
+        found.update(f"{path.parent.name}/{path.name} {len(text)}\n".encode())
+        found.update(text)
+    return found.hexdigest()
+
+
+def _files() -> Iterator[Path]:
+    root = Path(__file__).parents[1]
+    for name in WRITERS:
+        if name.endswith(".py"):
+            yield root / name
+        else:
+            place = Path(import_module("eomgen.templates").__path__[0]) if name == "templates" else root / name
+            yield from sorted(
+                Path(folder, file)
+                for folder, _, files in os.walk(place)
+                for file in files
+                if not folder.endswith("__pycache__")
+            )

@@ -1,0 +1,130 @@
+"""Programs that were compiled before are found without writing their sources; others never."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen import pipeline
+from eomgen.compilation import Cache, Options, shortcut
+from eomgen.program.fingerprint import fingerprint
+from eomgen.runtime.late import eager
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "two_link_manipulator.yaml"
+RUN = """
+import sys
+import eomgen as eg
+module = eg.load(sys.argv[1]).compile()
+print(module.core.core.__file__, "jinja2" in sys.modules)
+"""
+
+
+def model(name: str, old: str = "", new: str = "") -> Any:
+    text = EXAMPLE.read_text().replace("two_link_manipulator", f"short_{name}")
+    assert old in text
+    return text.replace(old, new, 1) if old else text
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Any:
+    def write(text: str) -> Path:
+        file = tmp_path / "model.yaml"
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def compiled(file: Path) -> tuple[str, bool]:
+    """File of the code, and whether it had to be written; in a process of its own."""
+    done = subprocess.run([sys.executable, "-c", RUN, str(file)], capture_output=True, text=True, check=True)
+    place, written = done.stdout.split()
+    return place, written == "True"
+
+
+def test_a_second_run_writes_nothing(write: Any, cache: Cache) -> None:
+    file = write(model("again"))
+    place, written = compiled(file)
+    assert written
+    assert compiled(file) == (place, False)
+    for note in cache.shortcuts.iterdir():  # notes that lead nowhere, or elsewhere, are not followed
+        note.write_text("0" * 64)
+    assert compiled(file) == (place, True)
+    for note in cache.shortcuts.iterdir():
+        note.write_text("../../nowhere")
+    assert compiled(file) == (place, True)
+    assert compiled(file) == (place, False)
+    Path(place).write_bytes(b"damaged")
+    assert compiled(file) == (place, True)
+    assert eg.load(file).compile().rhs(0.0, np.zeros(4)).shape == (4,)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("value: 0.5", "value: 0.75"), ("doc: Two-link", "doc: Three-link"), ("[0, -g, 0]", "[g, 0, 0]")]
+)
+def test_what_changes_the_sources_changes_the_fingerprint(write: Any, old: str, new: str) -> None:
+    first = fingerprint(pipeline.build(eg.load(write(model("change"))).derive()))
+    again = fingerprint(pipeline.build(eg.load(write(model("change"))).derive()))
+    other = fingerprint(pipeline.build(eg.load(write(model("change", old, new))).derive()))
+    assert first == again
+    assert first is not None
+    assert other not in (None, first)
+
+
+def test_tables_count_and_python_twins_have_no_fingerprint(tmp_path: Path) -> None:
+    source = tmp_path / "force.c"
+    source.write_text("double force(double x)\n{\n    return x;\n}\n")
+
+    def build(stiffness: float, twin: Any = None) -> Any:
+        made = eg.Model("bumper")
+        points = np.linspace(-0.1, 0.1, 21)
+        if twin is None:
+            force = made.table("force", points, stiffness * points)
+        else:
+            force = made.native("force", source, python=twin)
+        made.prismatic("s", made.ground, made.body("buffer", mass=2.0), axis="x")
+        made.actuator("spring", "s", -force(made.coordinate("s")))
+        return pipeline.build(made.derive())
+
+    assert fingerprint(build(4e3)) == fingerprint(build(4e3)) != fingerprint(build(5e3))
+    assert fingerprint(build(0.0, lambda x: x)) is None
+
+
+def test_options_and_writers_count(write: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    equations = eg.load(write(model("options"))).derive()
+    printed = fingerprint(pipeline.build(equations))
+    notes = [shortcut.Shortcut(printed, Options(**options)).note for options in ({}, {"optimize": 0}, {"lanes": 2})]
+    assert shortcut.Shortcut(printed, Options(native=True)).note is None
+    monkeypatch.setattr(shortcut, "digest_writers", lambda: "other code")
+    notes.append(shortcut.Shortcut(printed, Options()).note)
+    assert None not in notes
+    assert len(set(notes)) == len(notes)
+    plain, fast = equations.compile(lanes=0), equations.compile(lanes=0, optimize=0)
+    assert eager(plain.core) is not eager(fast.core)
+
+
+def test_a_change_of_code_or_templates_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = list(shortcut._files())
+    names = {path.name for path in files}
+    assert {"model.c.j2", "dop853.c", "_core.pyx", "c_text.py", "schedule.py", "options.py", "program.py"} <= names
+    before = shortcut.digest_writers.__wrapped__()
+    copied = tmp_path / files[0].parent.name / files[0].name
+    copied.parent.mkdir()
+    copied.write_bytes(files[0].read_bytes())
+    monkeypatch.setattr(shortcut, "_files", lambda: iter([copied, *files[1:]]))
+    assert shortcut.digest_writers.__wrapped__() == before
+    copied.write_bytes(files[0].read_bytes() + b"\n")
+    assert shortcut.digest_writers.__wrapped__() != before
+
+
+def test_notes_of_builds_that_are_gone_go_too(write: Any, cache: Cache) -> None:
+    compiled(write(model("gone")))
+    assert any(cache.shortcuts.iterdir())
+    cache.clear()
+    assert not any(cache.shortcuts.iterdir())
