@@ -17,7 +17,7 @@ from .cache import Cache, CacheEntry, cache_directory, compute_key
 from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
 from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags
-from .processor import choose_lanes, lane_files
+from .processor import choose_lanes, late_files
 
 Progress = Callable[[str], None]
 
@@ -85,9 +85,11 @@ def compile_sources(
     headers = {header: sources[header] if header in sources else read_header(header) for header in HEADERS}
     sources, width = choose_lanes(sources, options.lanes)
     compiler = find_compiler(options.compiler)
-    late = lane_files(sources) if options.lanes is None and not options.native else {}
+    late = late_files(sources, name) if options.lanes is None and not options.native else ()
     now = {file: text for file, text in sources.items() if file not in late}
     flags = _plan(now, options, compiler, 0 if late else width, extension=True)
+    if late:
+        flags = {file: [*words, *(["-DEOMGEN_LATE_SERIES"] if file else [])] for file, words in flags.items()}
     parts = {
         "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
         "layer": describe_layer(layer, headers, compiler),

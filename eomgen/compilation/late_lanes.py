@@ -1,4 +1,4 @@
-"""Late lanes: a built module without lanes -> the library with its lanes, compiled when a batch first needs it.
+"""Late lanes: a built module without lanes -> the library with its lanes and series, compiled when first needed.
 
 It is kept in the module's cache under a key that follows from the module's, and compiled from the sources kept there by
 the same compiler and flags.
@@ -17,7 +17,7 @@ from ..errors import ToolchainError
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, find_compiler
-from .processor import lane_files
+from .processor import lane_files, late_files
 
 _loaded: list[ctypes.CDLL] = []  # stay loaded: their functions are called
 
@@ -85,7 +85,7 @@ def _build(
     words = recipe["flags"][f"{built.name}.c"]
     words = ["-DEOMGEN_LATE", *(w for w in words if not w.startswith("-DEOMGEN_LANES=")), f"-DEOMGEN_LANES={width}"]
     called = [file for file in sources if file.startswith((f"{built.name}_tables.", f"{built.name}_native_"))]
-    files = [*lane_files(sources), *(file for file in called if file.endswith(".c"))]
+    files = [*late_files(sources, built.name), *(file for file in called if file.endswith(".c"))]
     flags = {**dict.fromkeys(files, words), "": recipe["flags"][""]}
     with cache.attempt(key) as directory:
         product = f"{built.name}_lanes.so"

@@ -35,6 +35,13 @@ def lane_files(files: Iterable[str]) -> dict[str, int]:
     return {file: int(found[1]) for file in files if (found := re.search(r"_lanes(\d+)\.c$", file))}
 
 
+def late_files(files: Iterable[str], name: str) -> list[str]:
+    """A model's files that are compiled when first needed: its lanes and its series; none without lanes."""
+    files = list(files)
+    lanes = list(lane_files(files))
+    return [*lanes, *(file for file in files if file == f"{name}_series.c")] if lanes else []
+
+
 def choose_lanes(sources: Mapping[str, str], wanted: int | None = None) -> tuple[dict[str, str], int]:
     """Leave out the lane files of other widths than the one wanted, by default that of this processor.
 

@@ -33,13 +33,12 @@ def emit_c(program: Program) -> SourceSet:
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
     in_lanes = lane_kernels(program)
-    program = replace(program, metadata={**program.metadata, "lanes": in_lanes})
+    series = series_file(program)
+    program = replace(program, metadata={**program.metadata, "lanes": in_lanes, "series": bool(series)})
     printed = _print(program)
     parts = distribute(program, printed)
     calls = used_calls(program)
-    series = series_file(program)
     context = _context(program, printed) | {"parts": parts, "part_names": part_names(printed) if parts else []}
-    context["series"] = bool(series)
     further = {
         f"{program.name}_part{k}.c": render(
             "c/part.c.j2",  # each declares its own pieces alone, so that the text grows as the pieces do
@@ -113,6 +112,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
             for k in program.kernels
         ],
         "lanes": in_lanes,
+        "series": program.metadata["series"],
         "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
         "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),

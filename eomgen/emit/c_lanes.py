@@ -49,6 +49,6 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     }
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
     for width, (tests, feature) in WIDTHS.items():
-        shown = {"name": name, "width": width, "tests": tests, "feature": feature}
+        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "series": context["series"]}
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
     return files

@@ -1,7 +1,7 @@
 """Stage emit: the terms of a right-hand side -> a C function of the Taylor coefficients of the motion.
 
-Coefficients are made order by order.  A product has a_0 b_k + a_k b_0 and a sum over lower orders; these sums come first,
-all together and in vector registers, so that little is left to wait for each other.
+Coefficients are made order by order.  A product has a_0 b_k + a_k b_0 and a sum over lower orders; these sums come
+first, all together and in vector registers, so that little is left to wait for each other.
 """
 
 from __future__ import annotations

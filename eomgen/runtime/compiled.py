@@ -59,8 +59,8 @@ def no_series(name: str) -> str:
     """Why a module has no Taylor method."""
     return (
         f"{name} has no Taylor series: the method is there with target='cython' for trees of bodies whose equations "
-        "are smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too long; "
-        "take DOP853"
+        "are smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too "
+        "long; take DOP853"
     )
 
 

@@ -36,12 +36,6 @@ typedef struct {
 typedef int (*eomgen_lane_function)(const double *t, const double *x, const double *u, const double *c, double *out,
     double *w, int *status);
 
-typedef struct {
-    int width;                           /* states at a time */
-    int (*usable)(void);                 /* whether this processor has the instructions */
-    const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
-} eomgen_lanes;
-
 /* Taylor coefficients of the motion through x at t: row m of out, n_x doubles, is the derivative of order m over m!, for
    m = 0 .. order. Returns a status, as above. */
 typedef struct {
@@ -49,6 +43,13 @@ typedef struct {
     int n_work; /* length of w */
     int (*expand)(double t, const double *x, const double *u, const double *c, int order, double *out, double *w);
 } eomgen_series;
+
+typedef struct {
+    int width;                           /* states at a time */
+    int (*usable)(void);                 /* whether this processor has the instructions */
+    const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
+    const eomgen_series *series;         /* of one state, where it is in the lanes' library; else NULL */
+} eomgen_lanes;
 
 typedef struct {
     int abi;
@@ -63,7 +64,7 @@ typedef struct {
     const char *metadata; /* JSON: names, units, values */
     const eomgen_lanes *const *lanes; /* what was compiled, widest first, then NULL */
     int closed_at;        /* where in w a call of rhs leaves its state brought onto the constraints, 0 where it does not */
-    const eomgen_series *series; /* NULL: none, as where the equations are not smooth or solve loops */
+    const eomgen_series *series; /* NULL: not here */
 } eomgen_model;
 
 /* The table of the model in this library (left out where EOMGEN_NO_TABLE is defined, to link several models). */

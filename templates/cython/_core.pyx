@@ -33,13 +33,14 @@ cdef extern from "eomgen.h" nogil:
         int n_in, n_out
     ctypedef int (*eomgen_lane_function)(const double *, const double *, const double *, const double *, double *,
                                          double *, int *) noexcept nogil
+    ctypedef struct eomgen_series:
+        int n_work
     ctypedef struct eomgen_lanes:
         int width
         int (*usable)() noexcept nogil
         const eomgen_lane_function *kernels
+        const eomgen_series *series
     ctypedef const eomgen_lanes *eomgen_lanes_pointer
-    ctypedef struct eomgen_series:
-        int n_work
     ctypedef struct eomgen_model:
         int abi
         const char *name

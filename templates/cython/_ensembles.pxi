@@ -6,6 +6,7 @@ cdef extern from "eomgen_ensembles.h" nogil:
         const eomgen_model *model
         eomgen_function rhs
         eomgen_function jacobian
+        const eomgen_series *series
         eomgen_lane_function lane_rhs
         int lane_width
         int n
@@ -113,6 +114,7 @@ cdef class Ensemble:
         asked = np.ascontiguousarray(() if t_eval is None else t_eval, dtype=float)
         self.held = [x0, p, u, nodes, atol, asked]
         all.method, all.model = find_method(method), MODEL
+        all.series = SERIES
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
         if all.method.squares > 0:
             all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call

@@ -22,16 +22,20 @@ cdef cnp.npy_intp BATCHED = 0  # columns evaluated without lanes
 cdef frozenset IN_LANES = frozenset(_FACTS.get("lanes", ()))
 
 
+cdef const eomgen_series *SERIES = MODEL.series
+cdef bint HAS_SERIES = bool(_FACTS.get("series"))
+
+
 def offer_lanes(find):
     """Have ``find()`` called for lanes when they are needed; it gives the address of an eomgen_lanes, or 0."""
     global LATE
-    if LANES == NULL and IN_LANES:
+    if (LANES == NULL and IN_LANES) or (SERIES == NULL and HAS_SERIES):
         LATE = find
 
 
 def take_lanes():
     """Have the lanes that were offered now; other threads that want them wait."""
-    global LANES, LATE, lane_width
+    global LANES, LATE, SERIES, lane_width
     cdef const eomgen_lanes *found
     with LATE_TURN:
         if LATE is None:
@@ -45,6 +49,7 @@ def take_lanes():
         if found != NULL and found.usable():
             lane_width = found.width
             LANES = found
+            SERIES = found.series if SERIES == NULL else SERIES
 
 
 cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp last, int width,

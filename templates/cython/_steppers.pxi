@@ -65,16 +65,20 @@ METHODS[3], METHODS[4], METHODS[5] = &eomgen_rk4, &eomgen_radau, &eomgen_taylor
 
 
 cdef method_pointer find_method(str name) except NULL:
-    """The method of a name, if the model has what it needs."""
+    """The method of a name, with what it needs of the model."""
     for i in range(6):
         if METHODS[i].name.decode() == name and name in methods:
+            if METHODS[i].expands and SERIES == NULL:
+                take_lanes()
+                if SERIES == NULL:
+                    raise RuntimeError(f"the series of {MODEL.name.decode()} could not be compiled")
             return METHODS[i]
     raise ValueError(f"no method {name}")
 
 
 methods = tuple([
     METHODS[i].name.decode() for i in range(6)
-    if (METHODS[i].squares == 0 or "jacobian" in names) and (not METHODS[i].expands or MODEL.series != NULL)
+    if (METHODS[i].squares == 0 or "jacobian" in names) and (not METHODS[i].expands or HAS_SERIES)
 ])
 
 
@@ -219,8 +223,8 @@ cdef class Stepper:
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        self.run.series = MODEL.series
-        length += eomgen_further(self.method, n, MODEL.series)
+        self.run.series = SERIES
+        length += eomgen_further(self.method, n, SERIES)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -235,7 +239,7 @@ cdef class Stepper:
         run.next = run.failure_state + n
         run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
         run.K = run.next + n
-        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, MODEL.series)
+        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, SERIES)
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)

@@ -46,7 +46,7 @@ long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
         return worker->memory(e);
     }
     const long rows = 5 + e->method->rows_K + e->method->rows_F;
-    const long further = eomgen_further(e->method, e->n, e->model->series);
+    const long further = eomgen_further(e->method, e->n, e->series);
     return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further + e->n_eval;
 }
 
@@ -128,7 +128,8 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     eomgen_run run;
     memset(&run, 0, sizeof run);
     double *const constants = own->memory;
-    run.rhs = e->rhs, run.jacobian = e->jacobian, run.series = e->model->series, run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
+    run.rhs = e->rhs, run.jacobian = e->jacobian, run.series = e->series;
+    run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
     run.rtol = e->rtol, run.atol = e->atol, run.max_step = e->max_step, run.most_steps = e->max_steps;
     run.look = look_at_stop, run.looker = e;
     run.w = constants + e->model->n_const;
@@ -138,7 +139,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     run.next = run.failure_state + n;
     run.closed = e->model->closed_at ? run.w + e->model->closed_at : NULL;
     run.K = run.next + n;
-    run.F = run.K + e->method->rows_K * n + eomgen_further(e->method, e->n, e->model->series);
+    run.F = run.K + e->method->rows_K * n + eomgen_further(e->method, e->n, e->series);
     double *const times = run.F + e->method->rows_F * n;
     for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
         run_one(e, &run, own, constants, times, k);

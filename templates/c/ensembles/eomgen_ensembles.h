@@ -16,6 +16,7 @@ typedef struct {
     const eomgen_model *model;
     eomgen_function rhs;
     eomgen_function jacobian;      /* of implicit methods */
+    const eomgen_series *series;   /* of Taylor's method */
     eomgen_lane_function lane_rhs; /* NULL: one trajectory at a time */
     int lane_width;
     int n;                        /* states */
