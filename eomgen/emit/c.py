@@ -16,7 +16,7 @@ from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
 
 #: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h")
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h", "eomgen_contraction.h")
 
 
 def emit_c(program: Program) -> SourceSet:

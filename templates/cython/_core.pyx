@@ -13,7 +13,7 @@ of any thread. Batches and long kernels run without the GIL.
 cimport numpy as cnp
 from cpython.pycapsule cimport PyCapsule_New
 from libc.math cimport NAN
-from libc.stdint cimport uintptr_t
+from libc.stdint cimport int64_t, uintptr_t
 from libc.string cimport memcmp, memcpy
 
 import json
@@ -33,6 +33,7 @@ cdef extern from "eomgen.h" nogil:
         int width
         int (*usable)() noexcept nogil
         const eomgen_lane_function *kernels
+        void (*contracted)() noexcept
     ctypedef const eomgen_lanes *eomgen_lanes_pointer
     ctypedef struct eomgen_model:
         int abi
