@@ -30,7 +30,7 @@ LAYER = {
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
-    "eomgen_lane_runs.h": ("c/ensembles/lane_steps.c", "c/ensembles/lane_runs.c"),
+    "eomgen_lane_runs.h": tuple(f"c/ensembles/lane_{name}.c" for name in ("steps", "taylor", "runs")),
     **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 

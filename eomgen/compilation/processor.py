@@ -11,7 +11,7 @@ from importlib import import_module
 from ..errors import UsageError
 
 #: Width -> features, by NumPy's names, without which the file of that width is of no use; the widest first.
-NEEDS: dict[int, tuple[str, ...]] = {8: ("AVX512F", "AVX512VL", "AVX512DQ"), 4: ("AVX2",), 2: ()}
+NEEDS: dict[int, tuple[str, ...]] = {8: ("AVX512F", "AVX512VL", "AVX512DQ", "FMA3"), 4: ("AVX2", "FMA3"), 2: ()}
 
 
 @functools.cache

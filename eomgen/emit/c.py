@@ -12,13 +12,14 @@ from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
 from .c_parts import distribute, part_names
-from .c_series import series_file
+from .c_series import series_files
 from .c_text import Printed, print_block, print_precompute, used_helpers
 from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
 
 #: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_series.h", "eomgen_processor.h")
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_series.h", "eomgen_processor.h",
+           "eomgen_contraction.h")  # fmt: skip
 
 
 def emit_c(program: Program) -> SourceSet:
@@ -33,7 +34,7 @@ def emit_c(program: Program) -> SourceSet:
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
     in_lanes = lane_kernels(program)
-    series = series_file(program)
+    series = series_files(program)
     program = replace(program, metadata={**program.metadata, "lanes": in_lanes, "series": bool(series)})
     printed = _print(program)
     parts = distribute(program, printed)

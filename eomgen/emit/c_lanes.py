@@ -41,14 +41,23 @@ def lane_files(program: Program, context: Mapping[str, Any]) -> dict[str, str]:
     if not blocks:
         return {}
     name = program.name
+    rhs = program.twins.get("rhs", "rhs")
+    blocks = dict(sorted(blocks.items(), key=lambda item: item[0] != rhs))
     roots = [y for b in blocks.values() for y in (*b.outputs, *b.checks)]
     inside = {
         **context,
         "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
         "blocks": [context["printed"][b] for b in blocks],
+        "alone": rhs in blocks,
     }
     files = {f"{name}_lanes.h": render("c/lanes.h.j2", inside)}
     for width, (tests, feature) in WIDTHS.items():
-        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "series": context["series"]}
+        shown = {"name": name, "width": width, "tests": tests, "feature": feature, "contracted": rhs in blocks}
+        shown["series"] = context["series"]
         files[f"{name}_lanes{width}.c"] = render("c/lanes.c.j2", shown)
+        if rhs in blocks:
+            fused = {**shown, "tests": (*tests, "fma") if tests else (), "call": f"{rhs}_block"}
+            files[f"{name}_contracted_lanes{width}.c"] = render("c/contracted.c.j2", fused)
+            if context["series"]:
+                files[f"{name}_series_lanes{width}.c"] = render("c/series_lanes.c.j2", fused)
     return files

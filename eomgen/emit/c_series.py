@@ -19,8 +19,8 @@ ROW = MOST_ORDER + 2
 TOGETHER = 14
 
 
-def series_file(program: Program) -> dict[str, str]:
-    """``<name>_series.c``; none without a series."""
+def series_files(program: Program) -> dict[str, str]:
+    """``<name>_series.h`` with the function over ``real``, and ``<name>_series.c``; none without a series."""
     series = make_series(program)
     if series is None:
         return {}
@@ -39,7 +39,7 @@ def series_file(program: Program) -> dict[str, str]:
         "kept": printer.kept,
         "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
     }
-    return {f"{program.name}_series.c": render("c/series.c.j2", context)}
+    return {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
 
 
 class _Printer:
@@ -127,7 +127,7 @@ class _Printer:
         return f"{self._sum(p, q)} + {self._zero(late)}*b{early} + {self._zero(early)}*b{late}"
 
     def _div(self, i: int, term: Term, p: int, q: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(q)}")
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(q)}")
         if not self._changes(q):
             return f"b{p}*{inverse}"
         rest, last = self._sum(i, q), f"a{i}*b{q}"
@@ -140,11 +140,11 @@ class _Printer:
         return f"(b{p} - {self._sum(i, i)})*{self._reciprocal(f'r{i}', f'0.5 / a{i}')}"
 
     def _log(self, i: int, term: Term, p: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(p)}")
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(p)}")
         return f"(b{p} - inverse*{self._sum(i, p, True)})*{inverse}"
 
     def _pow(self, i: int, term: Term, p: int, q: int) -> str:
-        inverse, e = self._reciprocal(f"r{i}", f"1.0 / {self._zero(p)}"), self._zero(q)
+        inverse, e = self._reciprocal(f"r{i}", f"1.0 / {self._real(p)}"), self._zero(q)
         weighted, plain = self._sum(p, i, True), self._sum(p, i)
         return f"(({e} + 1.0)*inverse*{weighted} - {plain} + {e}*b{p}*a{i})*{inverse}"
 
@@ -156,14 +156,14 @@ class _Printer:
 
     def _inverse(self, i: int, term: Term, p: int) -> str:
         """Those whose rate is the operand's divided by another term: asin, acos, atan."""
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(term.other)}")
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(term.other)}")
         sign = "-" if term.kind == "acos" else ""
         return f"({sign}b{p} - inverse*{self._sum(i, term.other, True)})*{inverse}"
 
     _asin = _acos = _atan = _inverse
 
     def _atan2(self, i: int, term: Term, y: int, x: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._zero(term.other)}")
+        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(term.other)}")
         sums, ends = f"-{self._sum(i, term.other, True)}", ""
         if self._changes(y):
             sums, ends = f"{self._sum(y, x, True)} {sums}", f" + b{y}*{self._zero(x)}"
@@ -226,7 +226,9 @@ class _Printer:
         for i, term in enumerate(self._terms):
             if i in self._lines and term.kind in ("state", "time"):
                 lines.append(f"const real b{i} = {self._lines[i]};")
-                lines += [f"out[k*N + {int(term.value)}] = b{i};"] if term.kind == "state" else []
+                lines += (
+                    [f"out[k*{len(self._series.rates)} + {int(term.value)}] = b{i};"] if term.kind == "state" else []
+                )
         return lines
 
     def sums(self) -> list[list[str]]:

@@ -230,7 +230,7 @@ def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan
     """The same through ``simulate``, one run after the other: where there is no compiled stepper for the method."""
     count, n = x0.shape
     sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
-    status, failure, steps, rejected, evaluations, noted = (np.zeros(count, dtype=np.int_) for _ in range(6))
+    status, failure, steps, rejected, evaluations, noted = (np.zeros(count, dtype=np.int64) for _ in range(6))
     names = find_events(module, plan).names
     notes = np.full((2 + n, plan.keep_events, count), np.nan) if names else None
     samples = None if sizes is None else np.full(sizes, np.nan)

@@ -126,7 +126,7 @@ def _lost(module: Module, cases: Cases, plan: Plan, reduction: Reduction, error:
     """What is kept of a block that no worker could run: runs without states, marked so."""
     sizes, k = (module.n_x, 0 if plan.t_eval is None else len(plan.t_eval)), cases.count
     samples = None if plan.t_eval is None else np.full((*sizes, k), np.nan)
-    failure, steps, rejected, evaluations, noted = (np.zeros(k, dtype=np.int_) for _ in range(5))
+    failure, steps, rejected, evaluations, noted = (np.zeros(k, dtype=np.int64) for _ in range(5))
     notes = np.full((2 + sizes[0], plan.keep_events, k), np.nan) if find_events(module, plan).names else None
     status = np.full(k, LOST, dtype=np.intc)
     x, t = np.full((sizes[0], k), np.nan), np.full(k, plan.span[0])

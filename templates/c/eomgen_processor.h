@@ -5,12 +5,12 @@
 
 #include <cpuid.h>
 
-enum { EOMGEN_AVX2 = 1, EOMGEN_AVX512 = 2 /* with its extensions DQ and VL */ };
+enum { EOMGEN_AVX2 = 1 /* and FMA */, EOMGEN_AVX512 = 2 /* with its extensions DQ and VL */ };
 
 static inline int eomgen_processor(void)
 {
     unsigned a, b, c, d, low, high;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & 1u << 27)) {
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & (1u << 27 | 1u << 12)) != (1u << 27 | 1u << 12)) {
         return 0;
     }
     __asm__("xgetbv" : "=a"(low), "=d"(high) : "c"(0));

@@ -15,6 +15,7 @@
 #ifdef EOMGEN_WIDTH
 typedef double real __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 typedef int64_t flag __attribute__((vector_size(8 * EOMGEN_WIDTH))); /* all bits where true */
+typedef uint64_t numeral __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 #define EOMGEN_LANE(x, k) (x)[k]
 /* A check that fails marks its lanes and the others go on. */
 #define EOMGEN_BEGIN flag failed = { 0 };
@@ -34,6 +35,13 @@ static inline real choose(flag condition, real a, real b)
 static inline real abs_of(real a)
 {
     return (real)((flag)a & ~(flag)same(-0.0));
+}
+
+static inline int any_of(flag a)
+{
+    int64_t found = 0;
+    for (int k = 0; k < EOMGEN_WIDTH; k++) { found |= a[k]; }
+    return found != 0;
 }
 #else
 #define EOMGEN_WIDTH 1

@@ -22,6 +22,25 @@
 typedef double pack __attribute__((vector_size(8 * EOMGEN_PACK)));
 typedef uint64_t bits __attribute__((vector_size(8 * EOMGEN_PACK)));
 
+#ifdef EOMGEN_CONTRACTED
+/* Where a*b + c is rounded once: three parts of all bits, the first subtraction is exact. NaN needs no help of libm. */
+static inline bits sincos_pack(pack a, pack *restrict sine, pack *restrict cosine)
+{
+    const pack turns = a * 0.6366197723675814 + 0x1.8p52, n = turns - 0x1.8p52;
+    const bits quarter = (bits)turns;
+    const pack r = ((a - n * 0x1.921fb54442d18p+0) - n * 0x1.1a62633145c07p-54) + n * 0x1.f1976b7ed8fbcp-110;
+    const pack z = r * r, z2 = z * z, size = (pack)((bits)a & 0x7fffffffffffffffu);
+    const pack s = r + r * z * ((-0.16666666666666666 + z * 0.008333333333330925) + z2 * ((-0.00019841269836722437
+        + z * 2.755731608382574e-06) + z2 * (-2.505112794596564e-08 + z * 1.591784866512194e-10)));
+    const pack c = (1.0 - 0.5 * z) + z2 * ((0.041666666666666664 - z * 0.0013888888888887382) + z2
+        * ((2.480158729874308e-05 - z * 2.755731726001471e-07) + z2 * (2.0876143829213935e-09
+        - z * 1.1382456865840483e-11)));
+    const bits odd = -(quarter & 1), apart = ((bits)s ^ (bits)c) & odd;
+    *sine = (pack)((bits)s ^ apart ^ ((quarter & 2) << 62));
+    *cosine = (pack)((bits)c ^ apart ^ (((quarter + 1) & 2) << 62));
+    return (bits)(size > EOMGEN_NEAR);
+}
+#else
 static inline bits sincos_pack(pack x, pack *restrict sine, pack *restrict cosine)
 {
     const bits sign = (bits)x & 0x8000000000000000u;
@@ -43,6 +62,7 @@ static inline bits sincos_pack(pack x, pack *restrict sine, pack *restrict cosin
     *cosine = (pack)((bits)c ^ apart ^ (((quarter + 1) & 2) << 62));
     return (bits)(a <= EOMGEN_NEAR) ^ ~(bits){ 0 };
 }
+#endif
 
 static inline int any_far(bits far)
 {

@@ -14,7 +14,7 @@ cimport numpy as cnp
 from cpython.object cimport PyObject
 from cpython.pycapsule cimport PyCapsule_New
 from libc.math cimport NAN
-from libc.stdint cimport uintptr_t
+from libc.stdint cimport int64_t, uintptr_t
 from libc.string cimport memcmp, memcpy
 
 import json
@@ -40,6 +40,8 @@ cdef extern from "eomgen.h" nogil:
         int (*usable)() noexcept nogil
         const eomgen_lane_function *kernels
         const eomgen_series *series
+        void (*contracted)() noexcept
+        void (*expand)() noexcept
     ctypedef const eomgen_lanes *eomgen_lanes_pointer
     ctypedef struct eomgen_model:
         int abi

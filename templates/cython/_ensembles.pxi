@@ -7,42 +7,43 @@ cdef extern from "eomgen_ensembles.h" nogil:
         eomgen_function rhs
         eomgen_function jacobian
         const eomgen_series *series
-        eomgen_lane_function lane_rhs
+        void (*lane_rhs)() noexcept
+        void (*lane_series)() noexcept
         int lane_width
         int n
-        long count
+        ptrdiff_t count
         const double *x0
         const double *p
         const double *u
-        long p_stride, u_stride
+        ptrdiff_t p_stride, u_stride
         const double *nodes
         int n_nodes
         double rtol, max_step, first_step
         const double *atol
-        long max_steps
+        int64_t max_steps
         const double *t_eval
-        long n_eval
+        ptrdiff_t n_eval
         double *samples
         double *x
         double *t
         int *status
-        long *steps
-        long *rejected
-        long *evaluations
-        long n_notes
+        int64_t *steps
+        int64_t *rejected
+        int64_t *evaluations
+        ptrdiff_t n_notes
         double *notes
-        long *noted
+        int64_t *noted
         int *failure
         double *failure_time
-        long next, done
+        ptrdiff_t next, done
         int stop
     ctypedef struct eomgen_thread:
         const eomgen_signal *signals
         eomgen_events *events
         double *notes
-        long notes_room
+        ptrdiff_t notes_room
         double *memory
-    long eomgen_ensemble_memory(const eomgen_ensemble *, const eomgen_thread *) noexcept
+    ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *, const eomgen_thread *) noexcept
     void eomgen_ensemble_work(eomgen_ensemble *, const eomgen_thread *) noexcept
 
 
@@ -99,7 +100,7 @@ cdef class Ensemble:
     cdef readonly object samples, notes
 
     def __cinit__(self, str method, nodes, x0, p, u, double rtol, atol, double max_step, double first_step,
-                  long max_steps, t_eval=None, signals=(), events=None, long keep=0):
+                  int64_t max_steps, t_eval=None, signals=(), events=None, ptrdiff_t keep=0):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
         cdef eomgen_ensemble *all = &self.all
         if "rhs" in IN_LANES:
@@ -119,7 +120,7 @@ cdef class Ensemble:
         if all.method.squares > 0:
             all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
         if LANES != NULL:
-            all.lane_rhs, all.lane_width = LANES.kernels[index], LANES.width
+            all.lane_rhs, all.lane_series, all.lane_width = LANES.contracted, LANES.expand, LANES.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
         all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
         all.nodes, all.n_nodes = reading(nodes), len(nodes)
@@ -128,18 +129,18 @@ cdef class Ensemble:
         self.x, self.t = np.full((count, n), np.nan), np.full(count, nodes[0])
         self.status = np.full(count, -101, dtype=np.intc)  # stopped
         self.failure, self.failure_time = np.zeros(count, dtype=np.intc), np.zeros(count)
-        self.steps, self.rejected, self.evaluations = (np.zeros(count, dtype=np.int_) for _ in range(3))
+        self.steps, self.rejected, self.evaluations = (np.zeros(count, dtype=np.int64) for _ in range(3))
         self.samples = None if t_eval is None else np.full((count, len(asked), n), np.nan)
         all.x, all.t = <double *>cnp.PyArray_DATA(self.x), <double *>cnp.PyArray_DATA(self.t)
         all.samples = NULL if t_eval is None else <double *>cnp.PyArray_DATA(<cnp.ndarray>self.samples)
         all.status, all.failure = <int *>cnp.PyArray_DATA(self.status), <int *>cnp.PyArray_DATA(self.failure)
         self.notes = np.full((count, keep, 2 + n), np.nan) if events else None
-        self.noted = np.zeros(count, dtype=np.int_)
-        all.n_notes, all.noted = keep, <long *>cnp.PyArray_DATA(self.noted)
+        self.noted = np.zeros(count, dtype=np.int64)
+        all.n_notes, all.noted = keep, <int64_t *>cnp.PyArray_DATA(self.noted)
         all.notes = <double *>cnp.PyArray_DATA(<cnp.ndarray>self.notes) if events else NULL
         all.failure_time = <double *>cnp.PyArray_DATA(self.failure_time)
-        all.steps, all.rejected = <long *>cnp.PyArray_DATA(self.steps), <long *>cnp.PyArray_DATA(self.rejected)
-        all.evaluations = <long *>cnp.PyArray_DATA(self.evaluations)
+        all.steps, all.rejected = <int64_t *>cnp.PyArray_DATA(self.steps), <int64_t *>cnp.PyArray_DATA(self.rejected)
+        all.evaluations = <int64_t *>cnp.PyArray_DATA(self.evaluations)
 
     def work(self):
         """Run trajectories until none is left, without the GIL; called by every thread."""

@@ -30,23 +30,23 @@ static const eomgen_lane_worker *find_worker(const eomgen_ensemble *e, const eom
     return NULL;
 }
 
-long eomgen_ensemble_take(eomgen_ensemble *e)
+ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e)
 {
     if (__atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
         return -1;
     }
-    const long k = __atomic_fetch_add(&e->next, 1, __ATOMIC_RELAXED);
+    const ptrdiff_t k = __atomic_fetch_add(&e->next, 1, __ATOMIC_RELAXED);
     return k < e->count ? k : -1;
 }
 
-long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
+ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own)
 {
     const eomgen_lane_worker *const worker = find_worker(e, own);
     if (worker != NULL) {
         return worker->memory(e);
     }
-    const long rows = 5 + e->method->rows_K + e->method->rows_F;
-    const long further = eomgen_further(e->method, e->n, e->series);
+    const ptrdiff_t rows = 5 + e->method->rows_K + e->method->rows_F;
+    const ptrdiff_t further = eomgen_further(e->method, e->n, e->series);
     return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further + e->n_eval;
 }
 
@@ -57,10 +57,10 @@ static long look_at_stop(void *looker, const double *t)
 }
 
 /* Keep the events noted by now, as many as there is room for. */
-static void keep_notes(eomgen_ensemble *e, eomgen_journey *journey, long k)
+static void keep_notes(eomgen_ensemble *e, eomgen_journey *journey, ptrdiff_t k)
 {
-    const long width = 2 + e->n;
-    for (long i = 0; i < journey->n_notes; i++, e->noted[k]++) {
+    const ptrdiff_t width = 2 + e->n;
+    for (ptrdiff_t i = 0; i < journey->n_notes; i++, e->noted[k]++) {
         if (e->noted[k] < e->n_notes) {
             memcpy(e->notes + (k * e->n_notes + e->noted[k]) * width, journey->notes + i * width,
                    (size_t)width * sizeof(double));
@@ -69,7 +69,7 @@ static void keep_notes(eomgen_ensemble *e, eomgen_journey *journey, long k)
     journey->n_notes = 0;
 }
 
-static int travel(eomgen_ensemble *e, eomgen_run *run, eomgen_journey *journey, long k)
+static int travel(eomgen_ensemble *e, eomgen_run *run, eomgen_journey *journey, ptrdiff_t k)
 {
     int status = EOMGEN_FULL;
     while (status == EOMGEN_FULL) {
@@ -81,7 +81,7 @@ static int travel(eomgen_ensemble *e, eomgen_run *run, eomgen_journey *journey, 
     return status;
 }
 
-static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *own, double *constants, double *times, long k)
+static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *own, double *constants, double *times, ptrdiff_t k)
 {
     const size_t size = (size_t)e->n * sizeof(double);
     eomgen_journey journey;
@@ -107,7 +107,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
     if (e->model->precompute(e->p + k * e->p_stride, constants) == 0) {
         status = travel(e, run, &journey, k);
     }
-    for (long j = journey.stored * e->n; j < e->n_eval * e->n; j++) {
+    for (ptrdiff_t j = journey.stored * e->n; j < e->n_eval * e->n; j++) {
         journey.states[j] = NAN;
     }
     memcpy(e->x + k * e->n, run->y, size);
@@ -141,7 +141,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     run.K = run.next + n;
     run.F = run.K + e->method->rows_K * n + eomgen_further(e->method, e->n, e->series);
     double *const times = run.F + e->method->rows_F * n;
-    for (long k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
+    for (ptrdiff_t k = eomgen_ensemble_take(e); k >= 0; k = eomgen_ensemble_take(e)) {
         run_one(e, &run, own, constants, times, k);
         __atomic_fetch_add(&e->done, 1, __ATOMIC_RELAXED);
     }

@@ -2,6 +2,9 @@
 #ifndef EOMGEN_ENSEMBLES_H
 #define EOMGEN_ENSEMBLES_H
 
+#include <stddef.h>
+#include <stdint.h>
+
 #include "eomgen_loop.h"
 
 /* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_travel or this. */
@@ -10,37 +13,38 @@ enum { EOMGEN_BAD_PARAMETERS = -110 };
 enum { EOMGEN_GLANCE = 500 }; /* evaluations between looks at `stop` */
 
 /* The trajectories of one batch and what became of them. The caller owns every array; rows belong to trajectories. Results do
-   not depend on which thread or lane takes which trajectory. */
+   not depend on which thread or lane takes which trajectory; those in lanes differ from others within the tolerance. */
 typedef struct {
     const eomgen_method *method;
     const eomgen_model *model;
     eomgen_function rhs;
     eomgen_function jacobian;      /* of implicit methods */
     const eomgen_series *series;   /* of Taylor's method */
-    eomgen_lane_function lane_rhs; /* NULL: one trajectory at a time */
+    void (*lane_rhs)(void);        /* see eomgen_lanes; NULL: one trajectory at a time */
+    void (*lane_series)(void);     /* likewise */
     int lane_width;
     int n;                        /* states */
-    long count;                   /* trajectories */
+    ptrdiff_t count;              /* trajectories */
     const double *x0;             /* count rows of n */
     const double *p, *u;          /* rows of n_p and n_u, the same row for all where the stride is 0 */
-    long p_stride, u_stride;
+    ptrdiff_t p_stride, u_stride;
     const double *nodes;          /* n_nodes times: start, corners of the signals, end */
     int n_nodes;
     double rtol, max_step, first_step; /* first_step 0: chosen */
     const double *atol;           /* n */
-    long max_steps;
+    int64_t max_steps;
     const double *t_eval;         /* n_eval times in the direction of the run */
-    long n_eval;
+    ptrdiff_t n_eval;
     double *samples;              /* count blocks of n_eval rows of n, NaN where a trajectory did not get to */
     double *x, *t;                /* count rows of n: last state; its time */
     int *status;
-    long *steps, *rejected, *evaluations;
-    long n_notes;                 /* rows kept for each trajectory's events; a row: event, t, state (n) */
+    int64_t *steps, *rejected, *evaluations;
+    ptrdiff_t n_notes;            /* rows kept for each trajectory's events; a row: event, t, state (n) */
     double *notes;                /* count blocks of n_notes rows, NaN where there were fewer, or NULL */
-    long *noted;                  /* how many events there were */
+    int64_t *noted;               /* how many events there were */
     int *failure;                 /* status of the last evaluation that failed, 0 if none did */
     double *failure_time;
-    long next, done;              /* queue; shared between threads */
+    ptrdiff_t next, done;         /* queue; shared between threads */
     int stop;                     /* set by anyone: no further trajectory is begun, those under way end as stopped */
 } eomgen_ensemble;
 
@@ -56,16 +60,16 @@ typedef struct {
 /* How trajectories are run side by side; one for each width that was compiled. */
 typedef struct {
     int width;
-    long (*memory)(const eomgen_ensemble *e);
+    ptrdiff_t (*memory)(const eomgen_ensemble *e);
     int (*takes)(const eomgen_ensemble *e, const eomgen_thread *own); /* whether this ensemble can be run so */
     void (*work)(eomgen_ensemble *e, const eomgen_thread *own);
 } eomgen_lane_worker;
 
 /* The next trajectory of the queue, or -1. */
-long eomgen_ensemble_take(eomgen_ensemble *e);
+ptrdiff_t eomgen_ensemble_take(eomgen_ensemble *e);
 
 /* Doubles of memory that one thread needs. */
-long eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own);
+ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *own);
 
 /* Take trajectories until there are none. */
 void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own);

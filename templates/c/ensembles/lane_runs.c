@@ -1,88 +1,86 @@
 /* The queue of trajectories and the rounds of steps. */
 /* Store what is asked for up to now of the lanes that have moved. */
-static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run *run, lane_task *tasks,
-                         const int *moved, double direction)
+static void sample_lanes(eomgen_ensemble *e, const lane_method *method, lane_run *run, flag moved, double direction)
 {
+    const int n = run->n;
     int prepared = 0;
     for (;;) {
-        int wanted[W], any = 0;
+        flag wanted = { 0 };
         real times = run->t;
         for (int l = 0; l < W; l++) {
-            lane_task *const task = tasks + l;
-            wanted[l] = 0;
-            while (moved[l] && task->done < e->n_eval && direction * (e->t_eval[task->done] - run->t[l]) <= 0.0) {
-                if (run->t[l] != e->t_eval[task->done]) {
-                    times[l] = e->t_eval[task->done];
-                    wanted[l] = any = 1;
+            while (moved[l] && run->done[l] < e->n_eval && direction * (e->t_eval[run->done[l]] - run->t[l]) <= 0.0) {
+                if (run->t[l] != e->t_eval[run->done[l]]) {
+                    times[l] = e->t_eval[run->done[l]];
+                    wanted[l] = -1;
                     break;
                 }
-                for (int i = 0; i < run->n; i++) {
-                    e->samples[(task->index * e->n_eval + task->done) * run->n + i] = run->y[i][l];
+                for (int i = 0; i < n; i++) {
+                    e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->y[i][l];
                 }
-                task->done++;
+                run->done[l]++;
             }
         }
-        if (!any) {
+        if (!any_of(wanted)) {
             return;
         }
         if (!prepared) {
-            const long before = run->calls;
+            const int before = run->calls;
+            run->awake = moved;
             method->prepare(run);
-            for (int l = 0; l < W; l++) {
-                tasks[l].calls += wanted[l] ? run->calls - before : 0;
-            }
+            run->evaluations += wanted & (run->calls - before);
             prepared = 1;
         }
         method->interpolate(run, times, run->z);
         for (int l = 0; l < W; l++) {
-            for (int i = 0; wanted[l] && i < run->n; i++) {
-                e->samples[(tasks[l].index * e->n_eval + tasks[l].done) * run->n + i] = run->z[i][l];
+            for (int i = 0; wanted[l] && i < n; i++) {
+                e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][l];
             }
-            tasks[l].done += wanted[l];
+            run->done[l] += wanted[l] != 0;
         }
     }
 }
 
-static void end_lane(eomgen_ensemble *e, lane_run *run, lane_task *task, int l, int status)
+static void end_lane(eomgen_ensemble *e, lane_run *run, int l, int status)
 {
-    const long k = task->index;
-    for (long j = task->done * run->n; j < e->n_eval * run->n; j++) {
+    const ptrdiff_t k = run->index[l];
+    for (ptrdiff_t j = run->done[l] * run->n; j < e->n_eval * run->n; j++) {
         e->samples[k * e->n_eval * run->n + j] = NAN;
     }
     for (int i = 0; i < run->n; i++) {
         e->x[k * run->n + i] = run->y[i][l];
     }
-    e->t[k] = run->t[l], e->status[k] = status, e->evaluations[k] = task->calls;
+    e->t[k] = run->t[l], e->status[k] = status;
+    e->steps[k] = run->steps[l], e->rejected[k] = run->rejected[l], e->evaluations[k] = run->evaluations[l];
     e->failure[k] = run->failure[l], e->failure_time[k] = run->failure_time[l];
-    task->index = -1;
+    run->active[l] = run->begins[l] = run->awake[l] = 0;
     __atomic_fetch_add(&e->done, 1, __ATOMIC_RELAXED);
 }
 
 /* The next node of a lane's trajectory, or the end of it. */
-static void next_node(eomgen_ensemble *e, lane_run *run, lane_task *task, int l)
+static void next_node(eomgen_ensemble *e, lane_run *run, int l)
 {
-    if (++task->node >= e->n_nodes) {
-        end_lane(e, run, task, l, 0);
+    if (++run->node[l] >= e->n_nodes) {
+        end_lane(e, run, l, 0);
         return;
     }
-    task->t_bound = e->nodes[task->node];
-    task->h_abs = task->node == 1 ? e->first_step : fmax(task->h_last, task->h_abs);
-    run->hold[l] = run->t[l] + 0.5 * (task->t_bound - run->t[l]);
-    task->begins = 1, task->again = 0;
+    run->t_bound[l] = e->nodes[run->node[l]];
+    run->size[l] = run->node[l] == 1 ? e->first_step : fmax(run->size_before[l], run->size[l]);
+    run->hold[l] = run->t[l] + 0.5 * (run->t_bound[l] - run->t[l]);
+    run->begins[l] = -1, run->again[l] = 0;
 }
 
 /* The next trajectory of the queue into a lane; those that cannot begin end at once. */
-static void fill_lane(eomgen_ensemble *e, lane_run *run, lane_task *task, int l, double *constants)
+static EOMGEN_APART void fill_lane(eomgen_ensemble *e, lane_run *run, int l, double *constants)
 {
-    while (task->index < 0) {
-        const long k = eomgen_ensemble_take(e);
+    while (!run->active[l]) {
+        const ptrdiff_t k = eomgen_ensemble_take(e);
         if (k < 0) {
             return;
         }
-        memset(task, 0, sizeof *task);
-        task->index = k;
+        run->index[l] = k, run->done[l] = 0, run->node[l] = 0, run->active[l] = -1;
         run->failure[l] = 0, run->failure_time[l] = 0.0;
-        e->steps[k] = e->rejected[k] = 0;
+        run->steps[l] = run->rejected[l] = run->evaluations[l] = 0;
+        run->size_before[l] = 0.0;
         const int status = e->model->precompute(e->p + k * e->p_stride, constants);
         for (int i = 0; i < e->model->n_const; i++) {
             run->c[i][l] = constants[i];
@@ -95,96 +93,87 @@ static void fill_lane(eomgen_ensemble *e, lane_run *run, lane_task *task, int l,
         }
         run->t[l] = run->t_old[l] = e->nodes[0];
         if (status != 0) {
-            end_lane(e, run, task, l, EOMGEN_BAD_PARAMETERS);
+            end_lane(e, run, l, EOMGEN_BAD_PARAMETERS);
         } else {
-            next_node(e, run, task, l);
+            next_node(e, run, l);
         }
     }
 }
 
-/* Lead the lanes that have come to a node on to what is next; whether any has a trajectory. */
-static int advance_nodes(eomgen_ensemble *e, lane_run *run, lane_task *tasks, double direction, double *constants)
+/* Lead the lanes that have come to a node on to what is next. */
+static void advance_nodes(eomgen_ensemble *e, lane_run *run, double direction, double *constants)
 {
-    int busy = 0;
-    for (int l = 0; l < W; l++) {
-        if (tasks[l].index >= 0 && !tasks[l].begins && direction * (run->t[l] - tasks[l].t_bound) >= 0.0) {
-            next_node(e, run, tasks + l, l);
-            fill_lane(e, run, tasks + l, l, constants);
+    const flag there = run->active & ~run->begins & ((run->t - run->t_bound) * direction >= 0.0);
+    if (any_of(there)) {
+        for (int l = 0; l < W; l++) {
+            if (there[l]) {
+                next_node(e, run, l);
+                fill_lane(e, run, l, constants);
+            }
         }
-        busy = busy || tasks[l].index >= 0;
     }
-    return busy;
 }
 
 /* The step that each lane tries: its size with the sign of the run, 0 for those without a trajectory. */
-static real choose_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, double direction, double *constants)
+static void choose_steps(eomgen_ensemble *e, lane_run *run, double direction, double *constants)
 {
-    real h = same(0.0);
-    for (int l = 0; l < W; l++) {
-        lane_task *const task = tasks + l;
-        run->awake[l] = 0;
-        if (task->index < 0 || task->begins) {
-            continue;
+    const real t = run->t, spacing = abs_of(t) * 0x1p-52; /* of numbers there, or more */
+    const real least = 10.0 * choose(spacing > 0x1p-1022, spacing, same(0x1p-1022));
+    run->awake = run->active & ~run->begins;
+    run->size_before = choose(run->again, run->size_before, run->size);
+    real size = choose(run->size > e->max_step, same(e->max_step), choose(run->size < least, least, run->size));
+    size = run->size = choose(run->again, run->size, size);
+    const flag lost = ~(size >= least), late = ~run->again & (run->steps >= e->max_steps);
+    if (any_of(run->awake & (lost | late))) {
+        for (int l = 0; l < W; l++) {
+            if (run->awake[l] && (lost[l] || late[l])) {
+                end_lane(e, run, l, late[l] ? EOMGEN_TOO_MANY_STEPS : EOMGEN_STEP_TOO_SMALL);
+                fill_lane(e, run, l, constants); /* tries with the next round */
+            }
         }
-        const double t = run->t[l], least = 10.0 * fabs(nextafter(t, direction * INFINITY) - t);
-        if (!task->again) {
-            task->h_last = task->h_abs;
-            task->h_abs = task->h_abs > e->max_step ? e->max_step : task->h_abs < least ? least : task->h_abs;
-        }
-        const int lost = !(task->h_abs >= least), late = !task->again && e->steps[task->index] >= e->max_steps;
-        if (lost || late) {
-            end_lane(e, run, task, l, late ? EOMGEN_TOO_MANY_STEPS : EOMGEN_STEP_TOO_SMALL);
-            fill_lane(e, run, task, l, constants);
-            continue; /* tries with the next round */
-        }
-        double t_new = t + task->h_abs * direction;
-        if (direction * (t_new - task->t_bound) > 0.0) {
-            t_new = task->t_bound;
-        }
-        task->t_new = t_new;
-        h[l] = t_new - t;
-        task->h_abs = fabs(h[l]);
-        run->awake[l] = 1;
     }
-    return h;
+    const real t_new = t + size * direction;
+    run->t_new = choose((t_new - run->t_bound) * direction > 0.0, run->t_bound, t_new);
+    run->step = choose(run->awake, run->t_new - t, same(0.0));
+    run->size = choose(run->awake, abs_of(run->step), run->size);
 }
 
-/* Judge the steps tried: which lanes have moved, and the size of each one's next. */
-static void judge_steps(eomgen_ensemble *e, lane_run *run, lane_task *tasks, real error, int order, int *moved)
+/* error to the power of -1 / (order + 1), within 1 %: the bits of a number are nearly its logarithm, then one step of
+   Newton's method. */
+static inline real stretch_of(real error, int order)
 {
-    flag accepted = { 0 };
-    real stretch = 1.0 / root(root(root(error))); /* as eomgen_stretch has it for order 7 */
-    for (int l = 0; order != 7 && l < W; l++) {
-        stretch[l] = eomgen_stretch(error[l], order);
+    const double p = order + 1;
+    const numeral shrunk = ((numeral)error >> 32) * (uint64_t)(4294967296.0 / p);
+    real z = (real)((uint64_t)(1072640819.0 * (1.0 + 1.0 / p) * 4294967296.0) - shrunk), power = z;
+    for (int i = 0; i < order; i++) {
+        power *= z;
     }
-    for (int l = 0; l < W; l++) {
-        lane_task *const task = tasks + l;
-        moved[l] = run->awake[l] && error[l] < 1.0;
-        if (moved[l]) {
-            double factor = error[l] == 0.0 ? 10.0 : fmin(10.0, 0.9 * stretch[l]);
-            factor = task->again && factor > 1.0 ? 1.0 : factor;
-            task->h_abs *= factor;
-            task->again = 0;
-            run->t_old[l] = run->t[l], run->t[l] = task->t_new;
-            accepted[l] = -1;
-            e->steps[task->index]++;
-        } else if (run->awake[l]) {
-            const double factor = 0.9 * stretch[l];
-            task->h_abs *= factor > 0.2 ? factor : 0.2; /* also where the error is NaN */
-            task->again = 1;
-            e->rejected[task->index]++;
-        }
-    }
+    return z * ((p + 1.0 - error * power) / p);
+}
+
+/* Judge the steps tried: returns the lanes that have moved; sets the size of each one's next. Steps are a ninth shorter than
+   SciPy's, so that fewer are rejected: less work and smaller errors, as a rejected step costs lanes as much as another. */
+static flag judge_steps(lane_run *run, real error, int order)
+{
+    const flag moved = run->awake & (error < 1.0), again = run->awake & ~moved;
+    const real factor = 0.8 * stretch_of(error, order), most = choose(run->again, same(1.0), same(10.0));
+    const real more = choose((factor < most) & (error > 0.0), factor, most);
+    const real less = choose(factor > 0.2, factor, same(0.2)); /* also where the error is NaN */
+    run->size *= choose(moved, more, choose(again, less, same(1.0)));
+    run->again = again;
+    run->t_old = choose(moved, run->t, run->t_old), run->t = choose(moved, run->t_new, run->t);
+    run->steps -= moved, run->rejected -= again;
     for (int i = 0; i < run->n; i++) {
-        run->y[i] = choose(accepted, run->y[i], run->y_old[i]);
-        run->f[i] = choose(accepted, run->f[i], run->K[i]);
+        run->y[i] = choose(moved, run->y[i], run->y_old[i]);
+        run->f[i] = choose(moved, run->f[i], run->K[i]);
     }
+    return moved;
 }
 
 static const lane_method *find_method(const char *name)
 {
-    static const lane_method *const methods[] = { &lane_dop853, &lane_rk45, &lane_rk23 };
-    for (int i = 0; i < 3; i++) {
+    static const lane_method *const methods[] = { &lane_dop853, &lane_rk45, &lane_rk23, &lane_taylor };
+    for (int i = 0; i < 4; i++) {
         if (strcmp(methods[i]->name, name) == 0) {
             return methods[i];
         }
@@ -203,66 +192,89 @@ static int takes(const eomgen_ensemble *e, const eomgen_thread *own)
     return own->events == NULL && find_method(e->method->name) != NULL;
 }
 
-static long lane_memory(const eomgen_ensemble *e)
+static ptrdiff_t lane_memory(const eomgen_ensemble *e)
 {
     const lane_method *const method = find_method(e->method->name);
-    const long rows = 4 + method->rows_K + method->rows_F;
-    return e->model->n_const + W * (1 + e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n);
+    const ptrdiff_t rows = 4 + method->rows_K + method->rows_F, further = eomgen_further(e->method, e->n, e->series);
+    return e->model->n_const + W * (1 + e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further);
+}
+
+static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread *own, const lane_method *method, real *memory)
+{
+    const int n = e->n;
+    memset(run, 0, sizeof *run);
+    run->rhs = (lane_function)e->lane_rhs, run->signals = own->signals, run->n_u = e->model->n_u, run->n = n;
+    run->rtol = e->rtol, run->atol = e->atol;
+    run->c = memory;
+    run->u = run->c + e->model->n_const;
+    run->w = run->u + e->model->n_u;
+    run->y = run->w + e->model->n_work;
+    run->y_old = run->y + n, run->f = run->y_old + n, run->z = run->f + n;
+    run->K = run->z + n;
+    run->F = run->K + method->rows_K * n + eomgen_further(e->method, n, e->series);
+    run->expand = (lane_series)e->lane_series;
+    run->order = method == &lane_taylor ? taylor_order(e->rtol, e->series->most) : 0;
+}
+
+/* What comes before a step: lanes that begin, and what each tries. */
+static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants)
+{
+    const size_t size = (size_t)run->n * sizeof(real);
+    if (any_of(run->active & run->begins)) {
+        flag first = { 0 };
+        for (int l = 0; l < W; l++) {
+            first[l] = run->node[l] == 1 ? -1 : 0;
+        }
+        /* a time asked for may be the start */
+        sample_lanes(e, method, run, first & run->begins & run->active, direction);
+        if (method == &lane_taylor) {
+            run->begins = (flag){ 0 };
+        } else {
+            begin_lanes(e, method, run, direction);
+        }
+        advance_nodes(e, run, direction, constants); /* a part may have no length */
+    }
+    if (method == &lane_taylor) {
+        expand_lanes(e, run);
+    }
+    choose_steps(e, run, direction, constants);
+    memcpy(run->y_old, run->y, size);
+    if (method != &lane_taylor) {
+        memcpy(run->K, run->f, size);
+    }
+    run->calls = 0;
+}
+
+static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants)
+{
+    run->evaluations += run->awake & run->calls;
+    const flag moved = judge_steps(run, method->error(run, run->step), method->error_order);
+    if (e->n_eval > 0) {
+        sample_lanes(e, method, run, moved, direction);
+    }
+    advance_nodes(e, run, direction, constants);
 }
 
 static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
 {
-    double *memory = own->memory;
     const lane_method *const method = find_method(e->method->name);
-    const int n = e->n;
     const double direction = e->nodes[e->n_nodes - 1] < e->nodes[0] ? -1.0 : 1.0;
-    lane_run run;
-    lane_task tasks[W];
-    memset(&run, 0, sizeof run);
-    double *const constants = memory;
-    memory += e->model->n_const;
+    double *const constants = own->memory, *memory = constants + e->model->n_const;
     memory += (W - ((uintptr_t)memory / sizeof(double)) % W) % W; /* vectors lie at multiples of their size */
-    run.rhs = e->lane_rhs, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
-    run.rtol = e->rtol, run.atol = e->atol;
-    run.c = (real *)memory;
-    run.u = run.c + e->model->n_const;
-    run.w = run.u + e->model->n_u;
-    run.y = run.w + e->model->n_work;
-    run.y_old = run.y + n, run.f = run.y_old + n, run.z = run.f + n;
-    run.K = run.z + n;
-    run.F = run.K + method->rows_K * n;
-    int busy = 0;
+    lane_run run;
+    lay_out(&run, e, own, method, (real *)memory);
     for (int l = 0; l < W; l++) {
-        tasks[l].index = -1;
-        fill_lane(e, &run, tasks + l, l, constants);
-        busy = busy || tasks[l].index >= 0;
+        fill_lane(e, &run, l, constants);
     }
-    for (long round = 0; busy; round++) {
-        int begins = 0, moved[W];
-        for (int l = 0; l < W; l++) {
-            if (round % (EOMGEN_GLANCE / 8) == 0 && tasks[l].index >= 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED)) {
-                end_lane(e, &run, tasks + l, l, EOMGEN_STOPPED);
+    for (ptrdiff_t round = 0; any_of(run.active); round++) {
+        const int stopped = round % (EOMGEN_GLANCE / 8) == 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED);
+        for (int l = 0; stopped && l < W; l++) {
+            if (run.active[l]) {
+                end_lane(e, &run, l, EOMGEN_STOPPED);
             }
-            moved[l] = tasks[l].index >= 0 && tasks[l].begins && tasks[l].node == 1;
-            begins = begins || (tasks[l].index >= 0 && tasks[l].begins);
         }
-        if (begins) {
-            sample_lanes(e, method, &run, tasks, moved, direction); /* a time asked for may be the start */
-            begin_lanes(e, method, &run, tasks, direction);
-            advance_nodes(e, &run, tasks, direction, constants); /* a part may have no length */
-        }
-        run.step = choose_steps(e, &run, tasks, direction, constants);
-        memcpy(run.y_old, run.y, (size_t)n * sizeof(real));
-        memcpy(run.K, run.f, (size_t)n * sizeof(real));
-        const long before = run.calls;
+        prepare_round(e, method, &run, direction, constants);
         method->attempt(&run, run.step);
-        for (int l = 0; l < W; l++) {
-            tasks[l].calls += run.awake[l] ? run.calls - before : 0;
-        }
-        judge_steps(e, &run, tasks, method->error(&run, run.step), method->error_order, moved);
-        if (e->n_eval > 0) {
-            sample_lanes(e, method, &run, tasks, moved, direction);
-        }
-        busy = advance_nodes(e, &run, tasks, direction, constants);
+        finish_round(e, method, &run, direction, constants);
     }
 }

@@ -1,6 +1,6 @@
 /* Trajectories side by side, each lane with steps of its own: a lane whose step is rejected tries again while the others go
-   on, and one that has ended takes the next trajectory of the queue. Included by a file for each width. The arithmetic of a
-   lane is that of eomgen_ensemble_work, so that its results have the same bits. */
+   on, and one that has ended takes the next trajectory of the queue. Included by a file for each width. Every lane does the
+   same operations in the same order, so that a trajectory's results do not depend on which lane it is in. */
 #include <math.h>
 #include <string.h>
 
@@ -9,18 +9,30 @@
 
 enum { W = EOMGEN_WIDTH };
 
+/* The right-hand side in lanes, which may contract: returns the lanes that fail. */
+typedef flag (*lane_function)(real t, const real *x, const real *u, const real *c, real *out, real *w);
+
+/* Taylor coefficients likewise. */
+typedef flag (*lane_series)(real t, const real *x, const real *u, const real *c, int order, real *out, real *w);
+
+/* What the lanes are at. */
 typedef struct {
-    eomgen_lane_function rhs;
+    lane_function rhs;
+    lane_series expand;
     const eomgen_signal *signals;
     int n_u, n, order; /* order: of a Taylor step */
     double rtol;
     const double *atol;
     real t, t_old, step, hold; /* hold: as in eomgen_run */
     real *c, *u, *w, *y, *y_old, *f, *K, *F, *z; /* constants, inputs, work; states as in eomgen_run; a state between */
-    long calls;
-    int awake[W];                                /* lanes whose evaluations count */
+    int calls;
+    flag active, begins, awake, again; /* has a trajectory; needs x' and a first step; evaluations count; was rejected */
+    real size, size_before, t_new, t_bound; /* size_before: as it was before the last step */
+    flag steps, rejected, evaluations;
     int failure[W];
     double failure_time[W];
+    ptrdiff_t index[W], done[W]; /* trajectory; samples stored */
+    int node[W];
 } lane_run;
 
 typedef struct {
@@ -32,38 +44,44 @@ typedef struct {
     void (*interpolate)(const lane_run *run, real t, real *y);
 } lane_method;
 
-/* What a lane is at; index -1: nothing. */
-typedef struct {
-    long index, done, calls;
-    int node, begins, again; /* begins: needs x' and a first step; again: the last step was rejected */
-    double h_abs, t_bound, t_new, h_last; /* h_last: as it was before the last step */
-} lane_task;
-
-static void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
+/* Mark what failed in lanes that count, and keep those lanes from going on. */
+static EOMGEN_APART void note_failures(lane_run *run, real t, const real *y, real *k, flag failed, flag bad)
 {
-    int codes[W];
-    for (int i = 0; run->signals != NULL && i < run->n_u; i++) {
+    for (int l = 0; l < W; l++) {
+        int finite = 1;
+        for (int i = 0; i < run->n && bad[l]; i++) {
+            finite = finite && isfinite(y[i][l]);
+            k[i][l] = NAN;
+        }
+        if (bad[l] && run->awake[l] && (finite || run->failure[l] == 0)) {
+            run->failure[l] = failed[l] ? EOMGEN_SINGULAR_MASS_MATRIX : EOMGEN_NON_FINITE, run->failure_time[l] = t[l];
+        }
+    }
+}
+
+static EOMGEN_APART void read_tables(lane_run *run, real t)
+{
+    for (int i = 0; i < run->n_u; i++) {
         for (int l = 0; run->signals[i].n > 0 && l < W; l++) {
             run->u[i][l] = eomgen_table_value(run->signals + i, run->signals[i].order == 0 ? run->hold[l] : t[l]);
         }
     }
-    run->calls++;
-    if (run->rhs((const double *)&t, (const double *)y, (const double *)run->u, (const double *)run->c, (double *)k,
-                 (double *)run->w, codes) == 0) {
-        return;
+}
+
+static inline void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
+{
+    if (run->signals != NULL) {
+        read_tables(run, t);
     }
-    for (int l = 0; l < W; l++) {
-        if (codes[l] == 0) {
-            continue;
-        }
-        int finite = 1;
-        for (int i = 0; i < run->n; i++) {
-            finite = finite && isfinite(y[i][l]);
-            k[i][l] = NAN;
-        }
-        if (run->awake[l] && (finite || run->failure[l] == 0)) {
-            run->failure[l] = codes[l], run->failure_time[l] = t[l];
-        }
+    run->calls++;
+    const flag failed = run->rhs(t, y, run->u, run->c, k, run->w);
+    real sum = same(0.0); /* NaN where a result is not finite */
+    for (int i = 0; i < run->n; i++) {
+        sum += k[i] * 0.0;
+    }
+    const flag bad = failed | (sum != 0.0);
+    if (any_of(bad & run->awake)) {
+        note_failures(run, t, y, k, failed, bad);
     }
 }
 
@@ -75,64 +93,65 @@ static inline real larger_of(real a, real b)
 EOMGEN_EACH(root, sqrt)
 #define RUN lane_run
 #define EVALUATE evaluate_lanes
+#define ATTEMPT(name) static void name##_attempt(lane_run *run, real h)
+#define STAGE(s, at, ...) \
+    { \
+        const int n = run->n; \
+        const real *restrict const y0 = run->y_old, *const K = run->K; \
+        real *restrict const y = run->y; \
+        for (int i = 0; i < n; i++) { y[i] = y0[i] + h * (__VA_ARGS__); } \
+        evaluate_lanes(run, run->t + at * h, y, run->K + s * n); \
+    }
+#define LAST_STAGE(s) memcpy(run->f, run->K + s * run->n, (size_t)run->n * sizeof(real));
+#define k(j) K[j * n + i]
+#define SCALE(a) (1.0 / (a))
+#define OVER(a, scale) ((a) * (scale))
 #define METHOD(name, title, ...) \
     static const lane_method lane_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, name##_interpolate };
 #include "eomgen_methods.h"
 
-static double lane_norm(const lane_run *run, const real *x, const real *y, int l)
+static real lane_norm(const lane_run *run, const real *x, const real *y)
 {
-    double sum = 0.0;
+    real sum = same(0.0);
     for (int i = 0; i < run->n; i++) {
-        const double part = (x[i][l] - (y != NULL ? y[i][l] : 0.0)) / (run->atol[i] + fabs(run->y[i][l]) * run->rtol);
+        const real part = (y != NULL ? x[i] - y[i] : x[i]) / (run->atol[i] + abs_of(run->y[i]) * run->rtol);
         sum += part * part;
     }
-    return sqrt(sum / run->n);
+    return root(sum / (double)run->n);
 }
 
-/* x' of the lanes that begin, and their first steps. */
-static void begin_lanes(const eomgen_ensemble *e, const lane_method *method, lane_run *run, lane_task *tasks,
-                        double direction)
+/* x' of the lanes that begin, and their first steps: as eomgen_start has it. */
+static EOMGEN_APART void begin_lanes(const eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction)
 {
     const int n = run->n;
     real *const y1 = run->K, *const f1 = run->K + n;
-    real h0 = same(0.0);
-    double d0[W], d1[W];
-    for (int l = 0; l < W; l++) {
-        run->awake[l] = tasks[l].index >= 0 && tasks[l].begins;
-    }
+    const flag begins = run->begins & run->active;
+    run->awake = begins;
     evaluate_lanes(run, run->t, run->y, f1);
-    for (int l = 0; l < W; l++) {
-        if (!run->awake[l]) {
-            continue;
-        }
-        tasks[l].calls++;
-        for (int i = 0; i < n; i++) {
-            run->f[i][l] = f1[i][l];
-        }
-        const double length = fabs(tasks[l].t_bound - run->t[l]);
-        if (!(tasks[l].h_abs > 0.0) && n > 0 && length > 0.0) {
-            d0[l] = lane_norm(run, run->y, NULL, l), d1[l] = lane_norm(run, run->f, NULL, l);
-            const double h = d0[l] < 1e-5 || d1[l] < 1e-5 ? 1e-6 : 0.01 * d0[l] / d1[l];
-            h0[l] = h < length ? h : length;
-        } else if (!(tasks[l].h_abs > 0.0)) {
-            tasks[l].h_abs = length, run->awake[l] = 0;
-        } else {
-            run->awake[l] = 0;
-        }
+    run->evaluations -= begins;
+    for (int i = 0; i < n; i++) {
+        run->f[i] = choose(begins, f1[i], run->f[i]);
     }
+    const real length = abs_of(run->t_bound - run->t);
+    const flag given = run->size > 0.0, simple = begins & ~given & (n > 0 ? length == 0.0 : length == length);
+    const flag chosen = begins & ~given & ~simple;
+    run->size = choose(simple, length, run->size);
+    const real d0 = lane_norm(run, run->y, NULL), d1 = lane_norm(run, run->f, NULL);
+    real h0 = choose((d0 < 1e-5) | (d1 < 1e-5), same(1e-6), 0.01 * d0 / d1);
+    h0 = choose(chosen, choose(h0 < length, h0, length), same(0.0));
     for (int i = 0; i < n; i++) {
         y1[i] = run->y[i] + h0 * direction * run->f[i];
     }
+    run->awake = chosen;
     evaluate_lanes(run, run->t + h0 * direction, y1, f1);
+    run->evaluations -= chosen;
+    const real d2 = lane_norm(run, f1, run->f) / h0, d = larger_of(d1, d2);
     for (int l = 0; l < W; l++) {
-        if (run->awake[l]) {
-            const double length = fabs(tasks[l].t_bound - run->t[l]);
-            const double d2 = lane_norm(run, f1, run->f, l) / h0[l], d = d1[l] > d2 ? d1[l] : d2;
-            const double h1 = d1[l] <= 1e-15 && d2 <= 1e-15 ? fmax(1e-6, h0[l] * 1e-3)
-                                                            : pow(0.01 / d, 1.0 / (method->error_order + 1));
-            tasks[l].h_abs = fmin(fmin(100.0 * h0[l], h1), fmin(length, e->max_step));
-            tasks[l].calls++;
+        if (chosen[l]) {
+            const double h1 = d1[l] <= 1e-15 && d2[l] <= 1e-15 ? fmax(1e-6, h0[l] * 1e-3)
+                                                               : pow(0.01 / d[l], 1.0 / (method->error_order + 1));
+            run->size[l] = fmin(fmin(100.0 * h0[l], h1), fmin(length[l], e->max_step));
         }
-        tasks[l].begins = 0;
     }
+    run->begins &= ~begins;
 }

@@ -6,6 +6,7 @@
 #include "eomgen_ensembles.h"
 
 #if EOMGEN_LANES & 2
+#include "eomgen_contraction.h"
 #define EOMGEN_WIDTH 2
 #include "eomgen_lane_runs.h"
 

@@ -6,10 +6,11 @@
 #include "eomgen_ensembles.h"
 
 #if EOMGEN_LANES & 4
+#include "eomgen_contraction.h"
 #if defined(__clang__)
-#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
 #else
-#pragma GCC target("avx2")
+#pragma GCC target("avx2,fma")
 #endif
 #define EOMGEN_WIDTH 4
 #include "eomgen_lane_runs.h"

@@ -6,10 +6,11 @@
 #include "eomgen_ensembles.h"
 
 #if EOMGEN_LANES & 8
+#include "eomgen_contraction.h"
 #if defined(__clang__)
-#pragma clang attribute push(__attribute__((target("avx512f,avx512vl,avx512dq"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx512f,avx512vl,avx512dq,fma"))), apply_to = function)
 #else
-#pragma GCC target("avx512f,avx512vl,avx512dq")
+#pragma GCC target("avx512f,avx512vl,avx512dq,fma")
 #endif
 #define EOMGEN_WIDTH 8
 #include "eomgen_lane_runs.h"

@@ -1,30 +1,10 @@
 /* RK23: P. Bogacki, L. Shampine, A 3(2) pair of Runge-Kutta formulas, 1989; as SciPy has it. */
-static void rk23_attempt(RUN *run, real h)
+ATTEMPT(rk23)
 {
-    const int n = run->n;
-    const real t = run->t;
-    const real *restrict y0 = run->y_old;
-    real *restrict y = run->y;
-    real *const K = run->K;
-    const real *restrict const k0 = K;
-    real *const k1 = K + n;
-    real *const k2 = K + 2 * n;
-    real *const k3 = K + 3 * n;
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.5 * k0[i]);
-    }
-    EVALUATE(run, t + 0.5 * h, y, k1);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.75 * k1[i]);
-    }
-    EVALUATE(run, t + 0.75 * h, y, k2);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.2222222222222222 * k0[i] + 0.3333333333333333 * k1[i] + 0.4444444444444444 * k2[i]);
-    }
-    EVALUATE(run, t + h, y, k3);
-    for (int i = 0; i < n; i++) {
-        run->f[i] = k3[i];
-    }
+    STAGE(1, 0.5, 0.5 * k(0))
+    STAGE(2, 0.75, 0.75 * k(1))
+    STAGE(3, 1.0, 0.2222222222222222 * k(0) + 0.3333333333333333 * k(1) + 0.4444444444444444 * k(2))
+    LAST_STAGE(3)
 }
 
 static real rk23_error(const RUN *run, real h)

@@ -1,49 +1,17 @@
 /* RK45: J. Dormand, P. Prince, A family of embedded Runge-Kutta formulae, 1980; dense output of order 4 by L. Shampine,
    Some practical Runge-Kutta formulas, 1986; as SciPy has them. */
-static void rk45_attempt(RUN *run, real h)
+ATTEMPT(rk45)
 {
-    const int n = run->n;
-    const real t = run->t;
-    const real *restrict y0 = run->y_old;
-    real *restrict y = run->y;
-    real *const K = run->K;
-    const real *restrict const k0 = K;
-    real *const k1 = K + n;
-    real *const k2 = K + 2 * n;
-    real *const k3 = K + 3 * n;
-    real *const k4 = K + 4 * n;
-    real *const k5 = K + 5 * n;
-    real *const k6 = K + 6 * n;
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.2 * k0[i]);
-    }
-    EVALUATE(run, t + 0.2 * h, y, k1);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.075 * k0[i] + 0.225 * k1[i]);
-    }
-    EVALUATE(run, t + 0.3 * h, y, k2);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.9777777777777777 * k0[i] - 3.7333333333333334 * k1[i] + 3.5555555555555554 * k2[i]);
-    }
-    EVALUATE(run, t + 0.8 * h, y, k3);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (2.9525986892242035 * k0[i] - 11.595793324188385 * k1[i] + 9.822892851699436 * k2[i] -
-            0.2908093278463649 * k3[i]);
-    }
-    EVALUATE(run, t + 0.8888888888888888 * h, y, k4);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (2.8462752525252526 * k0[i] - 10.757575757575758 * k1[i] + 8.906422717743473 * k2[i] +
-            0.2784090909090909 * k3[i] - 0.2735313036020583 * k4[i]);
-    }
-    EVALUATE(run, t + 1.0 * h, y, k5);
-    for (int i = 0; i < n; i++) {
-        y[i] = y0[i] + h * (0.09114583333333333 * k0[i] + 0.44923629829290207 * k2[i] + 0.6510416666666666 * k3[i]
-            - 0.322376179245283 * k4[i] + 0.13095238095238096 * k5[i]);
-    }
-    EVALUATE(run, t + h, y, k6);
-    for (int i = 0; i < n; i++) {
-        run->f[i] = k6[i];
-    }
+    STAGE(1, 0.2, 0.2 * k(0))
+    STAGE(2, 0.3, 0.075 * k(0) + 0.225 * k(1))
+    STAGE(3, 0.8, 0.9777777777777777 * k(0) - 3.7333333333333334 * k(1) + 3.5555555555555554 * k(2))
+    STAGE(4, 0.8888888888888888, 2.9525986892242035 * k(0) - 11.595793324188385 * k(1) + 9.822892851699436 * k(2) -
+        0.2908093278463649 * k(3))
+    STAGE(5, 1.0, 2.8462752525252526 * k(0) - 10.757575757575758 * k(1) + 8.906422717743473 * k(2) +
+        0.2784090909090909 * k(3) - 0.2735313036020583 * k(4))
+    STAGE(6, 1.0, 0.09114583333333333 * k(0) + 0.44923629829290207 * k(2) + 0.6510416666666666 * k(3) -
+        0.322376179245283 * k(4) + 0.13095238095238096 * k(5))
+    LAST_STAGE(6)
 }
 
 static real rk45_error(const RUN *run, real h)
