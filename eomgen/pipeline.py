@@ -240,7 +240,10 @@ def _load(
         artifact = shortcut.find()
         if artifact is None:
             from .emit import emit_c
+            from .emit.sources import keep_bytecode
 
+            if (folder := shortcut.cache.open_templates()) is not None:
+                keep_bytecode(folder)
             sources = emit_c(program)
     with _timed(seconds, "compile"):
         if artifact is None:

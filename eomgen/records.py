@@ -1,14 +1,18 @@
 """Frozen dataclasses that are quick to define: everything eomgen describes and derives is made of them.
 
 The standard library compiles six methods for each class when it is defined, which for all the classes of eomgen took a
-fifth of the time to its first result.  Here ``__init__`` is compiled when it is first needed, and the other methods are
+fifth of the time to its first result.  Here ``__init__`` is compiled when it is needed often, and the other methods are
 made without compiling.  Fields, defaults, ``replace``, ``fields``, equality, hashes and errors are the same.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
+
+#: Objects of a class after which its ``__init__`` is compiled.
+MANY = 100
 
 if TYPE_CHECKING:
     from dataclasses import dataclass as dataclass
@@ -62,15 +66,42 @@ def _freeze(kind: type) -> type:
 
 
 class _Init:
-    """The ``__init__`` of a class until it is first looked at."""
+    """The ``__init__`` of a class until it is worth compiling."""
 
-    def __init__(self, kind: type, fields: tuple[dataclasses.Field[Any], ...]) -> None:
-        self.kind, self.fields = kind, fields
+    def __init__(self, kind: Any, fields: tuple[dataclasses.Field[Any], ...]) -> None:
+        self.kind, self.fields, self.calls = kind, fields, 0
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
-        if vars(self.kind).get("__init__") is self:
+        self.calls += 1
+        if instance is not None and self.calls < MANY:
+            return partial(self.fill, instance)
+        return self.compiled().__get__(instance, owner)
+
+    def compiled(self) -> Any:
+        """What takes its place."""
+        if vars(self.kind)["__init__"] is self:
             self.kind.__init__ = _compile_init(self.kind, self.fields)
-        return vars(self.kind)["__init__"].__get__(instance, owner)
+        return vars(self.kind)["__init__"]
+
+    def fill(self, record: Any, *given: Any, **named: Any) -> None:
+        """Set the fields; whatever does not fit is left to the compiled function, which says so."""
+        held, values, rest = vars(record), iter(given), dict(named)
+        for field in self.fields:
+            name = field.name
+            value = next(values, dataclasses.MISSING)
+            if value is dataclasses.MISSING:
+                value = rest.pop(name, field.default)
+                if value is dataclasses.MISSING:
+                    make: Any = field.default_factory
+                    if make is dataclasses.MISSING:
+                        return self.compiled()(record, *given, **named)  # type: ignore[no-any-return]
+                    value = make()
+            held[name] = value
+        if rest or len(given) > len(self.fields):
+            return self.compiled()(record, *given, **named)  # type: ignore[no-any-return]
+        if hasattr(record, "__post_init__"):
+            record.__post_init__()
+        return None
 
 
 def _compile_init(kind: type, fields: tuple[dataclasses.Field[Any], ...]) -> Any:

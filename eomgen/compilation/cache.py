@@ -100,6 +100,16 @@ class Cache:
         """Folder of notes that tell keys of builds; see :mod:`.shortcut`."""
         return self.root / "shortcuts"
 
+    def open_templates(self) -> Path | None:
+        """Folder of the templates' bytecode, made if need be; None where it cannot be written."""
+        folder = self.root / "templates"
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _check_private(self.root)
+        except (OSError, ToolchainError):
+            return None
+        return folder if os.access(folder, os.W_OK) else None
+
     def find(self, key: str) -> CacheEntry | None:
         """The entry of a key if it is there and every file is as it was published; notes that it was used."""
         directory = self._entries / key
@@ -235,6 +245,7 @@ class Cache:
         directories = list(self._entries.iterdir()) if self._entries.is_dir() else []
         for directory in directories:
             self._remove(directory)
+        shutil.rmtree(self.root / "templates", ignore_errors=True)
         self.sweep()
         self._forget()
         return len(directories)

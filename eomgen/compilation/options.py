@@ -36,8 +36,8 @@ class Options:
     compiler : str or None
         Command line of the compiler; None finds one. Changes the build.
     lanes : {0, 2, 4, 8} or None
-        States that batches take at a time in vector registers; None takes what suits this processor, 0 leaves them
-        out. Results are the same, to the last bit. Changes the build.
+        States that batches take at a time in vector registers; None takes what suits this processor, compiled when
+        batches or ensembles first need it, 0 leaves them out. Results are the same, to the last bit. Changes the build.
     jobs : int or None
         Files compiled at a time; None takes the number of processors. Does not change the build.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..program import Program
@@ -49,6 +50,13 @@ def environment() -> Environment:
     made.filters["docstring"] = lambda text: str(text).replace("\\", "\\\\").replace('"', '\\"')
     made.filters["toml"] = lambda text: json.dumps(str(text), ensure_ascii=False)
     return made
+
+
+def keep_bytecode(folder: Path) -> None:
+    """Keep what Jinja makes of templates in a folder of the user's own; it knows when a template has changed."""
+    from jinja2 import FileSystemBytecodeCache
+
+    environment().bytecode_cache = FileSystemBytecodeCache(str(folder))
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:

@@ -68,6 +68,8 @@ def describe(module: Module) -> Handle:
     file = str(getattr(core, "__file__", "") or "")
     if not file or not Path(file).is_file():
         raise UsageError(f"the module of {module.name!r} has no file that workers could load; use target cython")
+    if hasattr(core, "take_lanes"):
+        core.take_lanes()  # here, once, so that workers find them beside the module
     return Handle(type(module), core.__name__, file, digest(file), _recipe(Path(file)), module.p, module.u)
 
 

@@ -313,7 +313,7 @@ cdef class Kernel:
         if self.name in IN_LANES:
             BATCHED += columns
             if BATCHED >= MANY:
-                take_lanes()
+                take_lanes(self.name)
         return 0
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):

@@ -103,8 +103,7 @@ cdef class Ensemble:
                   int64_t max_steps, t_eval=None, signals=(), events=None, ptrdiff_t keep=0):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
         cdef eomgen_ensemble *all = &self.all
-        if "rhs" in IN_LANES:
-            take_lanes()
+        take_lanes()
         self.signals, self.watched, self.context = tuple(signals), events, Context()
         x0, p, u = (np.ascontiguousarray(value, dtype=float) for value in (x0, p, u))
         count = len(x0)

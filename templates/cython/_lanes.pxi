@@ -33,10 +33,12 @@ def offer_lanes(find):
         LATE = find
 
 
-def take_lanes():
-    """Have the lanes that were offered now; other threads that want them wait."""
+def take_lanes(str name="rhs"):
+    """Have the lanes that were offered now, if a kernel has any; other threads that want them wait."""
     global LANES, LATE, SERIES, lane_width
     cdef const eomgen_lanes *found
+    if LATE is None or name not in IN_LANES:
+        return
     with LATE_TURN:
         if LATE is None:
             return
@@ -45,11 +47,11 @@ def take_lanes():
         except Exception:
             LATE = None  # not again and again; after an interrupt it is tried again
             raise
-        LATE = None
         if found != NULL and found.usable():
             lane_width = found.width
             LANES = found
             SERIES = found.series if SERIES == NULL else SERIES
+        LATE = None
 
 
 cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp last, int width,

@@ -43,6 +43,11 @@ except crank.EomgenError as error:  # no compiler, no steppers of its own
     assert crank.metadata["target"] == "numpy" and "scipy" in str(error).lower()
 else:
     assert crank.metadata["target"] == "cython" and trajectory.t[-1] == 0.1
+    batch = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 5))
+    assert crank._core.lane_width >= 2 and "mass_matrix" in crank.metadata["lanes"]  # from the beginning
+    single = [crank.mass_matrix(np.ascontiguousarray(batch[:, k])) for k in range(5)]
+    assert (crank.mass_matrix(batch) == np.stack(single, axis=-1)).all()
+    assert crank._core.lane_width >= 2 and crank.rhs(t=0.0, x=x, out=x_dot) is x_dot
 print(repr(x_dot.tolist()))
 """
 

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from eomgen.records import dataclass
+from eomgen.records import MANY, dataclass
 
 
 def define(decorate: Callable[[type], type]) -> tuple[type, type]:
@@ -118,3 +118,18 @@ def test_other_options_are_the_standard_librarys() -> None:
     made = Open(1)
     made.size = 2
     assert made == Open(2)
+
+
+def test_objects_made_before_and_after_compiling_are_the_same() -> None:
+    quick, _ = define(dataclass(frozen=True))
+    made = [quick(label="a", size=k) for k in range(MANY + 10)]
+    assert type(vars(quick)["__init__"]).__name__ == "function"
+    assert [m.size for m in made] == list(range(MANY + 10))
+    assert {tuple(vars(m)) for m in made} == {("size", "label")}
+    for wrong in ({"size": 1, "other": 2}, {}, {"label": "b"}):
+        fresh, _ = define(dataclass(frozen=True))
+        with pytest.raises(TypeError) as early:
+            fresh(**wrong)
+        with pytest.raises(TypeError) as late:
+            quick(**wrong)
+        assert str(early.value) == str(late.value)
