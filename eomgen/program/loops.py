@@ -19,7 +19,7 @@ from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, tra
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
 
-PASSES = 5  #: of linear corrections with GENTLE; where weak rows keep something, drivers take more
+PASSES = 4  #: of linear corrections with GENTLE; where weak rows keep something, drivers take more
 LEFT = 1e-12  #: most that the last pass may leave, relative to all of what was corrected
 NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
