@@ -13,6 +13,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
+from ..numeric.definite import STILL
 from ..numeric.gram import GENTLE, TIKHONOV
 from .factor import exceeding
 from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
@@ -189,6 +190,11 @@ class LoopBlocks:
         units = [self.s[k] * self.s[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
         sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
         checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
+        if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
+            moving = {k: self.s[k] / self.s[terms.preferred[0]] for k, row in enumerate(B) if row}
+            reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
+            if reach is not None:
+                checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
         return [*moved, *a, sound], checks
 
     # -- partition ------------------------------------------------------------------------------------------------
