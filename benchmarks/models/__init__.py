@@ -45,7 +45,7 @@ def chain(n: int) -> eg.Model:
     return m
 
 
-def chain_with_joints(n: int) -> tuple[eg.Model, np.ndarray]:
+def chain_with_joints(n: int, stiffness: float = 1e4, damping: float = 1e2) -> tuple[eg.Model, np.ndarray]:
     """Rods on hinges with stiff springs and dampers in all but the first, and where it starts."""
     m = eg.Model(f"stiff_chain_{n}", gravity=(0, -9.81, 0))
     previous = m.ground
@@ -54,7 +54,7 @@ def chain_with_joints(n: int) -> tuple[eg.Model, np.ndarray]:
         rod = m.body(f"rod{k}", mass=mass, com=(0, -length / 2, 0), inertia={"zz": mass * length**2 / 12})
         m.revolute(f"q{k}", previous, rod)
         if k:
-            m.torque(f"joint{k}", f"q{k}", f"-1e4*q{k} - 1e2*q{k}_dot")
+            m.torque(f"joint{k}", f"q{k}", f"-{stiffness}*q{k} - {damping}*q{k}_dot")
         previous = rod.at(0, -length, 0)
     return m, np.array([1.0] + (n - 1) * [0.3] + n * [0.0])
 

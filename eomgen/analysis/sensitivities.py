@@ -22,6 +22,7 @@ from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
 from ..runtime.simulate import DEFAULTS, find_span, ordered_times
+from ..runtime.storage import table_path
 from .linear import output_derivatives
 from .start import Columns, held_names, keep_consistent, split_columns, start_sensitivity
 
@@ -74,10 +75,7 @@ class Sensitivities:
         Path
             The file written.
         """
-        target = Path(path)
-        target = target.with_suffix(".npz") if not target.suffix else target
-        if target.suffix not in (".npz", ".csv"):
-            raise UsageError(f"{target}: sensitivities are written as .npz or .csv")
+        target = table_path(path, "sensitivities are")
         if target.suffix == ".npz":
             x_names, y_names = self.trajectory.x_names, self.trajectory.metadata["y_names"]
             np.savez(target, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)

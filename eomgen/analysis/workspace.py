@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
+from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
 from .workspace_grid import Grid, read_grid
@@ -148,10 +149,7 @@ class Workspace:
         Path
             The file written.
         """
-        target = Path(path)
-        target = target.with_suffix(".npz") if not target.suffix else target
-        if target.suffix not in (".npz", ".csv"):
-            raise UsageError(f"{target}: a workspace is written as .npz or .csv")
+        target = table_path(path, "a workspace is")
         if target.suffix == ".npz":
             arrays: dict[str, Any] = {f"[{name}]": np.asarray(self[name]) for name in self.names}
             np.savez_compressed(target, over=list(self.over), of=self.of, jacobian=self.jacobian, **arrays)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from .core import Expr, Graph
-from .slopes import BRANCHING, FLAT, SLOPES, choice, partials
+from .slopes import BRANCHING, FLAT, SLOPES, choice, half_power_slope, partials
 from .traverse import LEAVES, common_graph, reachable
 
 
@@ -29,7 +29,12 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
         if operation == "mul":
             a, b = node[1], node[2]
             da, db = tangent(a), tangent(b)
-            if da is None:
+            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (found := half_power_slope(g, a, b)):
+                dc = tangent(found[0])
+                if dc is None:
+                    continue
+                d = mul(found[1], dc)
+            elif da is None:
                 if db is None:
                     continue
                 d = mul(a, db)
@@ -116,6 +121,12 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
                     adjoints[k] = add(adjoints[k], w) if k in adjoints else w
         elif operation == "mul":
             a, b = node[1], node[2]
+            if (nodes[a][0] == "sqrt" or nodes[b][0] == "sqrt") and (found := half_power_slope(g, a, b)):
+                c = found[0]
+                if c in active:
+                    d = mul(w, found[1])
+                    adjoints[c] = add(adjoints[c], d) if c in adjoints else d
+                continue
             if a in active:
                 d = mul(w, b)
                 adjoints[a] = add(adjoints[a], d) if a in adjoints else d

@@ -13,11 +13,28 @@ from .scales import Array
 
 SINGULAR = 1e-13  #: smallest pivot, relative to its own diagonal entry
 NOTHING = 1e-22  #: smallest pivot, relative to the largest diagonal entry: the square of what rounding leaves of a zero
+#: Least inertia of the only freedom, relative to that of all it moves: 1e-13 squared, the rounding of a dead centre.
+STILL = 1e-26
 
 
 def safely_positive(pivots: Array, sizes: Array) -> bool:
     """Whether each pivot (n,) of L D L^T exceeds 1e-13 of its size (n,) and 1e-22 of the largest; NaN does not."""
     return bool((pivots > np.maximum(SINGULAR * sizes, NOTHING * sizes.max(initial=0.0))).all())
+
+
+def moves_inertia(pivot: float, B: Array, sizes: Array) -> bool:
+    """Whether the inertia behind a single freedom is more than what rounding moves at the dead centre of a toggle.
+
+    Parameters
+    ----------
+    pivot : float
+        B^T M B, scaled.
+    B : (n, 1) array
+        What moves, scaled.
+    sizes : (n,) array
+        Diagonal of the scaled mass matrix of the tree.
+    """
+    return bool(pivot > STILL * sizes[B[:, 0] != 0.0].sum())
 
 
 def correlated(M: Array) -> Array:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
-from .definite import safely_positive
+from .definite import moves_inertia, safely_positive
 from .partitions import Partition, partition
 from .projection import largest, minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
@@ -73,7 +73,9 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is not positive definite") from None
     # the squares of its diagonal are the pivots of L D L^T
     size = (split.B**2 * scaled.diagonal()[:, None]).sum(axis=0)
-    if not safely_positive(factor.diagonal() ** 2, size):
+    pivots = factor.diagonal() ** 2
+    alone = len(size) == 1
+    if not safely_positive(pivots, size) or (alone and not moves_inertia(pivots[0], split.B, scaled.diagonal())):
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
     return Embedded(scaled, matrix, factor, split)
 

@@ -13,13 +13,16 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
+from ..numeric.definite import STILL
 from ..numeric.gram import GENTLE, TIKHONOV
 from .factor import exceeding
 from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
 
-PASSES = 5  #: of linear corrections with GENTLE; where weak rows keep something, drivers take more
+#: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations; where weak rows keep
+#: something, drivers take more.
+PASSES = 5, 4
 LEFT = 1e-12  #: most that the last pass may leave, relative to all of what was corrected
 NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
@@ -137,19 +140,22 @@ class LoopBlocks:
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property
-    def _factor(self) -> tuple[Factor, int]:
-        """The factor of J J^T, and how many passes of a correction by it leave no trace of its regularisation."""
+    def _factor(self) -> tuple[Factor, tuple[int, int]]:
+        """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
         if self.gentle:
             return self._regularised(self.J, GENTLE)[0], PASSES
         if len(self.J) > self.terms.n_v - self.terms.n_dof:  # redundant rows
-            return self._regularised(self.J, TIKHONOV)[0], 2
-        return factorize(gram(self.J)), 1
+            return self._regularised(self.J, TIKHONOV)[0], (2, 2)
+        return factorize(gram(self.J)), (1, 1)
 
-    def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr]) -> list[Expr]:
-        """The nearest x with C_q x + r = 0; where configurations may lose rank, that nothing is left is a condition."""
+    def _corrected(self, x: list[Expr], r: Sequence[Expr], conditions: list[Expr], order: int = 1) -> list[Expr]:
+        """The nearest x with C_q x + r = 0; where configurations may lose rank, that nothing is left is a condition.
+
+        Velocities are of order 1, accelerations of order 2.
+        """
         factor, passes = self._factor
         columns = transpose(self.J, self.terms.n_v)
-        for _ in range(passes):
+        for _ in range(passes[order - 1]):
             e = [a + b for a, b in zip(r, times(self.rows, x), strict=True)]
             dz = times(columns, factor.solve(e))
             x = [a - s * b for a, s, b in zip(x, self.s, dz, strict=True)]
@@ -170,7 +176,7 @@ class LoopBlocks:
         here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))
         gamma = [x * i for x, i in zip(here[terms.n_v :], self.inverse, strict=True)]
         if self.gentle:
-            a = self._corrected([graph.zero] * terms.n_v, gamma, conditions)
+            a = self._corrected([graph.zero] * terms.n_v, gamma, conditions, 2)
             B, _, sound = self._partition(None, conditions)
         else:
             B, a, sound = self._partition([-x for x in gamma], conditions)
@@ -189,6 +195,11 @@ class LoopBlocks:
         units = [self.s[k] * self.s[k] if terms.n_dof > 1 else graph.one for k in terms.preferred]
         sizes = [graph.zero if x is None else x * k for x, k in zip(squares, units, strict=True)]
         checks = exceeding([d * k for d, k in zip(factor.pivots, units, strict=True)], sizes)
+        if terms.n_dof == 1:  # there is no other motion whose inertia tells what nothing is
+            moving = {k: self.s[k] / self.s[terms.preferred[0]] for k, row in enumerate(B) if row}
+            reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
+            if reach is not None:
+                checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
         return [*moved, *a, sound], checks
 
     # -- partition ------------------------------------------------------------------------------------------------

@@ -56,11 +56,8 @@ class ForceAnalyses:
 
         Parameters
         ----------
-        t : float or (k,) array
-        x : (n_x,) or (n_x, k) array
-            States; projected onto the constraints first.
-        p, u, out : optional
-            As for every kernel; u may also be (n_u, k), inputs of each state.
+        t, x, p, u, out
+            As for :meth:`multipliers`.
 
         Returns
         -------

@@ -43,11 +43,24 @@ class Stored:
         return self._energies
 
 
+def table_path(path: str | Path, what: str) -> Path:
+    """Where a table is written: an ending of ``.npz`` is added if there is none.
+
+    Raises
+    ------
+    UsageError
+        Another ending than ``.npz`` or ``.csv``.
+    """
+    target = Path(path)
+    target = target if target.suffix else target.with_suffix(".npz")
+    if target.suffix not in (".npz", ".csv"):
+        raise UsageError(f"{target}: {what} written as .npz or .csv, not {target.suffix!r}")
+    return target
+
+
 def save(trajectory: Trajectory, path: str | Path) -> Path:
     """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
-    target = Path(path)
-    if not target.suffix:
-        target = target.with_suffix(".npz")
+    target = table_path(path, "a trajectory is")
     names = trajectory.names
     values = trajectory.to_numpy()
     if target.suffix == ".csv":
@@ -55,8 +68,6 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
         table = np.vstack([trajectory.t, values]).T
         np.savetxt(target, table, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
         return target
-    if target.suffix != ".npz":
-        raise UsageError(f"a trajectory is saved as .npz or .csv, not {target.suffix!r}")
     header = {"format": FORMAT, "names": list(names), **trajectory.metadata}
     arrays: dict[str, Any] = {
         "t": trajectory.t,

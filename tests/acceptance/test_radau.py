@@ -13,20 +13,7 @@ import sympy as sm
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
-
-
-def stiff_chain(n: int, stiffness: float, damping: float) -> eg.Model:
-    """Rods on hinges, all but the first with a stiff spring and a damper."""
-    m = eg.Model("stiff_chain", gravity=(0, -9.81, 0))
-    previous = m.ground
-    for i in range(n):
-        mass, length = 1.0 + 0.1 * i, 1.0 - 0.02 * i
-        rod = m.body(f"rod{i}", mass=mass, com=(0, -length / 2, 0), inertia={"zz": mass * length**2 / 12})
-        m.revolute(f"q{i}", previous, rod)
-        if i:
-            m.torque(f"joint{i}", f"q{i}", f"-{stiffness}*q{i} - {damping}*q{i}_dot")
-        previous = rod.at(0, -length, 0)
-    return m
+from benchmarks.models import chain_with_joints
 
 
 def linear(k: float, c: float) -> Any:
@@ -43,8 +30,12 @@ def jacobian(mod: Any) -> Callable[[float, np.ndarray], np.ndarray]:
 
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank", "stiff chain"])
 def test_the_steps_of_scipy(module: Callable[..., Any], name: str) -> None:
-    mod = stiff_chain(4, 1e4, 1e2).compile() if name == "stiff chain" else module(name)
-    x0 = np.array([1.0, 0.3, 0.3, 0.3, 0, 0, 0, 0]) if name == "stiff chain" else mod.x0()
+    if name == "stiff chain":
+        model, x0 = chain_with_joints(4)
+        mod = model.compile()
+    else:
+        mod = module(name)
+        x0 = mod.x0()
     options = {"rtol": 1e-6, "atol": 1e-8, "dense_output": True}
     theirs = solve_ivp(mod.rhs, (0, 2), x0, method="Radau", jac=jacobian(mod), **options)
     ours = solve_ivp(mod.rhs, (0, 2), x0, method=mod.Radau, **options)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.integrate
+from children import child
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
@@ -137,13 +138,11 @@ def test_an_interrupt_is_heard(acceptance_cache: Path) -> None:
     model = Path(__file__).parents[2] / "examples" / "double_pendulum.yaml"
     environment = {**os.environ, "EOMGEN_CACHE_DIR": str(acceptance_cache)}
     code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + LONG
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(model)], stdout=subprocess.PIPE, text=True, env=environment
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
-    time.sleep(0.3)
-    begun = time.perf_counter()
-    process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=30)[0] == "stopped\n"
+    command = [sys.executable, "-c", code, str(model)]
+    with child(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.3)
+        begun = time.perf_counter()
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=30)[0] == "stopped\n"
     assert time.perf_counter() - begun < 2.0  # its own share is a few hundredths; the rest is leaving Python

@@ -11,12 +11,14 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from children import child
 
 from eomgen.compilation import Cache, compile_c_library, compile_sources, load_core
 
@@ -56,10 +58,10 @@ def wrapper(tmp_path: Path) -> Callable[[str], str]:
     return make
 
 
-def start(folder: Path, compiler: str) -> subprocess.Popen[str]:
+def start(folder: Path, compiler: str) -> AbstractContextManager[subprocess.Popen[str]]:
     command = [sys.executable, "-c", BUILD, str(folder)]
     environment = {**os.environ, "CC": compiler}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    return child(command, env=environment, stdout=subprocess.PIPE, text=True)
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
@@ -173,8 +175,9 @@ def test_two_processes_build_the_same(
     met = tmp_path / "met"
     met.mkdir()
     wait = f'touch {met}/$$; for i in $(seq 500); do [ "$(ls {met} | wc -l)" -ge 2 ] && break; sleep 0.02; done'
-    builders = [start(folder, wrapper(wait)) for _ in range(2)]
-    paths = {builder.communicate(timeout=30)[0].strip() for builder in builders}
+    with start(folder, wrapper(wait)) as one, start(folder, wrapper(wait)) as other:
+        builders = one, other
+        paths = {builder.communicate(timeout=30)[0].strip() for builder in builders}
     assert [builder.returncode for builder in builders] == [0, 0]
     assert len(list(met.iterdir())) == 2
     (entry,) = fresh_cache.entries()
@@ -189,10 +192,10 @@ def test_killed_build_leaves_only_something_to_sweep(
     folder: Path, tmp_path: Path, wrapper: Callable[[str], str], fresh_cache: Cache, sources: dict[str, str], lines: str
 ) -> None:
     mark = tmp_path / "mark"
-    builder = start(folder, wrapper(lines.format(mark=mark)))
-    wait_for(mark.exists)
-    os.killpg(builder.pid, signal.SIGKILL)
-    builder.communicate()
+    with start(folder, wrapper(lines.format(mark=mark))) as builder:
+        wait_for(mark.exists)
+        os.killpg(builder.pid, signal.SIGKILL)
+        builder.communicate()
     assert fresh_cache.entries() == []
     assert list((fresh_cache.root / "entries").iterdir()) == []
     assert len(list((fresh_cache.root / "attempts").iterdir())) == 1
@@ -207,10 +210,10 @@ def test_interrupted_build_cleans_up(
     folder: Path, tmp_path: Path, wrapper: Callable[[str], str], fresh_cache: Cache
 ) -> None:
     mark = tmp_path / "mark"
-    builder = start(folder, wrapper(f"touch {mark}; exec sleep 30"))
-    wait_for(mark.exists)
-    os.killpg(builder.pid, signal.SIGINT)
-    builder.communicate(timeout=20)
+    with start(folder, wrapper(f"touch {mark}; exec sleep 30")) as builder:
+        wait_for(mark.exists)
+        os.killpg(builder.pid, signal.SIGINT)
+        builder.communicate(timeout=20)
     assert builder.returncode != 0
     assert fresh_cache.entries() == []
     assert list((fresh_cache.root / "attempts").iterdir()) == []

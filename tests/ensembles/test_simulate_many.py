@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from children import child
 from scipy.integrate import solve_ivp
 
 import eomgen as eg
@@ -280,18 +281,13 @@ def test_an_interrupt_is_honoured_soon(tmp_path: Path) -> None:
         "mod = compiled('double_pendulum', 'cython'); print('ready', flush=True)\n"
         "mod.simulate_many(1e4, angles(4000), **TIGHT)"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(Path(__file__).parents[1])], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
-    try:
-        assert process.stdout is not None
+    command = [sys.executable, "-c", code, str(Path(__file__).parents[1])]
+    with child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout.readline() == b"ready\n"
         time.sleep(1.0)
         start = time.perf_counter()
         process.send_signal(signal.SIGINT)
         errors = process.communicate(timeout=30)[1]
-    finally:
-        process.kill()
     assert time.perf_counter() - start < 5.0  # the machine may be busy
     assert process.returncode != 0
     assert b"KeyboardInterrupt" in errors

@@ -226,3 +226,18 @@ def test_gradients_agree_with_differences(data, twins):
         assume(np.abs(values).max() < 1e2)
         fourth_order = values @ np.array([1.0, -8.0, 8.0, -1.0]) / (12 * h)
         assert slope == pytest.approx(fourth_order, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("exponent", [1.5, 2.5, 4.5, 1.3])
+@pytest.mark.parametrize("stiffness", ["k", 3.0])
+def test_powers_of_a_depth_are_flat_where_it_is_zero(exponent: float, stiffness: str | float) -> None:
+    """Contact laws k max(d, 0)^n: their slope is 0 at and before contact, not 0 times infinity."""
+    g = Graph()
+    d = g.symbol("d")
+    k = g.symbol("k") if isinstance(stiffness, str) else g.constant(stiffness)
+    force = k * g.apply("max", d, g.constant(0.0)) ** exponent
+    for slope in (*gradient(force, [d]), *jvp([force], {d: g.one}), jacobian([force, d], [d])[0, 0]):
+        assert [evaluate([slope], {"d": x, "k": 3.0})[0] for x in (-1.0, 0.0)] == [0.0, 0.0]
+        for x in (1e-6, 0.7, 4.0):
+            expected = 3.0 * exponent * x ** (exponent - 1)
+            assert evaluate([slope], {"d": x, "k": 3.0})[0] == pytest.approx(expected, rel=1e-14)

@@ -87,7 +87,7 @@ def test_the_work_of_a_loop_does_not_grow_with_the_number_of_loops() -> None:
     for part in ("closing", "dynamics"):
         per_loop = [(found[2 * n][part] - found[n][part]) / n for n in (5, 10, 20)]
         assert max(per_loop) <= 1.02 * min(per_loop), part
-    assert sum(found[40].values()) <= 40 * 750
+    assert sum(found[40].values()) <= 40 * 705
 
 
 def test_a_state_with_more_freedoms_at_once_is_named() -> None:

@@ -1,4 +1,5 @@
-/* The sums of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. Returns the largest. */
+/* The sums of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. Returns the largest; of a
+   single freedom, for which there is nothing beside, 1e-4 of all that it moves (numeric/definite.py, STILL). */
 static double embedded_sizes(const double *restrict B, const double *restrict mass, double *restrict sizes)
 {
     double largest = 0.0;
@@ -8,6 +9,13 @@ static double embedded_sizes(const double *restrict B, const double *restrict ma
             sizes[k] += B[i * F + k] * B[i * F + k] * mass[i * N + i];
         }
         largest = sizes[k] > largest ? sizes[k] : largest;
+    }
+    if (F == 1) {
+        double reach = 0.0;
+        for (int i = 0; i < N; i++) {
+            reach += B[i] != 0.0 ? mass[i * N + i] : 0.0;
+        }
+        largest = fmax(largest, 1e-4 * reach);
     }
     return largest;
 }
