@@ -26,6 +26,7 @@ LAYER = {
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
     "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
+    "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
     "eomgen_lane_runs.h": ("c/ensembles/lane_steps.c", "c/ensembles/lane_runs.c"),

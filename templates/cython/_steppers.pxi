@@ -48,6 +48,7 @@ cdef extern from "eomgen_steppers.h" nogil:
         int rows_K, rows_F, error_order, squares
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
     const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau
+    const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
                      double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
@@ -197,7 +198,7 @@ cdef class Stepper:
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
-        self.method = METHODS[methods.index(method)]
+        self.method = eomgen_suited(METHODS[methods.index(method)], n)
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)

@@ -67,14 +67,25 @@ static void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
     }
 }
 
-static inline real larger_of(real a, real b)
+/* What each state may err by. */
+static inline void measure(const lane_run *run, real *scale)
 {
-    return choose(a >= b, a, b);
+    for (int i = 0; i < run->n; i++) {
+        const real a = abs_of(run->y_old[i]), b = abs_of(run->y[i]);
+        scale[i] = run->atol[i] + choose(a >= b, a, b) * run->rtol;
+    }
 }
 
 EOMGEN_EACH(root, sqrt)
+typedef real now;
 #define RUN lane_run
 #define EVALUATE evaluate_lanes
+#define ROW(j) K[(j) * n + i]
+#define AT(a) (a)[i]
+#define EACH(...) \
+    for (int i = 0; i < n; i++) { \
+        __VA_ARGS__; \
+    }
 #define METHOD(name, title, ...) \
     static const lane_method lane_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, name##_interpolate };
 #include "eomgen_methods.h"

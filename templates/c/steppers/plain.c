@@ -1,11 +1,27 @@
-/* The methods' text for one state at a time; eomgen_lane_runs.h takes the same text for several. */
+/* The methods' text for one state at a time; wide.c and eomgen_lane_runs.h take the same text with vectors. */
 #include "eomgen_real.h"
 #include "eomgen_steppers.h"
 
 #define RUN eomgen_run
 #define EVALUATE eomgen_evaluate
 #define root(a) sqrt(a)
-#define larger_of(a, b) fmax(a, b)
+#define now real
+#define ROW(j) K[(j) * n + i]
+#define AT(a) (a)[i]
+#define EACH(...) \
+    for (int i = 0; i < n; i++) { \
+        __VA_ARGS__; \
+    }
+
+/* What each state may err by. */
+static inline void measure(const eomgen_run *run, double *scale)
+{
+    for (int i = 0; i < run->n; i++) {
+        const double a = fabs(run->y_old[i]), b = fabs(run->y[i]);
+        scale[i] = run->atol[i] + (a >= b ? a : b) * run->rtol;
+    }
+}
+
 #define METHOD(name_, title, K, F, order) \
     const eomgen_method eomgen_##name_ = {.name = title, .rows_K = K, .rows_F = F, .error_order = order, \
         .attempt = name_##_attempt, .error = name_##_error, .prepare = name_##_prepare, \
