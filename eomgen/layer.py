@@ -11,7 +11,7 @@ STEPPERS = (
     *("control", "signals", "tape"),
     *("plain", "rk4_step", "rk4"),
     *("lu", "newton", "radau", "radau_step"),
-    "taylor",
+    *("taylor_terms", "taylor"),
     *("event_values", "event_zero", "crossings", "loop"),
 )
 
@@ -26,11 +26,14 @@ LAYER = {
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),
-    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23", "taylor_terms")),
+    "eomgen_methods.h": tuple(f"c/steppers/{name}.c" for name in ("dop853", "rk45", "rk23")),
     "eomgen_steppers.c": tuple(f"c/steppers/{name}.c" for name in STEPPERS),
+    "eomgen_wide_steps.c": ("c/steppers/wide.c",),
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
-    "eomgen_lane_runs.h": tuple(f"c/ensembles/lane_{name}.c" for name in ("steps", "taylor", "runs")),
+    "eomgen_lane_runs.h": (
+        *("c/ensembles/lane_steps.c", "c/steppers/taylor_terms.c", "c/ensembles/lane_taylor.c", "c/ensembles/lane_runs.c"),
+    ),
     **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }
 

@@ -21,7 +21,7 @@ from .processor import lane_width
 
 SOURCE = "_core.pyx"
 #: Of a model, that the layer reads too.
-HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_contraction.h")
+HEADERS = ("eomgen.h", "eomgen_real.h", "eomgen_processor.h", "eomgen_contraction.h")
 C_FILES = tuple(name for name in LAYER if name.endswith(".c"))
 _OBJECTS = ("_core.o", *(f"{name}.o" for name in C_FILES))
 _lock = threading.Lock()  # Cython keeps state of its own

@@ -50,6 +50,7 @@ cdef extern from "eomgen_steppers.h" nogil:
         void (*interpolate)(const eomgen_run *, double, double *) noexcept nogil
     const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor
     long eomgen_further(const eomgen_method *, long, const eomgen_series *)
+    const eomgen_method *eomgen_suited(const eomgen_method *, int) noexcept
     int eomgen_march(eomgen_function, int, double, double, const double *, const double *, const double *, double *,
                      double *, double *) noexcept
     void eomgen_start(const eomgen_method *, eomgen_run *) noexcept
@@ -216,7 +217,7 @@ cdef class Stepper:
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, i
-        self.method = find_method(method)
+        self.method = eomgen_suited(find_method(method), n)
         self.context, self.held = context, []
         self.atol = np.array(vector(atol, n, "atol", ValueError))
         cdef cnp.ndarray start = vector(y0, n, "y0", ValueError)

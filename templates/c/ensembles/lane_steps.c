@@ -85,27 +85,26 @@ static inline void evaluate_lanes(lane_run *run, real t, const real *y, real *k)
     }
 }
 
-static inline real larger_of(real a, real b)
+/* One over what each state may err by. */
+static inline void measure(const lane_run *run, real *scale)
 {
-    return choose(a >= b, a, b);
+    for (int i = 0; i < run->n; i++) {
+        const real a = abs_of(run->y_old[i]), b = abs_of(run->y[i]);
+        scale[i] = 1.0 / (run->atol[i] + choose(a >= b, a, b) * run->rtol);
+    }
 }
 
 EOMGEN_EACH(root, sqrt)
+typedef real now;
 #define RUN lane_run
 #define EVALUATE evaluate_lanes
-#define ATTEMPT(name) static void name##_attempt(lane_run *run, real h)
-#define STAGE(s, at, ...) \
-    { \
-        const int n = run->n; \
-        const real *restrict const y0 = run->y_old, *const K = run->K; \
-        real *restrict const y = run->y; \
-        for (int i = 0; i < n; i++) { y[i] = y0[i] + h * (__VA_ARGS__); } \
-        evaluate_lanes(run, run->t + at * h, y, run->K + s * n); \
+#define ROW(j) K[(j) * n + i]
+#define AT(a) (a)[i]
+#define OVER(a) (a) * AT(scale) /* see measure */
+#define EACH(...) \
+    for (int i = 0; i < n; i++) { \
+        __VA_ARGS__; \
     }
-#define LAST_STAGE(s) memcpy(run->f, run->K + s * run->n, (size_t)run->n * sizeof(real));
-#define k(j) K[j * n + i]
-#define SCALE(a) (1.0 / (a))
-#define OVER(a, scale) ((a) * (scale))
 #define METHOD(name, title, ...) \
     static const lane_method lane_##name = { title, __VA_ARGS__, name##_attempt, name##_error, name##_prepare, name##_interpolate };
 #include "eomgen_methods.h"

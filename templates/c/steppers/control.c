@@ -5,13 +5,19 @@
 
 #include "eomgen_steppers.h"
 
-int eomgen_look(eomgen_run *run)
+int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
 {
-    if (--run->look_in == 0) {
+    if (run->look_in == 0) {
         run->look_in = run->look(run->looker, &run->t);
         run->stopped = run->look_in <= 0;
     }
-    return run->stopped;
+    for (int i = 0; run->stopped && i < run->n; i++) {
+        k[i] = NAN;
+    }
+    if (run->signals != NULL && !run->stopped) {
+        eomgen_force(run, t, y);
+    }
+    return !run->stopped;
 }
 
 void eomgen_note(eomgen_run *run, int status, double t, const double *y)
@@ -26,22 +32,8 @@ void eomgen_note(eomgen_run *run, int status, double t, const double *y)
     }
 }
 
-void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
+void eomgen_failed(eomgen_run *run, int status, double t, const double *y, double *k)
 {
-    if (eomgen_look(run)) {
-        for (int i = 0; i < run->n; i++) {
-            k[i] = NAN;
-        }
-        return;
-    }
-    if (run->signals != NULL) {
-        eomgen_force(run, t, y);
-    }
-    const int status = run->rhs(t, y, run->u, run->c, k, run->w);
-    run->evaluations++;
-    if (status == 0) {
-        return;
-    }
     for (int i = 0; i < run->n; i++) {
         k[i] = NAN;
     }
@@ -100,14 +92,27 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
     }
 }
 
+/* The least step that SciPy takes. */
+static double least_step(const eomgen_run *run)
+{
+    return 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
+}
+
+static int too_small(const eomgen_run *run, double h)
+{
+    return !(h >= 2.5e-15 * fabs(run->t) + 1e-300) && !(h >= least_step(run)); /* nextafter takes its time */
+}
+
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
 {
     if (method->step != NULL) {
         return method->step(run);
     }
     const int n = run->n;
-    const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
-    double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs < least ? least : run->h_abs;
+    double h_abs = run->h_abs > run->max_step ? run->max_step : run->h_abs;
+    if (h_abs == run->h_abs && too_small(run, h_abs)) {
+        h_abs = least_step(run);
+    }
     int rejected = 0;
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
         return EOMGEN_TOO_MANY_STEPS;
@@ -119,7 +124,7 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
     }
     memcpy(run->K, run->f, (size_t)n * sizeof(double));
     for (;;) {
-        if (run->stopped || !(h_abs >= least)) {
+        if (run->stopped || too_small(run, h_abs)) {
             run->y = run->y_old, run->y_old = spare;
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }

@@ -86,6 +86,8 @@ static inline long eomgen_further(const eomgen_method *method, long n, const eom
 }
 
 extern const eomgen_method eomgen_dop853, eomgen_rk45, eomgen_rk23, eomgen_rk4, eomgen_radau, eomgen_taylor;
+/* The same method for this processor and so many states, to the same bits. */
+const eomgen_method *eomgen_suited(const eomgen_method *method, int n);
 
 enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEPS = -104 };
 
@@ -103,14 +105,24 @@ void eomgen_force(eomgen_run *run, double t, const double *y);
 extern const char *const eomgen_operations[]; /* names of the codes, then NULL */
 void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out);
 
-/* Look in if it is time, and say whether the run is stopped. */
-int eomgen_look(eomgen_run *run);
-
-/* Remember a failure at (t, y). */
+/* What an evaluation may have to do besides: look, form the inputs; 0 where the run has stopped, with NaN in k. */
+int eomgen_ready(eomgen_run *run, double t, const double *y, double *k);
+/* Remember a failure at (t, y); and NaN into k. */
 void eomgen_note(eomgen_run *run, int status, double t, const double *y);
+void eomgen_failed(eomgen_run *run, int status, double t, const double *y, double *k);
 
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
-void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k);
+static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
+{
+    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, k)) {
+        return;
+    }
+    const int status = run->rhs(t, y, run->u, run->c, k, run->w);
+    run->evaluations++;
+    if (status != 0) {
+        eomgen_failed(run, status, t, y, k);
+    }
+}
 
 /* dx'/dx at (t, y), where x' is f, into J; spare: 2 n doubles. 0, or the status of a failure, which is remembered. */
 int eomgen_differentiate(eomgen_run *run, double t, const double *y, const double *f, double *J, double *spare);

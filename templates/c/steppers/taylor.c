@@ -24,11 +24,8 @@ static int taylor_step(eomgen_run *run)
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
         return EOMGEN_TOO_MANY_STEPS;
     }
-    if (eomgen_look(run)) {
+    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, run->t, run->y, run->f)) {
         return EOMGEN_STOPPED;
-    }
-    if (run->signals != NULL) {
-        eomgen_force(run, run->t, run->y);
     }
     const int status = run->series->expand(run->t, run->y, run->u, run->c, p, run->K, run->K + (TAYLOR_MOST + 1) * n);
     run->evaluations++;
