@@ -144,7 +144,7 @@ static EOMGEN_APART void begin_lanes(const eomgen_ensemble *e, const lane_method
     run->awake = chosen;
     evaluate_lanes(run, run->t + h0 * direction, y1, f1);
     run->evaluations -= chosen;
-    const real d2 = lane_norm(run, f1, run->f) / h0, d = larger_of(d1, d2);
+    const real d2 = lane_norm(run, f1, run->f) / h0, d = choose(d1 >= d2, d1, d2);
     for (int l = 0; l < W; l++) {
         if (chosen[l]) {
             const double h1 = d1[l] <= 1e-15 && d2[l] <= 1e-15 ? fmax(1e-6, h0[l] * 1e-3)
