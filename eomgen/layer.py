@@ -32,7 +32,12 @@ LAYER = {
     "eomgen_ensembles.h": ("c/ensembles/eomgen_ensembles.h",),
     "eomgen_ensembles.c": ("c/ensembles/ensembles.c",),
     "eomgen_lane_runs.h": (
-        *("c/ensembles/lane_steps.c", "c/steppers/taylor_terms.c", "c/ensembles/lane_taylor.c", "c/ensembles/lane_runs.c"),
+        *(
+            "c/ensembles/lane_steps.c",
+            "c/steppers/taylor_terms.c",
+            "c/ensembles/lane_taylor.c",
+            "c/ensembles/lane_runs.c",
+        ),
     ),
     **{f"eomgen_runs{width}.c": (f"c/ensembles/lanes{width}.c",) for width in (2, 4, 8)},
 }

@@ -102,8 +102,8 @@ static const char metadata[] =
     " \"operations\": {\"rhs\": {\"multiplications\": 1}, \"rhs_long\": {\"multiplications\": 1000000}}}";
 
 static const eomgen_model model = {
-    2, "pendulum", 3, 1, 5, PENDULUM_N_WORK, (int)(sizeof kernels / sizeof kernels[0]), kernels, pendulum_precompute, metadata,
-    NULL, 0,
+    3, "pendulum", 3, 1, 5, PENDULUM_N_WORK, (int)(sizeof kernels / sizeof kernels[0]), kernels, pendulum_precompute, metadata,
+    NULL, 0, NULL,
 };
 
 const eomgen_model *eomgen_model_table(void)
