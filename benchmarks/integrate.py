@@ -109,7 +109,7 @@ def best_of(action: Callable[[], Any], repeats: int) -> float:
 def race(
     module: Any, equations: list[tuple[Any, Any]], x0: np.ndarray, goals: dict[float, float], repeats: int
 ) -> tuple[list[list[Any]], list[Limit]]:
-    """At each error the loosest tolerance of each that reaches it, and how long that takes; the better of ours counts."""
+    """At each error the loosest tolerance of each that reaches it, and its time; the better of ours counts."""
     exact, n = taylor.reference(equations, x0, END), len(x0) // 2
     fine = [10.0 ** (-k / 2) for k in range(8, 31)]
     grids = {"DOP853": fine, "Taylor": fine, "heyoka": TOLERANCES[n]}
