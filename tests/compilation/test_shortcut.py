@@ -110,16 +110,15 @@ def test_options_and_writers_count(write: Any, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_change_of_code_or_templates_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    files = list(shortcut._files())
-    names = {path.name for path in files}
+    files = shortcut.writers()
+    names = {Path(path).name for path in files}
     assert {"model.c.j2", "dop853.c", "_core.pyx", "c_text.py", "schedule.py", "options.py", "program.py"} <= names
     before = shortcut.digest_writers.__wrapped__()
-    copied = tmp_path / files[0].parent.name / files[0].name
-    copied.parent.mkdir()
-    copied.write_bytes(files[0].read_bytes())
-    monkeypatch.setattr(shortcut, "_files", lambda: iter([copied, *files[1:]]))
+    copied, text = tmp_path / Path(files[0]).name, Path(files[0]).read_bytes()
+    copied.write_bytes(text)
+    monkeypatch.setattr(shortcut, "writers", lambda: [str(copied), *files[1:]])
     assert shortcut.digest_writers.__wrapped__() == before
-    copied.write_bytes(files[0].read_bytes() + b"\n")
+    copied.write_bytes(text + b"\n")
     assert shortcut.digest_writers.__wrapped__() != before
 
 
