@@ -52,7 +52,7 @@ class CacheEntry:
     key : str
         SHA-256 of everything it depends on.
     kind : str
-        ``extension``, ``library`` or ``layer``.
+        ``extension``, ``library``, ``layer`` or ``lanes``.
     name : str
         Name of the model.
     directory : Path
@@ -104,8 +104,9 @@ class Cache:
         """Folder of the templates' bytecode, made if need be; None where it cannot be written."""
         folder = self.root / "templates"
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
             _check_private(self.root)
+            folder.mkdir(mode=0o700, exist_ok=True)
         except (OSError, ToolchainError):
             return None
         return folder if os.access(folder, os.W_OK) else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -110,21 +111,44 @@ def test_options_and_writers_count(write: Any, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_change_of_code_or_templates_changes_the_digest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    files = list(shortcut._files())
-    names = {path.name for path in files}
+    files = shortcut.writers()
+    names = {Path(path).name for path in files}
     assert {"model.c.j2", "dop853.c", "_core.pyx", "c_text.py", "schedule.py", "options.py", "program.py"} <= names
     before = shortcut.digest_writers.__wrapped__()
-    copied = tmp_path / files[0].parent.name / files[0].name
-    copied.parent.mkdir()
-    copied.write_bytes(files[0].read_bytes())
-    monkeypatch.setattr(shortcut, "_files", lambda: iter([copied, *files[1:]]))
+    copied, text = tmp_path / Path(files[0]).name, Path(files[0]).read_bytes()
+    copied.write_bytes(text)
+    monkeypatch.setattr(shortcut, "writers", lambda: [str(copied), *files[1:]])
     assert shortcut.digest_writers.__wrapped__() == before
-    copied.write_bytes(files[0].read_bytes() + b"\n")
+    copied.write_bytes(text + b"\n")
     assert shortcut.digest_writers.__wrapped__() != before
 
 
 def test_notes_of_builds_that_are_gone_go_too(write: Any, cache: Cache) -> None:
-    compiled(write(model("gone")))
-    assert any(cache.shortcuts.iterdir())
-    cache.clear()
-    assert not any(cache.shortcuts.iterdir())
+    place, _ = compiled(write(model("gone")))
+    kept, _ = compiled(write(model("stays")))
+    shutil.rmtree(Path(place).parent)
+    cache.prune(older_than=1e6)
+    noted = {note.read_text() for note in cache.shortcuts.iterdir()}
+    assert Path(place).parent.name not in noted
+    assert Path(kept).parent.name in noted
+
+
+def test_templates_are_compiled_once(tmp_path: Path, fresh_cache: Cache) -> None:
+    folder = fresh_cache.open_templates()
+    assert folder is not None
+    assert fresh_cache.root.stat().st_mode & 0o077 == 0
+    code = (
+        "import sys, time, jinja2; from pathlib import Path\n"
+        "from eomgen.emit.sources import environment, keep_bytecode\n"
+        "keep_bytecode(Path(sys.argv[1])); environment()._compile = None if sys.argv[2:] else environment()._compile\n"
+        "print(environment().get_template('c/lanes.c.j2').render(name='m', width=2, tests=(), feature=''))"
+    )
+    first = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
+    assert list(folder.iterdir())
+    again = subprocess.run([sys.executable, "-c", code, str(folder), "no"], capture_output=True, text=True, check=True)
+    assert again.stdout == first.stdout
+    assert "m_lanes2" in again.stdout
+    fresh_cache.clear()
+    assert not folder.exists()
+    (fresh_cache.root / "templates").write_text("in the way")
+    assert fresh_cache.open_templates() is None
