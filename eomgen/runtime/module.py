@@ -256,7 +256,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """
         from .simulate import simulate
 
-        return simulate(self, span, initial, parameters, inputs, method=method, **options)
+        return simulate(self, span, initial, parameters, inputs, **self._stepped(method=method, **options))
 
     def simulate_many(
         self,
@@ -284,7 +284,15 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """
         from ..ensembles.simulate_many import simulate_many
 
-        return simulate_many(self, span, initial, parameters, inputs, **options)
+        return simulate_many(self, span, initial, parameters, inputs, **self._stepped(**options))
+
+    def _stepped(self, **options: Any) -> dict[str, Any]:
+        """Options of a run, RK4 with the model's own step where the model says so and nothing else is given."""
+        own = self.metadata.get("simulation", {}).get("step")
+        if own is not None and self.n_dof and options.get("method") in (None, "RK4"):
+            options["method"] = "RK4"
+            options["step"] = own if options.get("step") is None else options["step"]
+        return options
 
     def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
         """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.

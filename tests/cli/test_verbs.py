@@ -207,3 +207,20 @@ def test_check_draws_the_mechanism(call: Call, tmp_path: Path) -> None:
     wrong = call("check", EXAMPLES / "slider_crank.yaml", "--graph", "graph.doc")
     assert wrong.code == 2
     assert ".svg" in wrong.err
+
+
+def test_rounding_of_zeros_is_shown_as_zero() -> None:
+    from eomgen.cli.screen import without_noise
+
+    assert without_noise([1.0, -3e-20, 2e-3, float("nan")], ["m", "m", "rad", "m"])[:3] == [1.0, 0.0, 2e-3]
+    assert without_noise([-3e-20, 1e-21]) == [-3e-20, 1e-21]  # all of a small machine
+    assert without_noise([-3e-20, 1.0], ["m", "N"], [0.5, 1.0]) == [0.0, 1.0]
+
+
+def test_messages_speak_of_options() -> None:
+    from eomgen.cli.failures import lines_of
+    from eomgen.errors import AssemblyError, UsageError
+
+    assert lines_of(UsageError("method RK4 needs step=, the size")) == ["method RK4 needs --step, the size"]
+    blocked = lines_of(AssemblyError("the way is blocked; give initial={...} nearer to the first point"))
+    assert blocked == ["the way is blocked; give --set NAME=VALUE nearer to the first point"]
