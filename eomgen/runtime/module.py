@@ -57,7 +57,9 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
     rhs : callable
         ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
     jacobian : callable
-        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.
+        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.  Exact, in all directions, at states on
+        the constraints (of ``x0``, ``project`` or a trajectory); elsewhere it is the one at the projected state, off by
+        the order of the distance, as derivatives by parameters and inputs are.
     bias : callable
         ``bias(t, x)`` -> h (n_v,) in ``M v' + h`` = generalized forces that are not in the model.
     outputs : callable
