@@ -131,10 +131,11 @@ def test_examples_copies_one_and_never_overwrites(call: Call, tmp_path: Path, na
     assert copy.read_bytes() == (EXAMPLES / file).read_bytes()
 
 
-def test_cache(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
+def test_cache(call: Call, tmp_path: Path, warm_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "nothing"))
     empty = call("cache", "list", "--json").json
-    assert empty == {"directory": str(tmp_path / "cache"), "size": 0, "entries": []}
+    assert empty == {"directory": str(tmp_path / "nothing"), "size": 0, "entries": []}
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(warm_cache))
     assert call("run", EXAMPLES / "pendulum.yaml", "--end", "0.1").code == 0
     full = call("cache", "list", "--json").json
     assert {"pendulum"} <= {entry["name"] for entry in full["entries"]}
