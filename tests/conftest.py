@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -40,3 +41,18 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     if left_out and exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
         reporter.write_line(f"{len(left_out)} skipped or expected to fail, and --no-skips was given", red=True)
+
+
+@pytest.fixture
+def warm_cache(tmp_path: Path, pytestconfig: pytest.Config) -> Path:
+    """A cache of the test's own that holds the Cython layer, which takes half a minute to build, and nothing else."""
+    from eomgen.compilation import Cache
+
+    root = tmp_path / "cache"
+    entries = root / "entries"
+    entries.mkdir(parents=True, mode=0o700)
+    root.chmod(0o700)
+    for entry in Cache(Path(pytestconfig.stash[CACHE])).entries():
+        if entry.kind == "layer":
+            shutil.copytree(entry.directory, entries / entry.directory.name)
+    return root

@@ -47,6 +47,11 @@ def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
     if not C.size:
         return "beyond, nothing is open"
     gaps = np.abs(scales.residual(C))
+    undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
+    if undefined.any():
+        owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
+        what = "no finite value: look for a root or logarithm of a negative number, or a division by zero"
+        return f"beyond, at t = {t:.6g} s, {', '.join(owners)} has {what}"
     place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(follower.led, y, strict=True)) or f"t = {t:.6g} s"
     if not gaps.max() > SHUT:
         return f"beyond, at {place}, it closes again: a driver's value jumps there, or it is out of reach in between"

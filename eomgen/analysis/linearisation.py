@@ -127,6 +127,8 @@ class Linearisation:
     def stability(self) -> str:
         """By the largest real part of the eigenvalues: 'asymptotically stable', 'marginal' or 'unstable'.
 
+        'no freedom' where drivers and constraints hold everything.
+
         'marginal' where rounding alone could move one of them to the imaginary axis, and none is beyond it: the linear
         equations do not decide.
         """
@@ -212,7 +214,8 @@ class Linearisation:
             worst = int(np.abs(self._scaled_drift).argmax())
             lines.append(("largest drift", f"{self.states[worst]}, {self.drift[worst]:.6g}"))
         lines.append(("eigenvalues", ", ".join(number(value) for value in self.eigenvalues)))
-        return [*lines, ("stability", self.stability)]
+        frozen = " (of the equations frozen at this time)" if kind == "no steady motion" and self.A.size else ""
+        return [*lines, ("stability", self.stability + frozen)]
 
     def __repr__(self) -> str:
         return as_text(f"Linearisation of {self.name}", self.facts)

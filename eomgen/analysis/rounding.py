@@ -28,6 +28,8 @@ SWEEPS = 12  #: of Jacobi's method, at most
 def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
     """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
 
+    Without states it is 'no freedom': what drivers and constraints hold entirely is neither.
+
     Parameters
     ----------
     A : (n, n) array
@@ -39,7 +41,7 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
         Relative error of A.
     """
     if not A.size:
-        return "asymptotically stable"
+        return "no freedom"
     balanced = _balance(A, own)
     values = np.linalg.eigvals(balanced)
     far = error * float(np.linalg.norm(balanced, 2))

@@ -9,7 +9,7 @@ import click
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
 from .options import parse_settings
-from .screen import print_heading, print_json, print_table
+from .screen import print_heading, print_json, print_table, without_noise
 
 
 @click.command()
@@ -40,8 +40,10 @@ def consistent(
         )
         return
     print_heading("the nearest state on the constraints")
+    units = [module.layout.unit(name) for name in module.x_names]
+    columns = rough.tolist(), found.tolist(), change.tolist()
     rows = [
         [name, f"{a:.6g}", f"{b:.6g}", f"{c:.3g}"]
-        for name, a, b, c in zip(module.x_names, rough.tolist(), found.tolist(), change.tolist(), strict=True)
+        for name, a, b, c in zip(module.x_names, *(without_noise(x, units) for x in columns), strict=True)
     ]
     print_table(["", "given", "consistent", "change"], rows, right=range(1, 4))

@@ -22,6 +22,15 @@ from ..errors import (
 
 MODEL, USAGE, TOOLCHAIN, INTEGRATION = 1, 2, 3, 4
 
+#: What messages call an argument in Python, and the option it is here.
+OPTIONS = {
+    "initial={...}": "--set NAME=VALUE",
+    "step=,": "--step,",
+    "limits=True": "--within-limits",
+    "; give limits={name: ..}": "",
+    "method='embedding'": "--method embedding",
+}
+
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
@@ -43,13 +52,21 @@ def lines_of(error: BaseException, file: str = "") -> list[str]:
         return [str(p) if p.file else f"{prefix}{p}" for p in error.problems]
     if isinstance(error, OSError) and error.strerror:
         return [f"{error.filename}: {error.strerror}" if error.filename else error.strerror]
-    text = str(error)
+    text = told(error)
     if isinstance(error, ToolchainError):
         extra = [part for part in (error.command, error.output.strip()) if part and part not in text]
         return "\n".join([text, *extra]).splitlines()
     if file and isinstance(error, EomgenError) and not isinstance(error, UsageError | MissingDependencyError):
         text = text if text.startswith(file) else f"{file}: {text}"
     return text.splitlines() or [type(error).__name__]
+
+
+def told(error: BaseException) -> str:
+    """The message of an exception in the words of the command line."""
+    text = str(error)
+    for argument, option in OPTIONS.items():
+        text = text.replace(argument, option)
+    return text
 
 
 def to_dict(error: BaseException) -> dict[str, Any]:
@@ -59,7 +76,7 @@ def to_dict(error: BaseException) -> dict[str, Any]:
         "error": {
             "type": type(error).__name__,
             "exit_code": exit_code(error),
-            "message": str(error),
+            "message": told(error),
             "problems": problems,
         }
     }

@@ -7,7 +7,7 @@ import click
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
 from .options import parse_settings
-from .screen import print_heading, print_json, print_rows
+from .screen import print_heading, print_json, print_rows, without_noise
 
 
 @click.command()
@@ -36,4 +36,7 @@ def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...]
         return
     click.echo(repr(found))
     print_heading("velocities after it")
-    print_rows([(name, f"{after[name]:.6g} {module.layout.unit(name)}") for name in module.v_names])
+    units = [module.layout.unit(name) for name in module.v_names]
+    before = found.before[module.n_q :].tolist()
+    rates = without_noise([after[name] for name in module.v_names], units, before)
+    print_rows([(n, f"{x:.6g} {unit}") for n, x, unit in zip(module.v_names, rates, units, strict=True)])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import click
 
 from .analysis import Prepared, analysis_options, time_option
 from .options import parse_settings
-from .screen import print_heading, print_json, print_rows
+from .screen import print_heading, print_json, print_rows, without_noise
 
 
 @click.command()
@@ -30,10 +32,15 @@ def inverse(work: Prepared, t: float, actuated: tuple[str, ...], accelerate: tup
         )
         return
     print_heading(f"forces of the drives at t = {t:g} s")
-    print_rows([(name, f"{value:.6g} {_unit(module, name)}") for name, value in found.as_dict().items()])
+    forces = found.as_dict()
+    _print_values(list(forces), list(forces.values()), [_unit(module, name) for name in forces])
     print_heading("accelerations")
-    print_rows([(name, f"{value:.6g} {module.layout.unit(name)}") for name, value in
-                zip(module.layout.a, found.a, strict=True)])  # fmt: skip
+    _print_values(module.layout.a, found.a.tolist(), [module.layout.unit(name) for name in module.layout.a])
+
+
+def _print_values(names: Sequence[str], values: Sequence[float], units: Sequence[str]) -> None:
+    settled = zip(names, without_noise(values, units), units, strict=True)
+    print_rows([(name, f"{value:.6g} {unit}") for name, value, unit in settled])
 
 
 def _unit(module: object, name: str) -> str:

@@ -24,7 +24,7 @@ from .options import (
     target_option,
 )
 from .run import TABLES, complete_parameters, final_names, sort_settings
-from .screen import finite, print_heading, print_json, print_rows, print_table, stage
+from .screen import finite, print_heading, print_json, print_rows, print_table, stage, without_noise
 from .workspace import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
@@ -251,4 +251,7 @@ def print_motion(motion: KinematicAnalysis) -> None:
     picked = np.unique(np.linspace(0, len(motion) - 1, SHOWN).round().astype(int))
     if len(picked) < len(motion):
         print_rows([("shown", f"{len(picked)} of {len(motion)} points; --out FILE writes all")])
-    print_table(header, [[f"{motion[n][k]:.6g}" for n in ("t", *names)] for k in picked], right=range(len(header)))
+    units = [motion.units.get(n, n) for n in ("t", *names)]
+    sizes = [float(np.nanmax(np.abs(motion[n]), initial=0.0)) for n in ("t", *names)]
+    shown = [without_noise([motion[n][k] for n in ("t", *names)], units, sizes) for k in picked]
+    print_table(header, [[f"{x:.6g}" for x in row] for row in shown], right=range(len(header)))

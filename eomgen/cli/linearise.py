@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from .analysis import Prepared, analysis_options, pairs, time_option
-from .screen import print_heading, print_json, print_table
+from .screen import print_heading, print_json, print_table, without_noise
 
 
 @click.command()
@@ -45,5 +45,6 @@ def linearise(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool
     ):
         if matrix.size:
             print_heading(label)
-            lines = [[name, *(f"{x:.6g}" for x in row)] for name, row in zip(rows, matrix, strict=True)]
+            entries = iter(without_noise(matrix.ravel().tolist()))
+            lines = [[name, *(f"{next(entries):.6g}" for _ in columns)] for name in rows]
             print_table(["", *columns], lines, right=range(1, len(columns) + 1))

@@ -65,19 +65,20 @@ _SOLVER = (
         "--solver",
         metavar="NAME",
         callback=_find_solver,
-        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF or LSODA.",
+        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA, or RK4 with --step.",
     ),
+    click.option("--step", type=_TOLERANCE, metavar="H", help="Size of the steps of RK4 in s."),
     click.option("--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
     click.option("--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
 )
 
 
 def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """``--solver``, ``--rtol`` and ``--atol``, handed to the verb as one mapping ``solver`` for ``simulate``."""
+    """``--solver``, ``--step``, ``--rtol`` and ``--atol``, for ``simulate`` in one mapping ``solver``."""
 
     @functools.wraps(verb)
     def wrapped(*args: Any, **kwargs: Any) -> Any:
-        names = {"solver": "method", "rtol": "rtol", "atol": "atol"}
+        names = {"solver": "method", "step": "step", "rtol": "rtol", "atol": "atol"}
         given = {name: value for key, name in names.items() if (value := kwargs.pop(key)) is not None}
         return verb(*args, solver=given, **kwargs)
 

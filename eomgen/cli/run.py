@@ -27,7 +27,7 @@ from .options import (
     solver_options,
     target_option,
 )
-from .screen import finite, print_heading, print_json, print_rows, stage
+from .screen import finite, print_heading, print_json, print_rows, stage, without_noise
 
 if TYPE_CHECKING:
     from ..derivation import Equations
@@ -241,6 +241,8 @@ def print_trajectory(trajectory: Trajectory, energy: EnergyBalance | None, uncou
         rows += [("", f"... ({len(points) - POINTS} more)")] if len(points) > POINTS else []
     print_rows(rows + _energy_rows(energy, uncounted))
     print_heading(f"values at t = {trajectory.t[-1]:g} s")
-    print_rows(
-        [(name, f"{trajectory[name][-1]: .9g} {trajectory.units.get(name, '')}") for name in final_names(trajectory)]
-    )
+    names = final_names(trajectory)
+    units = [trajectory.units.get(name, "") for name in names]
+    sizes = [float(max(trajectory[name].max(), -trajectory[name].min())) for name in names]
+    final = without_noise([trajectory[name][-1] for name in names], units, sizes)
+    print_rows([(name, f"{x: .9g} {unit}") for name, x, unit in zip(names, final, units, strict=True)])

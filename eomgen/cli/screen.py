@@ -15,6 +15,7 @@ from typing import Any
 import click
 
 WIDTH = 120  #: of tables that do not go to a terminal
+NOISE = 1e-14  #: of the largest value of a unit: what is smaller is the rounding of a zero
 
 
 def print_json(value: Any) -> None:
@@ -37,6 +38,26 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     width = max((len(label) for label, _ in rows), default=0) + 2
     for label, value in rows:
         click.echo(f"  {label:<{width}}{value}")
+
+
+def without_noise(
+    values: Sequence[float], units: Sequence[str] | None = None, sizes: Sequence[float] | None = None
+) -> list[float]:
+    """Values for a table, 0 where one is nothing beside the largest of its unit.
+
+    Parameters
+    ----------
+    values : sequence of float
+    units : sequence of str, optional
+        Of each; one for all by default.
+    sizes : sequence of float, optional
+        What each value is like elsewhere, over a run for instance; by default the values themselves.
+    """
+    units = units or [""] * len(values)
+    largest = dict.fromkeys(units, 0.0)
+    for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
+        largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
+    return [0.0 if abs(x) <= NOISE * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> None:

@@ -69,7 +69,7 @@ KINDS = {
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
-SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA")
+SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
 _UNIT = Field("text", "unit, for display", default="")
 _DOC = Field("text", "one sentence, for display", default="")
@@ -248,6 +248,7 @@ SIMULATION: Fields = {
     "method": Field("choice", "integrator", default=Simulation.method, choices=SOLVERS),
     "rtol": Field("positive", "relative tolerance", default=Simulation.rtol),
     "atol": Field("positive", "absolute tolerance", default=Simulation.atol),
+    "step": Field("positive", "size of the steps of RK4 (s), and only of it"),
 }
 MODEL: Fields = {
     "name": _NAME,

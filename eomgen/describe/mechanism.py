@@ -181,6 +181,7 @@ class Simulation:
     method: str = "DOP853"
     rtol: float = 1e-8
     atol: float = 1e-10
+    step: float | None = None
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ def from_sympy(
     initial: Mapping[Any, Any] | None = None,
     specified: Mapping[Any, Any] | None = None,
     potential_energy: Any = None,
+    guess: Mapping[Any, Any] | None = None,
 ) -> Model:
     """A model from equations of motion that SymPy's mechanics has formed.
 
@@ -53,6 +54,8 @@ def from_sympy(
         Functions of time to replace by expressions in t: ``{f(t): a*sin(w*t)}``; derivatives follow.
     potential_energy : sympy.Expr, optional
         Potential energy (J), where SymPy's bodies do not have it.
+    guess : mapping, optional
+        Where assembly begins to look for coordinates that are not given, by symbol or name: it picks the branch.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def from_sympy(
     from .model import Model
 
     return Model.from_description(
-        describe_method(method, name, parameters, inputs, outputs, initial, specified, potential_energy)
+        describe_method(method, name, parameters, inputs, outputs, initial, specified, potential_energy, guess)
     )
 
 
@@ -81,6 +84,7 @@ def describe_method(
     initial: Mapping[Any, Any] | None = None,
     specified: Mapping[Any, Any] | None = None,
     potential_energy: Any = None,
+    guess: Mapping[Any, Any] | None = None,
 ) -> Description:
     """The description behind :func:`from_sympy`, which see."""
     forms = read_forms(method)
@@ -132,8 +136,9 @@ def describe_method(
         description.add("inputs", function, {"value": given_inputs.get(function, 0.0)})
     for output, expression in {**_noncontributing(forms, taken), **extra}.items():
         description.add("outputs", output, {"expression": expression})
-    if initial:
-        description.values["initial"] = {name_of(key): value for key, value in initial.items()}
+    for key, values in (("initial", initial), ("guess", guess)):
+        if values:
+            description.values[key] = {name_of(name): value for name, value in values.items()}
     return description
 
 

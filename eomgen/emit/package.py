@@ -34,7 +34,7 @@ FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces"
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", *ANALYSES)
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", *ANALYSES)
 
 
 def emit_package(program: Program, target: str) -> SourceSet:

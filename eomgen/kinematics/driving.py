@@ -121,6 +121,16 @@ def _explain(
         q = free.close(given, guess).q
     except AssemblyError as loops:
         return loops  # not for the drivers' sake
+    with np.errstate(all="ignore"):
+        values = functions.position(q)[0]
+    lost = [i for i in drivers if not np.isfinite(values[i])]
+    if lost:
+        names, labels = [drivers[i] for i in lost], functions.kinematics.constraints.labels
+        return AssemblyError(
+            f"{', '.join(names)} has no finite value at t = 0: look for a division by zero, or a root or logarithm "
+            "of a negative number",
+            [labels[i] for i in lost],
+        )
     kept, spare = _needed(functions, drivers, q)
     if spare:
         try:

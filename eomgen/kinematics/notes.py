@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from ..constraints import Driver
+from ..graph.traverse import reachable
 from .kinematics import Kinematics
 from .mobility import Mobility
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
 SHOWN = 6
+#: Operations that may make a corner -> what people write.
+CORNERS = {"abs": "abs", "sign": "sign", "min": "min", "max": "max", "select": "where"}
 
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
@@ -44,7 +48,24 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
                 f"{', '.join(mobility.independent)} hardly moves the mechanism at the initial configuration "
                 f"(conditioning {mobility.conditioning:.1g}); {name} would do better there ({value:.1g})"
             )
+    notes += [
+        f"{name}: {', '.join(corners)} in a driver's value may make a corner, where its rate jumps: an impact that is "
+        "not computed; take a smooth motion, or impacts for what is meant to hit"
+        for name, corners in _drivers_with_corners(kinematics)
+    ]
     return notes
+
+
+def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]:
+    """Names of drivers whose value takes one of several branches, and by which functions."""
+    found = []
+    for constraint in kinematics.mechanism.constraints:
+        if isinstance(constraint, Driver):
+            graph = constraint.value.graph
+            operations = {graph.nodes[i][0] for i in reachable(graph, [constraint.value.id])}
+            corners = [word for operation, word in CORNERS.items() if operation in operations]
+            found += [(constraint.name, corners)] if corners else []
+    return found
 
 
 def _few(names: tuple[str, ...] | list[str]) -> str:

@@ -250,6 +250,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             "method": m.simulation.method,
             "rtol": m.simulation.rtol,
             "atol": m.simulation.atol,
+            **({} if m.simulation.step is None else {"step": m.simulation.step}),
         },
     }
 

@@ -57,7 +57,9 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
     rhs : callable
         ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
     jacobian : callable
-        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.
+        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.  Exact, in all directions, at states on
+        the constraints (of ``x0``, ``project`` or a trajectory); elsewhere it is the one at the projected state, off by
+        the order of the distance, as derivatives by parameters and inputs are.
     bias : callable
         ``bias(t, x)`` -> h (n_v,) in ``M v' + h`` = generalized forces that are not in the model.
     outputs : callable
@@ -256,7 +258,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """
         from .simulate import simulate
 
-        return simulate(self, span, initial, parameters, inputs, method=method, **options)
+        return simulate(self, span, initial, parameters, inputs, **self._stepped(method=method, **options))
 
     def simulate_many(
         self,
@@ -284,7 +286,15 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """
         from ..ensembles.simulate_many import simulate_many
 
-        return simulate_many(self, span, initial, parameters, inputs, **options)
+        return simulate_many(self, span, initial, parameters, inputs, **self._stepped(**options))
+
+    def _stepped(self, **options: Any) -> dict[str, Any]:
+        """Options of a run, RK4 with the model's own step where the model says so and nothing else is given."""
+        own = self.metadata.get("simulation", {}).get("step")
+        if own is not None and self.n_dof and options.get("method") in (None, "RK4"):
+            options["method"] = "RK4"
+            options["step"] = own if options.get("step") is None else options["step"]
+        return options
 
     def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
         """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.

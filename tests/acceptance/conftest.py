@@ -1,24 +1,12 @@
-"""Each model is derived and compiled once for all acceptance tests, in a cache of their own."""
+"""Each model is derived and compiled once for all acceptance tests."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import models
 import pytest
-
-
-@pytest.fixture(scope="session")
-def acceptance_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("acceptance_cache")
-
-
-@pytest.fixture(autouse=True)
-def own_cache(acceptance_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a test itself compiles goes there too."""
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(acceptance_cache))
 
 
 @pytest.fixture(scope="session")
@@ -36,7 +24,7 @@ def equations() -> Callable[..., Any]:
 
 
 @pytest.fixture(scope="session")
-def module(equations: Callable[..., Any], acceptance_cache: Path) -> Callable[..., Any]:
+def module(equations: Callable[..., Any]) -> Callable[..., Any]:
     """``module(name, method, target, independent)`` -> the compiled module."""
     made: dict[Any, Any] = {}
 
@@ -45,9 +33,7 @@ def module(equations: Callable[..., Any], acceptance_cache: Path) -> Callable[..
     ) -> Any:
         key = name, method, target, independent
         if key not in made:
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setenv("EOMGEN_CACHE_DIR", str(acceptance_cache))
-                made[key] = equations(name, method, independent).compile(target=target)
+            made[key] = equations(name, method, independent).compile(target=target)
         return made[key]
 
     return compiled

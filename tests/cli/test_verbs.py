@@ -131,10 +131,11 @@ def test_examples_copies_one_and_never_overwrites(call: Call, tmp_path: Path, na
     assert copy.read_bytes() == (EXAMPLES / file).read_bytes()
 
 
-def test_cache(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
+def test_cache(call: Call, tmp_path: Path, warm_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "nothing"))
     empty = call("cache", "list", "--json").json
-    assert empty == {"directory": str(tmp_path / "cache"), "size": 0, "entries": []}
+    assert empty == {"directory": str(tmp_path / "nothing"), "size": 0, "entries": []}
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(warm_cache))
     assert call("run", EXAMPLES / "pendulum.yaml", "--end", "0.1").code == 0
     full = call("cache", "list", "--json").json
     assert {"pendulum"} <= {entry["name"] for entry in full["entries"]}
@@ -207,3 +208,20 @@ def test_check_draws_the_mechanism(call: Call, tmp_path: Path) -> None:
     wrong = call("check", EXAMPLES / "slider_crank.yaml", "--graph", "graph.doc")
     assert wrong.code == 2
     assert ".svg" in wrong.err
+
+
+def test_rounding_of_zeros_is_shown_as_zero() -> None:
+    from eomgen.cli.screen import without_noise
+
+    assert without_noise([1.0, -3e-20, 2e-3, float("nan")], ["m", "m", "rad", "m"])[:3] == [1.0, 0.0, 2e-3]
+    assert without_noise([-3e-20, 1e-21]) == [-3e-20, 1e-21]  # all of a small machine
+    assert without_noise([-3e-20, 1.0], ["m", "N"], [0.5, 1.0]) == [0.0, 1.0]
+
+
+def test_messages_speak_of_options() -> None:
+    from eomgen.cli.failures import lines_of
+    from eomgen.errors import AssemblyError, UsageError
+
+    assert lines_of(UsageError("method RK4 needs step=, the size")) == ["method RK4 needs --step, the size"]
+    blocked = lines_of(AssemblyError("the way is blocked; give initial={...} nearer to the first point"))
+    assert blocked == ["the way is blocked; give --set NAME=VALUE nearer to the first point"]

@@ -1,4 +1,4 @@
-"""A hand-written model (a pendulum) and caches that last as long as the tests."""
+"""A hand-written model (a pendulum) and caches of a test's own."""
 
 from __future__ import annotations
 
@@ -13,17 +13,10 @@ from eomgen.emit.sources import read_template
 MODEL = Path(__file__).with_name("model")
 
 
-@pytest.fixture(scope="session")
-def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One cache for most tests, so that the layer is built once."""
-    return tmp_path_factory.mktemp("cache") / "eomgen"
-
-
 @pytest.fixture(autouse=True)
-def cache(shared_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
-    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(shared_cache))
+def no_compiler_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the user's CC is."""
     monkeypatch.delenv("CC", raising=False)
-    return Cache(shared_cache)
 
 
 @pytest.fixture

@@ -64,10 +64,10 @@ def test_wheel_and_sdist_hold_everything(built: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path) -> None:
+def test_the_wheel_works_away_from_the_checkout(built: Path, tmp_path: Path, warm_cache: Path) -> None:
     home = tmp_path / "site"
     run("-m", "pip", "install", "--no-deps", "--quiet", "--target", home, next(built.glob("*.whl")), cwd=tmp_path)
-    where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(tmp_path / "cache")}
+    where = {"PYTHONPATH": str(home), "EOMGEN_CACHE_DIR": str(warm_cache)}
     origin = run("-c", "import eomgen; print(eomgen.__file__)", cwd=tmp_path, **where).strip()
     assert Path(origin).is_relative_to(home)
     run("-m", "eomgen", "examples", "pendulum", cwd=tmp_path, **where)
