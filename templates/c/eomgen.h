@@ -40,7 +40,7 @@ typedef struct {
     int width;                           /* states at a time */
     int (*usable)(void);                 /* whether this processor has the instructions */
     const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
-    void (*contracted)(void);            /* rhs for ensembles, a*b + c rounded once: lane_function of the layer, or NULL */
+    void (*contracted)(void);            /* rhs for ensembles, a*b + c rounded once; cast to lane_function of the layer */
 } eomgen_lanes;
 
 typedef struct {

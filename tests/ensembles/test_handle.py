@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,3 +62,14 @@ def test_what_a_processor_can_do_is_known() -> None:
     features = handles.processor_features()
     assert platform.machine() in features
     assert len(features) > 3
+
+
+def test_numbers_of_steps_have_64_bits_on_every_system() -> None:
+    """C's long has 32 on some, so none crosses the boundary."""
+    module = swing()
+    ensemble = module.simulate_many(0.1, {"a": [0.1, 0.2]}, events={"low": "a"})
+    for name in ("steps", "rejected", "evaluations", "event_counts"):
+        assert getattr(ensemble, name).dtype == np.int64
+    templates = Path(__file__).parents[2] / "templates"
+    for part in ("cython/_ensembles.pxi", "c/ensembles/lane_runs.c", "c/ensembles/lane_steps.c"):
+        assert not re.search(r"\blong\b", (templates / part).read_text()), part
