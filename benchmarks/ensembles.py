@@ -104,8 +104,8 @@ def largest_error(rows: np.ndarray, exact: np.ndarray) -> float:
 
 
 def heyoka_as_accurate(x: np.ndarray, exact: np.ndarray, wanted: float) -> tuple[float, Callable[[], np.ndarray]]:
-    """The loosest tolerance, two to a decade, at which heyoka errs no more than that, and its batches there."""
-    for tol in (10.0 ** (-k / 2) for k in range(12, 30)):
+    """The loosest tolerance, four to a decade, at which heyoka errs no more than that, and its batches there."""
+    for tol in (10.0 ** (-k / 4) for k in range(28, 57)):
         batches = heyoka_batches(x, THREADS, tol)
         if largest_error(batches(), exact) <= wanted:
             break

@@ -37,7 +37,8 @@ class Options:
         Command line of the compiler; None finds one. Changes the build.
     lanes : {0, 2, 4, 8} or None
         States that batches take at a time in vector registers; None takes what suits this processor, compiled when
-        batches or ensembles first need it, 0 leaves them out. Results are the same, to the last bit. Changes the build.
+        batches or ensembles first need it, 0 leaves them out. Results of batches are the same, to the last bit; those
+        of ensembles within the tolerance. Changes the build.
     jobs : int or None
         Files compiled at a time; None takes the number of processors. Does not change the build.
     """
@@ -80,6 +81,8 @@ def compile_flags(options: Options, compiler: CompilerInfo, size: int, *, hidden
     if compiler.kind != "other":
         # errno is never read; contraction makes results depend on the processor.
         flags += [f"-ffp-contract={'fast' if options.native else 'off'}", "-fno-math-errno"]
+    if compiler.kind == "gcc" and options.native and level == 1:
+        flags.append("-fexpensive-optimizations")  # without which gcc contracts nothing
     if hidden:
         flags.append("-fvisibility=hidden")
     if options.warnings:

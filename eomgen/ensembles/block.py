@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -301,6 +302,11 @@ def project(module: Module, cases: Cases, block: Block, t_eval: Array | None) ->
 
 def _project_columns(module: Module, cases: Cases, block: Block, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
+    if cases.alike:
+        good = np.isfinite(states).all(axis=0)
+        with suppress(EomgenError):  # some cannot be: find out which
+            states[:, good] = module.project(states[:, good], t=times[good], **cases.column(0))
+            return
     for k in range(cases.count):
         good = np.isfinite(states[:, :, k]).all(axis=0)
         if good.any():

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from functools import lru_cache
+import platform
+from contextlib import suppress
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,6 +34,8 @@ class Handle(NamedTuple):
     recipe : str
         JSON with the model's name, the source texts and the options to build it with; empty where there are none (an
         installed package).
+    needs : tuple of str
+        What the processor must have, for code compiled for the one where it was made (``native=True``): its features.
     p, u : arrays
         Values bound.
     """
@@ -43,16 +47,18 @@ class Handle(NamedTuple):
     recipe: str
     p: Array
     u: Array
+    needs: tuple[str, ...] = ()
 
     def open(self) -> Module:
-        """The module: from its own file if that is here and the same, else built from the sources, or imported.
+        """The module: from its own file if that is here, the same and for this processor, else built from the sources,
+        or imported.
 
         Raises
         ------
         ToolchainError
             It cannot be built here.
         """
-        core = _open(self.name, self.file, self.digest, self.recipe)
+        core = _open(self.name, self.file, self.digest, self.recipe, self.needs)
         return self.kind(core, self.p, self.u)
 
 
@@ -70,7 +76,25 @@ def describe(module: Module) -> Handle:
         raise UsageError(f"the module of {module.name!r} has no file that workers could load; use target cython")
     if hasattr(core, "take_lanes"):
         core.take_lanes()  # here, once, so that workers find them beside the module
-    return Handle(type(module), core.__name__, file, digest(file), _recipe(Path(file)), module.p, module.u)
+    recipe = _recipe(Path(file))
+    native = bool(recipe) and json.loads(recipe)["options"].get("native", False)
+    needs = tuple(sorted(processor_features())) if native else ()
+    return Handle(type(module), core.__name__, file, digest(file), recipe, module.p, module.u, needs)
+
+
+@cache
+def processor_features() -> frozenset[str]:
+    """What this processor can do: its kind, NumPy's names of features, and on Linux those of the kernel."""
+    found = {platform.machine()}
+    with suppress(ImportError, AttributeError):
+        features = import_module("numpy._core._multiarray_umath").__cpu_features__
+        found |= {name for name, there in features.items() if there}
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith(("flags", "Features")):
+                found |= set(line.partition(":")[2].split())
+                break
+    return frozenset(found)
 
 
 def digest(file: str) -> str:
@@ -89,8 +113,8 @@ def _recipe(file: Path) -> str:
 
 
 @lru_cache(maxsize=8)
-def _open(name: str, file: str, wanted: str, recipe: str) -> Any:
-    if Path(file).is_file() and digest(file) == wanted:
+def _open(name: str, file: str, wanted: str, recipe: str, needs: tuple[str, ...] = ()) -> Any:
+    if processor_features().issuperset(needs) and Path(file).is_file() and digest(file) == wanted:
         return restore(_core, name, file, None, None)  # type: ignore[arg-type]
     if not recipe:
         try:

@@ -58,7 +58,7 @@ def simulate_many(
     """Integrate the equations of motion for many initial values, parameters and inputs.
 
     Every run has steps of its own.  The results do not depend, to the last bit, on how threads, workers and blocks are
-    chosen; a run that fails is marked and holds up no other.
+    chosen; they are those of ``simulate`` within the tolerance.  A run that fails is marked and holds up no other.
 
     Parameters
     ----------

@@ -49,8 +49,8 @@ typedef struct {
     int (*usable)(void);                 /* whether this processor has the instructions */
     const eomgen_lane_function *kernels; /* in the order of the model's kernels; NULL where one has no lanes */
     const eomgen_series *series;         /* of one state, where it is in the lanes' library; else NULL */
-    void (*contracted)(void);            /* rhs for ensembles, a*b + c rounded once: lane_function of the layer, or NULL */
-    void (*expand)(void);                /* the series, likewise: lane_series of the layer, or NULL */
+    void (*contracted)(void);            /* rhs for ensembles, a*b + c rounded once; cast to lane_function of the layer */
+    void (*expand)(void);                /* the series, likewise; cast to lane_series of the layer; or NULL */
 } eomgen_lanes;
 
 typedef struct {

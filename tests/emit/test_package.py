@@ -76,7 +76,8 @@ def test_the_files_of_each_target(packages):
         for target, folder in packages.items()
     }
     c_files = {"crank.c", "crank.h", "eomgen.h", "eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h"} | {
-        "eomgen_processor.h"
+        "eomgen_processor.h",
+        "eomgen_contraction.h",
     }
     c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
     assert files["c"] == c_files | {"model.json", "README.md", "Makefile"}

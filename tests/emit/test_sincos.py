@@ -49,7 +49,13 @@ BUILDS = {
     "four": ["-mavx2", "-mfma", "-DEOMGEN_WIDTH=4"],
     "eight": ["-mavx512f", "-mavx512vl", "-mavx512dq", "-DEOMGEN_WIDTH=8"],
 }
-FEATURES = {"plain, packs of four": "avx2", "four": "avx2", "eight": "avx512dq"}
+#: Operations contracted, as ensembles have them; the later flag wins.
+CONTRACTED = {
+    f"{build}, contracted": ["-DEOMGEN_CONTRACTED", "-ffp-contract=fast", *BUILDS[build]] for build in ("four", "eight")
+}
+CONTRACTED["eight, contracted"].append("-mfma")
+FEATURES = {"plain, packs of four": "avx2", **dict.fromkeys(("four", "four, contracted"), "avx2")}
+FEATURES |= dict.fromkeys(("eight", "eight, contracted"), "avx512dq")
 
 
 def runs_here(build):
@@ -64,7 +70,7 @@ def evaluators(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sincos")
     (folder / "sincos.c").write_text(SOURCE)
     found = {}
-    for number, (build, flags) in enumerate(BUILDS.items()):
+    for number, (build, flags) in enumerate((BUILDS | CONTRACTED).items()):
         if not runs_here(build):
             continue
         library = folder / f"sincos{number}.so"
@@ -122,9 +128,35 @@ def test_within_two_units_in_the_last_place(evaluators):
     assert np.abs(cosines).max() <= 1.0
 
 
+@pytest.mark.parametrize("build", CONTRACTED)
+def test_contracted_within_two_units_in_the_last_place_and_the_same_everywhere(evaluators, build):
+    if build not in evaluators:
+        pytest.skip("this processor has no such instructions")
+    x = angles()
+    sines, cosines = evaluators[build](x)
+    for values, function in ((sines, mp.sin), (cosines, mp.cos)):
+        found = errors(values, x, function)
+        assert found.max() < 1.8, (found.max(), x[found.argmax()])
+        assert found.mean() < 0.3
+    mirrored = evaluators[build](-x)
+    np.testing.assert_array_equal(mirrored[0], -sines)
+    np.testing.assert_array_equal(mirrored[1], cosines)
+    order = np.random.default_rng(8).permutation(x.size)
+    for name in ("evaluate", "together"):
+        moved = evaluators[build](x[order], name)
+        known = ~np.isnan(moved[0])
+        assert known.sum() >= x.size - 56
+        np.testing.assert_array_equal(moved[0][known], sines[order][known])
+        np.testing.assert_array_equal(moved[1][known], cosines[order][known])
+    far = np.array([NEAR * 1.01, -2e6, 1e22, -1.7e308, 2.0**53, 3e15, np.nan, np.inf])
+    for values, function in zip(evaluators[build](far), (mp.sin, mp.cos), strict=True):
+        assert errors(values[:6], far[:6], function).max() < 1.0
+        assert np.isnan(values[6:]).all()
+
+
 def test_a_coefficient_that_is_off_is_seen(tmp_path):
     text = (TEMPLATES / "eomgen_sincos.h").read_text()
-    assert text.count("0.008333333333330925") == 1
+    assert text.count("0.008333333333330925") == 2
     for name in ("eomgen_real.h", "eomgen_angles.h"):
         (tmp_path / name).write_text((TEMPLATES / name).read_text())
     (tmp_path / "eomgen_sincos.h").write_text(text.replace("0.008333333333330925", "0.00833333333333"))
