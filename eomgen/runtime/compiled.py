@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .events import Events
+from .events import Events, warn_of_unknown
 from .integrate import Solution
 from .names import check_names
 from .signals import Forcing
@@ -37,7 +37,7 @@ MESSAGES = {
 
 def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     """Whether a run needs nothing but the module's own steppers."""
-    return method in getattr(module.core, "methods", ()) and not forcing.foreign
+    return isinstance(method, str) and method in getattr(module.core, "methods", ()) and not forcing.foreign
 
 
 def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bool = False) -> dict[str, Any]:
@@ -108,6 +108,8 @@ def integrate_compiled(
         after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
         status = journey.jump(after) or journey.travel()
     times, states, notes = journey.results()
+    if events is not None and journey.raised is None:
+        warn_of_unknown([events.names[i] for i in journey.unknown()], 3)
     if status == ZENO and events is not None:
         raise events.crowded(journey.t, journey.resets)
     t_events, x_events = [], []
