@@ -1,4 +1,4 @@
-"""What is asked of a run: wrong values are told by name, events without a value are told of, interrupts keep the run."""
+"""What is asked of a run: wrong values are told by name, events without a value are told of, interrupts keep it."""
 
 from __future__ import annotations
 
