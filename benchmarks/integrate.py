@@ -196,7 +196,7 @@ def run(quick: bool) -> Report:
         both.append(Table("heyoka's Taylor method over the same right-hand side", columns, races))
     notes = (
         "The hand-written loop calls the same compiled right-hand side and stores one state; ratios are of best times.",
-        "simulate stores every step, projects the states and puts a trajectory together; one step shows the fixed cost.",
+        "simulate stores every step, projects the states and makes a trajectory; one step shows the least that costs.",
         f"Each turn takes the best of {IN_A_ROW} runs in a row: the first of them finds cold caches.",
         "At equal error both take the loosest tolerance that reaches it; the reference is heyoka's in long doubles.",
     )
