@@ -30,6 +30,8 @@ LOOP = Path(__file__).parent / "dop853_loop.c"
 GOALS: dict[int, dict[float, float]] = {2: {1e-6: 1.0, 1e-9: 1.0, 1e-12: 1.5}, 5: {1e-5: 1.0, 1e-6: 1.0}}
 #: heyoka's tolerances that are tried; it compiles for each.
 TOLERANCES = {2: [10.0 ** (-k / 2) for k in range(10, 33)], 5: [10.0**-k for k in range(9, 14)]}
+#: Runs of which a turn takes the best: the first finds the caches full of what the others have left there.
+IN_A_ROW = 3
 State = Callable[[], np.ndarray]
 
 
@@ -91,6 +93,7 @@ def drivers(module: Any, x0: np.ndarray, hand: HandWritten) -> dict[str, State]:
     found: dict[str, State] = {
         "hand-written C loop": hand,
         "simulate": lambda: module.simulate((0.0, END), x0, **tight).x[:, -1],
+        "simulate, one step": lambda: module.simulate((0.0, 1e-4), x0, first_step=1e-4, **tight).x[:, -1],
         "simulate, 1,001 points": lambda: module.simulate((0.0, END), x0, t_eval=times, **tight).x[:, -1],
         "solve_ivp, our DOP853": partial(plain, module.DOP853),
         "solve_ivp, our DOP853, 1,001 points": partial(plain, module.DOP853, times),
@@ -157,20 +160,21 @@ def run(quick: bool) -> Report:
             actions = drivers(module, x0, hand)
             finals = {name: action() for name, action in actions.items()}
             samples = interleaved(
-                2 if quick else 15, **{name: partial(best_of, action, 1) for name, action in actions.items()}
+                2 if quick else 15, **{name: partial(best_of, action, IN_A_ROW) for name, action in actions.items()}
             )
             steps = len(module.simulate((0.0, END), x0, rtol=RTOL, atol=ATOL).t) - 1
             base = samples["hand-written C loop"].best
             for name, sample in samples.items():
                 over = (sample.best - base) / steps * 1e6
                 difference = float(np.abs(finals[name] - finals["hand-written C loop"]).max())
+                ends = name != "simulate, one step"
                 row = [
                     f"{n} links, {name}",
                     sample.median * 1e3,
                     sample.best * 1e3,
                     sample.best / base,
-                    over,
-                    difference,
+                    over if ends else None,
+                    difference if ends else None,
                 ]
                 tables.append(row)
             details[f"{n} links"] = {name: sample.as_dict() for name, sample in samples.items()} | {"steps": steps}
@@ -194,7 +198,8 @@ def run(quick: bool) -> Report:
         both.append(Table("heyoka's Taylor method over the same right-hand side", columns, races))
     notes = (
         "The hand-written loop calls the same compiled right-hand side and stores one state; ratios are of best times.",
-        "simulate stores every step, projects the states and puts a trajectory together.",
+        "simulate stores every step, projects the states and makes a trajectory; one step shows the least that costs.",
+        f"Each turn takes the best of {IN_A_ROW} runs in a row: the first of them finds cold caches.",
         "At equal error each takes the loosest tolerance that reaches it; the reference is heyoka's in long doubles.",
     )
     return Report(tuple(both), tuple(limits), notes, details)

@@ -202,7 +202,8 @@ class _Run:
                 times, states, Columns(self.module, times, states, self.forcing.sample(times, states)), header
             )
 
-        run = ImpactRun(t, x, columns, header, t_events, x_events, sample, self.impacts, self.breaks, ended)
+        parts = (t, x, columns, header, t_events, x_events, sample)
+        run = ImpactRun.of(parts, self.impacts, self.breaks, ended)
         run.message = run.count
         return run
 

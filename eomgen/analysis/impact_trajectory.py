@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -27,21 +27,18 @@ class ImpactRun(Trajectory):
         (bodies that stay in contact need a joint or a contact force); an event of the model that ends runs.
     """
 
-    def __init__(
-        self,
-        t: Array,
-        x: Array,
-        columns: Source,
-        header: dict[str, Any],
-        t_events: Sequence[Array] = (),
-        x_events: Sequence[Array] = (),
-        sample: Callable[[Array], Trajectory] | None = None,
-        impacts: Sequence[tuple[float, Impact]] = (),
-        breaks: Sequence[int] = (),
-        ended: str = "end",
-    ) -> None:
-        super().__init__(t, x, columns, header, t_events, x_events, sample)
-        self.impacts, self.breaks, self.ended = list(impacts), list(breaks), ended
+    impacts: list[tuple[float, Impact]]
+    breaks: list[int]
+    ended: str
+
+    @classmethod
+    def of(
+        cls, parts: tuple[Any, ...], impacts: Sequence[tuple[float, Impact]], breaks: Sequence[int], ended: str
+    ) -> ImpactRun:
+        """What a Trajectory is made of, and the impacts."""
+        run = cls(*parts)
+        run.impacts, run.breaks, run.ended = list(impacts), list(breaks), ended
+        return run
 
     def __repr__(self) -> str:
         return (
@@ -49,8 +46,8 @@ class ImpactRun(Trajectory):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        _, plain = super().__reduce__()
-        return type(self), (*plain, None, self.impacts, self.breaks, self.ended)
+        _, parts = super().__reduce__()
+        return type(self).of, (parts, self.impacts, self.breaks, self.ended)
 
     @property
     def count(self) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .events import Events
+from .events import Events, warn_of_unknown
 from .integrate import Solution
 from .names import check_names
 from .signals import Forcing
@@ -43,8 +43,8 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     UsageError
         Method Taylor where it cannot be: nobody else has it.
     """
-    there = method in getattr(module.core, "methods", ())
-    if method == "Taylor":
+    there = isinstance(method, str) and method in getattr(module.core, "methods", ())
+    if isinstance(method, str) and method == "Taylor":
         if not there:
             raise UsageError(no_series(module.name))
         if not forcing.stepwise:
@@ -132,6 +132,8 @@ def integrate_compiled(
         after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
         status = journey.jump(after) or journey.travel()
     times, states, notes = journey.results()
+    if events is not None and journey.raised is None:
+        warn_of_unknown([events.names[i] for i in journey.unknown()], 3)
     if status == ZENO and events is not None:
         raise events.crowded(journey.t, journey.resets)
     t_events, x_events = [], []

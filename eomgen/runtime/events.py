@@ -6,6 +6,7 @@ for a run are its names, expressions as text, or functions f(t, x) with SciPy's 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
@@ -77,14 +78,16 @@ class Event:
         require_time_and_state("an event", function)
         self.function, self.action = function, action
         self.name = name or str(getattr(function, "__name__", type(function).__name__))
-        self.terminal = (getattr(function, "terminal", None) or 0) if terminal is None else terminal
+        self.terminal = _times(self.name, getattr(function, "terminal", None) if terminal is None else terminal)
         given = getattr(function, "direction", 0) if direction is None else direction
         self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
         self.left: tuple[float, float] | None = None  #: time of the last reset, and the side of zero it led to
+        self.known = False  #: whether it has had a value other than NaN
 
     def __call__(self, t: float, x: Array) -> float:
         """The value at time t and state x; right after a reset, one on the side to which it led."""
         value = float(self.function(t, x))
+        self.known = self.known or value == value
         if self.left is not None and abs(t - self.left[0]) <= 1e-14 * max(abs(t), 1e-3):
             return self.left[1] * max(abs(value), 1e-300)
         return value
@@ -204,7 +207,7 @@ def _listed(given: Any) -> list[tuple[str | None, Any]]:
 
 def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formula]:
     """An event by its text, or by a mapping with the keys of a model file."""
-    options = {"expression": given} if isinstance(given, str) else dict(given)
+    options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
     text = options.get("expression")
     if not isinstance(text, str):
@@ -212,18 +215,39 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formu
     direction = options.get("direction") or 0
     if direction not in (-1, 0, 1):
         raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
-    event = Event(_unknown, name or text, int(options.get("terminal") or 0), direction)
+    event = Event(_only_in_c, name or text, options.get("terminal"), direction)
     return event, Formula(layout, text, f"event {name or text!r}")
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
     action = RESET if event.get("resets") else WAIT if event.get("restitution") is not None else GO_ON
     direction = int(event.get("direction") or 0) if chosen or action != GO_ON else UNWATCHED
-    return Event(_unknown, str(event["name"]), int(event.get("terminal") or 0), direction, action)
+    return Event(_only_in_c, str(event["name"]), int(event.get("terminal") or 0), direction, action)
 
 
-def _unknown(t: float, x: Array) -> float:
-    raise NotImplementedError("the compiled loop evaluates this event")
+def _only_in_c(t: float, x: Array) -> float:
+    """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
+    raise UsageError("an event by its name or text has a value in a run only; give a function f(t, x) instead")
+
+
+def _times(name: str, given: Any) -> int:
+    """At which time an event ends the run: 0 for never."""
+    whole = isinstance(given, (bool, int, np.bool_, np.integer)) or (isinstance(given, float) and given.is_integer())
+    if given is None or (whole and given >= 0):
+        return int(given or 0)
+    raise UsageError(
+        f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), not {given!r}"
+    )
+
+
+def warn_of_unknown(names: Sequence[str], depth: int = 2) -> None:
+    """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
+    if names:
+        warnings.warn(
+            f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
+            "found; look for a logarithm, root or quotient outside its domain",
+            stacklevel=depth + 2,
+        )
 
 
 def _value_of(kernel: Any, forcing: Forcing, i: int) -> Callable[[float, Array], float]:

@@ -33,6 +33,20 @@ class Solution(NamedTuple):
     ends: tuple[float, float]  #: first and last time reached
 
 
+class Interrupted(KeyboardInterrupt):
+    """An interrupt inside an integration, with what there was.
+
+    Parameters
+    ----------
+    solution : Solution
+        The steps up to there.
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        super().__init__()
+        self.solution = solution
+
+
 class Joined:
     """Dense output of several parts of a run."""
 
@@ -114,6 +128,8 @@ def integrate(
     ------
     Crawling
         The steps lead nowhere, as `pace` judges.
+    Interrupted
+        Ctrl-C.
     """
     scipy = require("scipy.integrate", "scipy", "simulate")
     times: list[Array] = []
@@ -135,16 +151,14 @@ def integrate(
         counted = [event.terminal for event in events]
         for event in events:
             event.terminal = event.terminal if event.action == GO_ON else 1
-        part = scipy.solve_ivp(
-            rhs,
-            span,
-            x,
-            method=watch_steps(solver, pace),
-            t_eval=asked,
-            events=list(events) or None,
-            dense_output=dense,
-            **options | first,
-        )
+        trail: list[tuple[float, Array]] = [(start, x)]
+        try:
+            part = scipy.solve_ivp(
+                rhs, span, x, method=watch_steps(solver, pace, trail), t_eval=asked, events=list(events) or None,
+                dense_output=dense, **options | first,
+            )  # fmt: skip
+        except KeyboardInterrupt as interrupt:
+            raise Interrupted(_cut_short(times, states, trail, t_events, x_events, nodes[0], counts)) from interrupt
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)
         t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
@@ -212,6 +226,32 @@ def integrate(
         str(part.message),
         counts,
         ends,
+    )
+
+
+def _cut_short(
+    times: Sequence[Array],
+    states: Sequence[Array],
+    trail: Sequence[tuple[float, Array]],
+    t_events: Sequence[Sequence[Array]],
+    x_events: Sequence[Sequence[Array]],
+    start: float,
+    counts: dict[str, int],
+) -> Solution:
+    """What was stored of the parts before, and the steps of the one that was interrupted."""
+    n = len(trail[0][1])
+    skip = 1 if times and times[-1].size and times[-1][-1] == trail[0][0] and len(trail) > 1 else 0
+    t, x = np.array([t for t, _ in trail[skip:]]), np.array([x for _, x in trail[skip:]]).T.reshape(n, -1)
+    return Solution(
+        np.concatenate([*times, t]),
+        np.concatenate([*states, x], axis=1),
+        [np.concatenate([np.empty(0), *found]) for found in t_events],
+        [np.concatenate([np.empty((n, 0)), *found], axis=1) for found in x_events],
+        None,
+        -1,
+        "The run was interrupted.",
+        counts,
+        (start, trail[-1][0]),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,6 +130,11 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
     def p(self) -> Array:
         """A copy of the parameters bound, (n_p,)."""
         return np.array(self.kernels.context.p)
+
+    @cached_property
+    def _parameters(self) -> Mapping[str, float]:
+        """The parameters bound, by name; they never change."""
+        return MappingProxyType(dict(zip(self.p_names, self.p.tolist(), strict=True)))
 
     @property
     def u(self) -> Array:

@@ -84,11 +84,13 @@ class Pace:
             raise Crawling(t, self.x, step)
 
 
-def watch_steps(solver: Any, pace: Pace) -> Any:
-    """A subclass of a SciPy solver that shows its steps to `pace`."""
+def watch_steps(solver: Any, pace: Pace, trail: list[tuple[float, Array]]) -> Any:
+    """A subclass of a SciPy solver that shows its steps to `pace` and leaves them in `trail`."""
 
     def step(self: Any) -> Any:
         message = solver.step(self)
+        if self.status != "failed":
+            trail.append((self.t, self.y))
         if self.status == "running":
             pace.look(self.t, self.y)
         return message

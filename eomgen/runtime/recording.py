@@ -35,9 +35,15 @@ class Columns:
 
     def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
         self.module, self.t, self.x, self.u = module, t, x, u
-        layout = module.layout
+        self._known: dict[str, Array] = {}
+        # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
+        self.names = _names(module.layout)
+
+    @cached_property
+    def _groups(self) -> list[tuple[tuple[str, ...], Callable[[], Array]]]:
+        layout = self.module.layout
         loops = layout.loops + layout.loop_rates + layout.loop_accelerations
-        self._groups: list[tuple[tuple[str, ...], Callable[[], Array]]] = [
+        return [
             (layout.x, lambda: self.x),
             (layout.a, lambda: self.slopes[layout.n_q :]),
             (layout.parameter_rates, self._parameter_rates),
@@ -46,9 +52,6 @@ class Columns:
             (layout.u, lambda: self.u),
             (("T", "V", "energy") if layout.energy_known else (), lambda: self.energies),
         ]
-        self._known: dict[str, Array] = {}
-        # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
-        self.names = _names(layout)
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._known:
@@ -166,7 +169,7 @@ def _units(layout: Layout) -> dict[str, str]:
 
 def describe(module: Module) -> dict[str, Any]:
     """What the columns of any run of a module are called, and its parameters."""
-    return _described(module.layout) | {"parameters": dict(zip(module.layout.p, module.p.tolist(), strict=True))}
+    return {**_described(module.layout), "parameters": dict(module._parameters)}
 
 
 @lru_cache(maxsize=64)
@@ -188,7 +191,7 @@ def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
     """Projected states (n_x, k), and how far the raw ones were off."""
     n = module.n_q
     if not t.size or not (module.n_rows or module.layout.space):
-        return Residuals(), np.array(raw)
+        return Residuals(), raw
     x = module.project(raw, t=t)
     if not module.n_rows:
         return Residuals(), x

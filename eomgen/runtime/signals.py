@@ -192,6 +192,8 @@ class Forcing:
 
     def encode(self) -> list[tuple[Any, ...]]:
         """The inputs that vary, as the compiled loop takes them."""
+        if not self:
+            return []
         tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal)]
         for i, formula in self.formulas.items():
             tables.append((i, formula.tape if isinstance(formula, DeclaredSignal) else record_tape([formula])))
@@ -251,6 +253,8 @@ class Forcing:
 
         Where they are more than KINKS, only some, unless ``every_jump``: compiled loops take any number.
         """
+        if not self.varying:
+            return []
         low, high = min(start, end), max(start, end)
 
         def found(jumps: bool) -> list[float]:

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
-from .events import UNWATCHED, Events
-from .integrate import Solution, check_options, choose_solver, integrate, takes_jacobian
+from .events import UNWATCHED, Events, warn_of_unknown
+from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
 from .pace import Crawling, Pace, describe_crawl, steepest
 from .progress import Progress, wanted
 from .recording import record
 from .signals import Forcing
-from .tolerances import IMPLICIT, check_tolerances
+from .tolerances import IMPLICIT, check_step, check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
@@ -112,7 +112,7 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
-    if method in (None, "kinematic"):
+    if method == "kinematic" or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
         if is_driven(module):
@@ -120,10 +120,10 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
-    if (method == "RK4") != (step is not None):
+    if (isinstance(method, str) and method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     if step is not None:
-        max_step = first_step = step
+        max_step = first_step = check_step("step", step)
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
@@ -170,18 +170,23 @@ def simulate(
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
-                raise SimulationInterrupted(
-                    f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
-                    lambda: record(bound, forcing, solution, title, options, watched.names),
-                ) from raised
+                raise Interrupted(solution) from raised
             if raised is not None:
                 raise raised
         else:
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
+                listed = watched.listed(bound, forcing)
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, watched.listed(bound, forcing), dense_output,
-                    options, pace, partial(watched.reset, bound, forcing),
+                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, pace,
+                    partial(watched.reset, bound, forcing),
                 )  # fmt: skip
+                warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
+    except Interrupted as interrupt:
+        solution = interrupt.solution
+        raise SimulationInterrupted(
+            f"interrupted at t = {solution.ends[1]:.6g} s of {end:.6g} s",
+            lambda: record(bound, forcing, solution, title, options, watched.names),
+        ) from interrupt.__cause__
     except Crawling as crawl:
         raise run.gave_up(crawl, end, title, options) from None
     except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
@@ -328,11 +333,19 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
-    if type(span) is tuple and len(span) == 2 and isfinite(span[0]) and isfinite(span[1]):
-        return float(span[0]), float(span[1])
-    if np.ndim(span) == 0:
-        return 0.0, number("the end of the span", span)
-    pair = np.asarray(span, dtype=float)
+    if (
+        type(span) is tuple
+        and len(span) == 2
+        and type(span[0]) is type(span[1]) is float
+        and isfinite(span[0] + span[1])
+    ):
+        return span
+    try:
+        if np.ndim(span) == 0:
+            return 0.0, number("the end of the span", span)
+        pair = np.asarray(span, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"span must be (start, end) in seconds, not {span!r}") from None
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
     return float(pair[0]), float(pair[1])
@@ -340,7 +353,10 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
 
 def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
     """The times wanted, in order and within the span, or a UsageError."""
-    times = np.array(t_eval, dtype=float)
+    try:
+        times = np.array(t_eval, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"t_eval must be a list of times in seconds, not {t_eval!r}") from None
     low, high = min(start, end), max(start, end)
     steps = np.diff(times) if times.ndim == 1 else np.empty(0)
     ordered = (steps > 0).all() if end >= start else (steps < 0).all()

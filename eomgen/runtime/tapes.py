@@ -115,8 +115,9 @@ class DeclaredSignal:
                     operands = (results[a], results[b], results[c])
                     try:
                         value = OPERATIONS[op](*operands)
-                    except (ArithmeticError, ValueError):
-                        value = math.nan
+                    except (ArithmeticError, ValueError):  # outside of its domain, or infinite: as C has it
+                        with np.errstate(all="ignore"):
+                            value = BEYOND[op](*operands)
                 results.append(float(value))
             return results[out[0]]
 
@@ -141,9 +142,9 @@ OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
     "pow": _two(math.pow),
     "atan2": _two(math.atan2),
     "abs": _one(abs),
-    "sign": lambda a, b, c: (a > 0) - (a < 0),
-    "min": _two(min),
-    "max": _two(max),
+    "sign": lambda a, b, c: a if a != a else (a > 0) - (a < 0),
+    "min": lambda a, b, c: a if a <= b or a != a else b,
+    "max": lambda a, b, c: a if a >= b or a != a else b,
     "lt": lambda a, b, c: a < b,
     "le": lambda a, b, c: a <= b,
     "eq": lambda a, b, c: a == b,
@@ -155,6 +156,14 @@ OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
 OPERATIONS |= {
     name: _one(getattr(math, name))
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+}
+#: The same where Python raises what C has a value for: log(0), 1/0, exp(1000).
+BEYOND: dict[str, Callable[[float, float, float], float]] = {
+    "div": lambda a, b, c: float(np.divide(a, b)),
+    "pow": lambda a, b, c: float(np.power(a, b)),
+} | {
+    name: _one(getattr(np, name.replace("asin", "arcsin").replace("acos", "arccos")))
+    for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "sinh", "cosh")
 }
 
 

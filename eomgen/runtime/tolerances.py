@@ -46,7 +46,7 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
         checked["rtol"] = max(rtol, LEAST) if isinstance(rtol, float) else np.maximum(rtol, LEAST)
     for name in ("max_step", "first_step"):
         if name in checked:
-            checked[name] = _step(name, checked[name])
+            checked[name] = check_step(name, checked[name])
     if "min_step" in checked:
         checked["min_step"] = number("min_step", checked["min_step"])
         if checked["min_step"] < 0.0:
@@ -70,7 +70,10 @@ def _tolerance(name: str, given: Any, n: int) -> Any:
     return values if values.ndim else float(values)
 
 
-def _step(name: str, given: Any) -> float:
+def check_step(name: str, given: Any) -> float:
+    """A length of steps (s), or a UsageError that names it."""
+    if type(given) is float and 0.0 < given < np.inf:
+        return given
     try:
         value = float(given)
     except (TypeError, ValueError):

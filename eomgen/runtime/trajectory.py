@@ -92,7 +92,8 @@ class Trajectory:
         self.residuals = Residuals(**header["residuals"])
         names = header.get("event_names") or [f"event_{k}" for k in range(len(t_events))]
         self.t_events, self.x_events = Named(t_events, names), Named(x_events, names)
-        self.nfev, self.njev, self.nlu = (int(header.get(key, 0)) for key in ("nfev", "njev", "nlu"))
+        self.nfev, self.njev = int(header.get("nfev", 0)), int(header.get("njev", 0))
+        self.nlu = int(header.get("nlu", 0))
         self.status, self.message = int(header.get("status", 0)), str(header.get("message", ""))
         self._sample = sample
 

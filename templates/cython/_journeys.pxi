@@ -1,6 +1,7 @@
 # Journeys: whole trajectories by eomgen_loop.h, with a look at Python every few milliseconds.
 
 from cpython.exc cimport PyErr_CheckSignals
+from libc.math cimport isnan
 
 from time import perf_counter
 
@@ -122,7 +123,7 @@ cdef class Journey(Stepper):
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef eomgen_journey *journey = &self.journey
-        self.stored, self.raised, self.stride = [[], [], [], []], None, 1
+        self.stored, self.raised, self.stride = [[], [], [], []], None, 8
         nodes = self.keep(plan["nodes"], float)
         journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(<cnp.ndarray>nodes), len(nodes)
         journey.span, journey.n_eval = abs(t_bound - t0), -1
@@ -134,7 +135,7 @@ cdef class Journey(Stepper):
             self.expect(**plan["events"])
         self.allocate(512)
         self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
-        self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, 1
+        self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, self.stride
 
     cdef keep(self, values, kind):
         array = np.array(values, dtype=kind)
@@ -240,6 +241,10 @@ cdef class Journey(Stepper):
         """The events that wait."""
         return [i for i in range(self.events.n) if self.events.fired[i]]
 
+    def unknown(self):
+        """The events watched that were NaN at the start and after every step."""
+        return [i for i in range(self.events.n) if self.events.direction[i] <= 1 and isnan(self.events.size[i])]
+
     def results(self):
         """Times (k,), states (k, n_x), and rows (event, t, state) of events, in order."""
         cdef eomgen_journey *j = &self.journey
@@ -278,14 +283,10 @@ cdef class Journey(Stepper):
         except BaseException as error:
             self.raised = error
             return 0
+        # the next look in 0.5 ms, as far as the time since the last tells; that of the first few evaluations tells little
         cdef double elapsed = now - self.looked
         self.looked = now
-        if elapsed < 5e-4:
-            self.stride *= 8
-        elif elapsed < 4e-3:
-            self.stride *= 2
-        elif elapsed > 1e-2:
-            self.stride = max(1, <long>(self.stride * (5e-3 / elapsed)))
+        self.stride = <long>min(max(self.stride * (5e-4 / max(elapsed, 1e-9)), 1.0), 16.0 * self.stride)
         return self.stride
 
     cdef int ask(self, double t, const double *y, double *g):
