@@ -29,7 +29,9 @@ x = crank.x0(theta=0.3, theta_dot=10.0)
 assert np.abs(crank.constraints(x[:3])).max() < 1e-12
 x_dot = crank.rhs(0.0, x)
 assert np.allclose(x_dot[:3], x[3:], rtol=1e-13) and np.isfinite(x_dot).all()
-assert set(crank.__all__) <= set(dir(crank)) | {"minimal"}
+assert set(crank.__all__) <= set(dir(crank)) | {"minimal", "Signal"}
+assert crank.Signal([0, 1], [0, 2])(0.5) == 1.0
+assert crank.step(0.0, x, 1e-6).shape == x.shape
 assert crank.minimal.rhs(0.0, [0.3, 10.0]).shape == (2,)
 try:
     crank.simulate((0, 1), method="BDF")

@@ -28,21 +28,36 @@ ROTATIONS = ("euler_angles", "euler_parameters")
 TURNING = ("humanoid", "humanoid of Gymnasium", "fish", "ant", "quadruped", "humanoid of motion capture")
 
 
+@pytest.fixture(scope="module")
+def judged() -> Any:
+    """Each model is read and judged once, for all methods."""
+    known: dict[tuple[str, str], Any] = {}
+
+    def judge(name: str, rotation: str) -> Any:
+        if (name, rotation) not in known:
+            known.clear()
+            path, assets = MODELS[name]
+            model = load_tree(path, assets, rotation)
+            kinematics = model.derive("recursive").kinematics
+            known[name, rotation] = model, Judge(path, model, rotation).states(kinematics, 20, seed=len(name))
+        return known[name, rotation]
+
+    return judge
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", FORMS)
 @pytest.mark.parametrize(
     ("name", "rotation"), [(name, r) for name in MODELS for r in ROTATIONS[: 2 if name in TURNING else 1]]
 )
-def test_model_equals_mujoco(name: str, rotation: str, method: str) -> None:
-    path, assets = MODELS[name]
-    model = load_tree(path, assets, rotation)
+def test_model_equals_mujoco(name: str, rotation: str, method: str, judged: Any) -> None:
+    model, states = judged(name, rotation)
     equations = model.derive(method)
     assert (len(equations.kinematics.balls) > 0) == (rotation == "euler_parameters")
-    states = Judge(path, model, rotation).states(equations.kinematics, 20, seed=len(name))
     runs: list[Any] = [Evaluated(equations)]
     n, plain, last = len(states[0].v), rotation == ROTATIONS[0], rotation == ROTATIONS[name in TURNING]
     if n <= FEW or (method == "embedding" and plain) or (method == "recursive" and (last or n <= MANY)):
-        runs.append(Compiled(equations, optimize=0))
+        runs.append(Compiled(equations, optimize=0, lanes=0))  # called state by state
     for run in runs:
         worst = largest_differences(model, run, states)
         assert max(worst.values()) <= LIMIT, (type(run).__name__, worst)
