@@ -333,13 +333,9 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
-    if (
-        type(span) is tuple
-        and len(span) == 2
-        and type(span[0]) is type(span[1]) is float
-        and isfinite(span[0] + span[1])
-    ):
-        return span
+    plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
+    if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
+        return float(span[0]), float(span[1])  # type: ignore[index]
     try:
         if np.ndim(span) == 0:
             return 0.0, number("the end of the span", span)
