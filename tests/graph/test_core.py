@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from eomgen.graph import Graph, evaluate
@@ -110,7 +110,7 @@ def test_powers_are_products(g):
 
 
 @given(data=st.data())
-@settings(max_examples=300, deadline=None, derandomize=True)
+@settings(max_examples=1000, deadline=None, derandomize=True)
 def test_simplified_expressions_keep_their_value(data):
     """Random programs over few values, so that every rule fires, against plain NumPy without any simplification."""
     g = Graph()
@@ -123,7 +123,7 @@ def test_simplified_expressions_keep_their_value(data):
         with np.errstate(all="ignore"):
             value = np.float64(NUMPY[operation](*(p[1] for p in picked)))
         # neither rounding next to a jump nor cancellation to noise is what is tested here
-        assume(np.isfinite(value) and abs(value) < 1e8 and (value == 0 or abs(value) > 1e-6))
-        pool.append((g.apply(operation, *(p[0] for p in picked)), value))
+        if np.isfinite(value) and abs(value) < 1e8 and (value == 0 or abs(value) > 1e-6):
+            pool.append((g.apply(operation, *(p[0] for p in picked)), value))
     ours = evaluate([p[0] for p in pool], values)
     np.testing.assert_allclose(ours, [p[1] for p in pool], rtol=1e-9, atol=1e-9)
