@@ -89,7 +89,7 @@ def compile_sources(
     now = {file: text for file, text in sources.items() if file not in late}
     flags = _plan(now, options, compiler, 0 if late else width, extension=True)
     if late:
-        flags = {file: [*words, *(["-DEOMGEN_LATE_SERIES"] if file else [])] for file, words in flags.items()}
+        flags = {file: [*words, *(["-DEOMGEN_WITHOUT_SERIES"] if file else [])] for file, words in flags.items()}
     parts = {
         "kind": "extension", "name": name, "sources": sources, "flags": flags, "native": _native(options, compiler),
         "layer": describe_layer(layer, headers, compiler),

@@ -18,7 +18,7 @@ from .layouts import describe_layouts
 from .sources import SourceSet, metadata_json, read_template, render
 
 #: Headers of the numbers that functions compute with.
-NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_series.h", "eomgen_processor.h",
+NUMBERS = ("eomgen_real.h", "eomgen_sincos.h", "eomgen_angles.h", "eomgen_processor.h",
            "eomgen_contraction.h")  # fmt: skip
 
 

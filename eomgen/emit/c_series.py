@@ -10,7 +10,7 @@ from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, make_series
 from .angles import print_angles
 from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
-from .sources import render
+from .sources import read_template, render
 from .straight import references
 
 #: Doubles of one row of coefficients: sums may read a zero behind them.
@@ -39,7 +39,8 @@ def series_files(program: Program) -> dict[str, str]:
         "kept": printer.kept,
         "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
     }
-    return {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
+    files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
+    return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
 
 
 class _Printer:

@@ -26,6 +26,13 @@ def fresh_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
 
 
 @pytest.fixture
+def cache(warm_cache: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
+    """One of the test's own that has the layer already."""
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(warm_cache))
+    return Cache(warm_cache)
+
+
+@pytest.fixture
 def sources() -> dict[str, str]:
     """The pendulum's C sources."""
     texts = {name: (MODEL / name).read_text() for name in ("pendulum.c", "pendulum.h")}

@@ -17,7 +17,6 @@ import pytest
 
 import eomgen as eg
 from eomgen.compilation import Cache, find_compiler
-from eomgen.compilation.cache import cache_directory
 from eomgen.runtime.late import eager
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "two_link_manipulator.yaml"
@@ -43,12 +42,6 @@ def write(tmp_path: Path) -> Any:
         return file
 
     return write
-
-
-@pytest.fixture
-def cache() -> Cache:
-    """The cache of the whole run."""
-    return Cache(cache_directory())
 
 
 def states(k: int) -> np.ndarray:

@@ -141,7 +141,8 @@ def test_templates_are_compiled_once(tmp_path: Path, fresh_cache: Cache) -> None
         "import sys, time, jinja2; from pathlib import Path\n"
         "from eomgen.emit.sources import environment, keep_bytecode\n"
         "keep_bytecode(Path(sys.argv[1])); environment()._compile = None if sys.argv[2:] else environment()._compile\n"
-        "print(environment().get_template('c/lanes.c.j2').render(name='m', width=2, tests=(), feature=''))"
+        "template = environment().get_template('c/lanes.c.j2')\n"
+        "print(template.render(name='m', width=2, tests=(), feature='', series=False, contracted=False))"
     )
     first = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
     assert list(folder.iterdir())

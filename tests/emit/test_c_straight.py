@@ -108,10 +108,10 @@ def test_null_result_is_not_wanted_and_nan_is_reported(systems, compiled):
 def test_the_table_describes_the_model(systems, compiled):
     system = systems.slider_crank()
     library = compiled(system)
-    assert library.table.abi == 2
+    assert library.table.abi == 3
     assert library.table.name == b"crank"
     lanes = ["mass_matrix", "bias", "inverse_dynamics", "energy"]
-    assert library.metadata == {**system.program().metadata, "lanes": lanes}
+    assert library.metadata == {**system.program().metadata, "lanes": lanes, "series": False}
     assert library.metadata["kernels"]["rhs"] == [6]
     assert {"terms", "position", "precompute"} <= set(library.metadata["operations"])
     assert library.metadata["operations"]["precompute"]["multiplications"] > 0
