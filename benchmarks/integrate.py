@@ -30,6 +30,8 @@ LOOP = Path(__file__).parent / "dop853_loop.c"
 GOALS: dict[int, dict[float, float]] = {2: {1e-6: 1.0, 1e-9: 1.0, 1e-12: 1.5}, 5: {1e-5: 1.0, 1e-6: 1.0}}
 #: heyoka's tolerances that are tried; it compiles for each.
 TOLERANCES = {2: [10.0 ** (-k / 2) for k in range(10, 33)], 5: [10.0**-k for k in range(9, 14)]}
+#: Tolerances that reach an error, of which the quickest counts: a looser one may take steps of lower order.
+TRIED = 4
 #: Runs of which a turn takes the best: the first finds the caches full of what the others have left there.
 IN_A_ROW = 3
 State = Callable[[], np.ndarray]
@@ -112,7 +114,7 @@ def best_of(action: Callable[[], Any], repeats: int) -> float:
 def race(
     module: Any, equations: list[tuple[Any, Any]], x0: np.ndarray, goals: dict[float, float], repeats: int
 ) -> tuple[list[list[Any]], list[Limit]]:
-    """At each error the loosest tolerance of each that reaches it, and its time; the better of ours counts."""
+    """At each error the shortest time of each that reaches it, of its loosest tolerances; the better of ours counts."""
     exact, n = taylor.reference(equations, x0, END), len(x0) // 2
     fine = [10.0 ** (-k / 2) for k in range(8, 31)]
     grids = {"DOP853": fine, "Taylor": fine, "heyoka": TOLERANCES[n]}
@@ -132,11 +134,14 @@ def race(
     rows: list[list[Any]] = []
     limits: list[Limit] = []
     for goal, bound in goals.items():
-        chosen = {name: next((k for k, e in enumerate(found) if e <= goal), None) for name, found in errors.items()}
-        seconds: dict[str, float] = {}
-        for name, k in chosen.items():
-            if k is not None:
-                seconds[name] = min(best_of(partial(runs[name], grids[name][k]), repeats) for _ in range(3))
+        reaching = {name: [k for k, e in enumerate(found) if e <= goal][:TRIED] for name, found in errors.items()}
+        tried = [(name, k) for name, found in reaching.items() for k in found]
+        times = dict.fromkeys(tried, np.inf)
+        for _ in range(3 * repeats):  # in turns, so that all meet the same disturbances
+            for name, k in tried:
+                times[name, k] = min(times[name, k], best_of(partial(runs[name], grids[name][k]), 2))
+        chosen = {name: min(found, key=lambda k: times[name, k], default=None) for name, found in reaching.items()}
+        seconds = {name: times[name, k] for name, k in chosen.items() if k is not None}
         best = min((seconds[name] for name in ("DOP853", "Taylor") if name in seconds), default=None)
         ratio = best / seconds["heyoka"] if best is not None and "heyoka" in seconds else None
         milliseconds = [seconds[name] * 1e3 if name in seconds else None for name in runs]
@@ -200,7 +205,8 @@ def run(quick: bool) -> Report:
         "The hand-written loop calls the same compiled right-hand side and stores one state; ratios are of best times.",
         "simulate stores every step, projects the states and makes a trajectory; one step shows the least that costs.",
         f"Each turn takes the best of {IN_A_ROW} runs in a row: the first of them finds cold caches.",
-        "At equal error each takes the loosest tolerance that reaches it; the reference is heyoka's in long doubles.",
+        f"At equal error each takes the quickest of the {TRIED} loosest tolerances that reach it.",
+        "The reference is heyoka's in long doubles.",
     )
     return Report(tuple(both), tuple(limits), notes, details)
 

@@ -82,9 +82,11 @@ class _Printer:
         self._row("reversed", right)
         return self._pairs.setdefault((row, right), f"s{len(self._pairs)}")
 
-    def _reciprocal(self, name: str, text: str) -> str:
-        self.kept.append(f"const real {name} = {text};")
-        return name
+    def _reciprocal(self, i: int) -> str:
+        """One over a term, made once."""
+        line = f"const real r{i} = 1.0 / {self._real(i)};"
+        self.kept += [line] if line not in self.kept else []
+        return f"r{i}"
 
     def _zero(self, i: int) -> str:
         """The value of a term."""
@@ -128,7 +130,7 @@ class _Printer:
         return f"{self._sum(p, q)} + {self._zero(late)}*b{early} + {self._zero(early)}*b{late}"
 
     def _div(self, i: int, term: Term, p: int, q: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(q)}")
+        inverse = self._reciprocal(q)
         if not self._changes(q):
             return f"b{p}*{inverse}"
         rest, last = self._sum(i, q), f"a{i}*b{q}"
@@ -138,14 +140,14 @@ class _Printer:
         return f"(b{p} - {rest} - {last})*{inverse}" if late else f"(b{p} - ({rest} + {last}))*{inverse}"
 
     def _sqrt(self, i: int, term: Term, p: int) -> str:
-        return f"(b{p} - {self._sum(i, i)})*{self._reciprocal(f'r{i}', f'0.5 / a{i}')}"
+        return f"(b{p} - {self._sum(i, i)})*(0.5*{self._reciprocal(i)})"
 
     def _log(self, i: int, term: Term, p: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(p)}")
+        inverse = self._reciprocal(p)
         return f"(b{p} - inverse*{self._sum(i, p, True)})*{inverse}"
 
     def _pow(self, i: int, term: Term, p: int, q: int) -> str:
-        inverse, e = self._reciprocal(f"r{i}", f"1.0 / {self._real(p)}"), self._zero(q)
+        inverse, e = self._reciprocal(p), self._zero(q)
         weighted, plain = self._sum(p, i, True), self._sum(p, i)
         return f"(({e} + 1.0)*inverse*{weighted} - {plain} + {e}*b{p}*a{i})*{inverse}"
 
@@ -157,14 +159,14 @@ class _Printer:
 
     def _inverse(self, i: int, term: Term, p: int) -> str:
         """Those whose rate is the operand's divided by another term: asin, acos, atan."""
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(term.other)}")
+        inverse = self._reciprocal(term.other)
         sign = "-" if term.kind == "acos" else ""
         return f"({sign}b{p} - inverse*{self._sum(i, term.other, True)})*{inverse}"
 
     _asin = _acos = _atan = _inverse
 
     def _atan2(self, i: int, term: Term, y: int, x: int) -> str:
-        inverse = self._reciprocal(f"r{i}", f"1.0 / {self._real(term.other)}")
+        inverse = self._reciprocal(term.other)
         sums, ends = f"-{self._sum(i, term.other, True)}", ""
         if self._changes(y):
             sums, ends = f"{self._sum(y, x, True)} {sums}", f" + b{y}*{self._zero(x)}"

@@ -14,7 +14,7 @@ from ..graph.traverse import reachable
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.
-MOST_ORDER = 20
+MOST_ORDER = 24
 #: Right-hand sides of more terms have no series: DOP853 is faster then, as work grows with the square of the order.
 MOST_TERMS = 600
 #: Integer powers up to this are products.
@@ -103,6 +103,7 @@ class _Terms:
         self._of: dict[int, int] = {graph.symbol(program.time).id: self._add(Term("time", varies=True))}
         for k, name in enumerate(block.inputs):
             self._of[graph.symbol(name).id] = self._add(Term("state", value=float(k), varies=True))
+        self._one = Term("number", value=1.0)
         self._smooth = True  #: whether all must have recurrences; checks need values alone
         for roots in (block.outputs, block.checks):
             for i in reachable(graph, [y.id for y in roots], stop=self._hoisted):
@@ -134,6 +135,10 @@ class _Terms:
         if kind == "sym" or i in self._hoisted:
             return self._add(Term("given", node=i))
         operands = [self._of[k] for k in node[1:]]
+        for p, q in (operands, operands[::-1]) if kind == "mul" else ():  # a quotient has one recurrence, not two
+            factor = self._terms[q]
+            if factor.kind == "div" and factor.varies and self._terms[factor.operands[0]] == self._one:
+                return self._apply("div", p, factor.operands[1])
         exponent = self._terms[operands[1]] if kind == "pow" else None
         if exponent is not None and exponent.kind == "number" and abs(exponent.value) in range(1, MOST_FACTORS + 1):
             return self._power(operands[0], int(exponent.value))

@@ -1,4 +1,20 @@
 /* Taylor's method in lanes. Its round differs: coefficients come first and tell the step, and none is tried in vain. */
+/* The polynomial at h from its start. */
+static void taylor_sum(const lane_run *run, real h, real *restrict y)
+{
+    const int n = run->n;
+    const real *row = run->K + run->order * n;
+    for (int i = 0; i < n; i++) {
+        y[i] = row[i];
+    }
+    for (int m = run->order; m-- > 0;) {
+        row -= n;
+        for (int i = 0; i < n; i++) {
+            y[i] = y[i] * h + row[i];
+        }
+    }
+}
+
 static void taylor_attempt(lane_run *run, real h)
 {
     run->calls++;

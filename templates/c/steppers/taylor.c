@@ -4,16 +4,20 @@ static void taylor_begin(eomgen_run *run)
     run->order = taylor_order(run->rtol, run->series->most);
 }
 
-/* x' at h from the start of the polynomial. */
-static void taylor_rate(const eomgen_run *run, double h, double *f)
+/* The polynomial at h from its start, and its rate. */
+static void taylor_sum_and_rate(const eomgen_run *run, double h, double *restrict y, double *restrict f)
 {
     const int n = run->n;
+    const double *row = run->K + run->order * n;
     for (int i = 0; i < n; i++) {
-        double sum = 0.0;
-        for (int m = run->order; m > 0; m--) {
-            sum = sum * h + m * run->K[m * n + i];
+        y[i] = row[i], f[i] = 0.0;
+    }
+    for (int m = run->order; m-- > 0;) {
+        row -= n;
+        for (int i = 0; i < n; i++) {
+            f[i] = f[i] * h + y[i];
+            y[i] = y[i] * h + row[i];
         }
-        f[i] = sum;
     }
 }
 
@@ -45,8 +49,7 @@ static int taylor_step(eomgen_run *run)
     double *const spare = run->y_old;
     run->y_old = run->y, run->y = spare;
     run->t_old = run->t, run->t = t_new, run->step = t_new - run->t_old;
-    taylor_sum(run, run->step, run->y);
-    taylor_rate(run, run->step, run->f);
+    taylor_sum_and_rate(run, run->step, run->y, run->f);
     run->h_abs = 0.0; /* given for the first step alone */
     run->interpolates = 0;
     run->steps++;
