@@ -112,9 +112,23 @@ class _Terms:
             self._smooth = False
 
     def series(self, block: Block) -> Series:
-        """All of it, once every node has its term."""
+        """All that is needed, once every node has its term; reciprocals may have gone into quotients."""
         rates, checks = ([self._of[y.id] for y in given] for given in (block.outputs, block.checks))
-        return Series(tuple(self._terms), tuple(rates), tuple(checks))
+        live = {i for i, term in enumerate(self._terms) if term.kind == "state"}
+        open_ends = [*rates, *checks]
+        while open_ends:
+            i = open_ends.pop()
+            term = self._terms[i]
+            if i not in live:
+                live.add(i)
+                open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
+        place = {i: k for k, i in enumerate(sorted(live))}
+        terms = (self._terms[i] for i in sorted(live))
+        moved = (
+            term._replace(operands=tuple(place[k] for k in term.operands), other=place.get(term.other, -1))
+            for term in terms
+        )
+        return Series(tuple(moved), tuple(place[i] for i in rates), tuple(place[i] for i in checks))
 
     def _add(self, term: Term) -> int:
         key = (term.kind, term.operands, term.node, term.value)
