@@ -9,6 +9,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from .models import EXAMPLES
 from .report import Limit, Report, Table
 
 TITLE = "latency of a whole process"
+FEW = 5  #: runs of each further peer
 MODELS = ("slider_crank", "double_pendulum")
 OTHER = "pendulum"  #: brings the layer into a cache that knows none of the models
 EXPORTED = "import slider_crank; run = slider_crank.simulate(10.0); assert run.t[-1] == 10.0 and len(run) > 100"
@@ -25,6 +27,12 @@ OF_EXPORTED = "exported slider_crank, imported and run for 10 s"
 #: a bare ``import numpy`` an exported module takes for 10 s of motion.
 NEW, KNOWN, TIMES = 1.2, 0.6, 2.5
 PEER = "SymPy, lambdify, solve_ivp: double_pendulum"
+#: Further peers: label -> package, task and its arguments; those that are installed run.
+PEERS = {
+    "PyDy, lambdify, odeint: double_pendulum": ("pydy", "run_double_pendulum_pydy", '["lambdify"]'),
+    "PyDy, Cython, odeint: double_pendulum": ("pydy", "run_double_pendulum_pydy", '["cython"]'),
+    "CasADi, cvodes: double_pendulum by hand": ("casadi", "run_double_pendulum_casadi", "[]"),
+}
 
 
 @contextmanager
@@ -87,9 +95,11 @@ def _measure(repeats: int, layer: Path, exported: dict[str, str]) -> Report:
         if repeat:
             for who, done in took.items():
                 found.setdefault(who, []).append(done)
-        peer = run_process([sys.executable, "-m", "benchmarks.tasks", "run_double_pendulum_sympy", "[]"])
-        if repeat:
-            found.setdefault(PEER, []).append(peer)
+        for label, (package, task, arguments) in {PEER: ("sympy", "run_double_pendulum_sympy", "[]"), **PEERS}.items():
+            if find_spec(package) is not None and (label == PEER or repeat <= FEW):
+                peer = run_process([sys.executable, "-m", "benchmarks.tasks", task, arguments])
+                if repeat:
+                    found.setdefault(label, []).append(peer)
     for model in MODELS:
         with cache_with_layer(layer) as environment:
             stages[f"{model}, new"] = _stages(model, environment)
@@ -117,7 +127,7 @@ def _measure(repeats: int, layer: Path, exported: dict[str, str]) -> Report:
     )
     notes = (
         "5 s of the slider-crank (a closed loop), 10 s of the double pendulum; SymPy takes KanesMethod for the latter,",
-        "solves and lambdifies it with cse to plain math, and integrates at the same tolerances.",
+        "solves and lambdifies it with cse to plain math, and integrates at the same tolerances, as the others do.",
         "new: the cache holds the layer, which is built once for all models; known: it holds the model too.",
         "cpu: computed by the process and its children, on all cores; hardly depends on what else the machine does.",
         "'process' is the wall time of the run whose stages are shown; what is not in a stage is imports and output.",

@@ -10,6 +10,9 @@ from time import perf_counter
 from typing import Any
 
 METHODS = ("embedding", "lagrange")
+#: Tolerances of the double pendulum's runs, and where they begin.
+TIGHT = {"rtol": 1e-11, "atol": 1e-13}
+START = [1.5707963267948966, 0.0, 0.0, 0.0]
 
 
 def derive_chain(n: int, method: str) -> dict[str, Any]:
@@ -96,8 +99,51 @@ def run_double_pendulum_sympy() -> dict[str, float]:
     imported = perf_counter()
     rhs = pendulum_rhs({"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 9.81})
     derived = perf_counter()
-    solve_ivp(rhs, (0.0, 10.0), [1.5707963267948966, 0.0, 0.0, 0.0], method="DOP853", rtol=1e-11, atol=1e-13)
+    solve_ivp(rhs, (0.0, 10.0), START, method="DOP853", **TIGHT)
     return {"import": imported - start, "derive": derived - imported, "simulate": perf_counter() - derived}
+
+
+def run_double_pendulum_pydy(generator: str) -> dict[str, float]:
+    """The same through PyDy's code generation and odeint, as its examples do."""
+    start = perf_counter()
+    import numpy as np
+    import sympy as sm
+    from pydy.codegen.ode_function_generators import generate_ode_function
+    from scipy.integrate import odeint
+
+    from .peers import double_pendulum
+
+    imported = perf_counter()
+    kane = double_pendulum()
+    derived = perf_counter()
+    rhs = generate_ode_function(
+        kane.forcing, kane.q, kane.u, kane.parameters, mass_matrix=kane.mass_matrix,
+        coordinate_derivatives=sm.Matrix(kane.u), generator=generator,
+    )  # fmt: skip
+    made = perf_counter()
+    odeint(rhs, START, np.linspace(0, 10, 1001), args=(np.array([1.0, 1.0, 1.0, 1.0, 9.81]),), **TIGHT)
+    seconds = {"import": imported - start, "derive": derived - imported}
+    return {**seconds, "compile": made - derived, "simulate": perf_counter() - made}
+
+
+def run_double_pendulum_casadi() -> dict[str, float]:
+    """The same in CasADi's virtual machine, the accelerations written by hand (its users have no derivation)."""
+    start = perf_counter()
+    import casadi as ca
+    import numpy as np
+
+    imported = perf_counter()
+    x = ca.SX.sym("x", 4)
+    bend, whole = x[1], x[2] + x[3]
+    s, c, g = ca.sin(bend), ca.cos(bend), 9.81  # unit masses and lengths; the second angle from the first rod
+    b1, b2 = s * whole**2 - 2 * g * ca.sin(x[0]), -s * x[2] ** 2 - g * ca.sin(x[0] + bend)
+    a1 = (b1 - c * b2) / (2 - c * c)
+    ode = ca.vertcat(x[2], x[3], a1, b2 - c * a1 - a1)
+    times, options = np.linspace(0, 10, 1001), {"reltol": TIGHT["rtol"], "abstol": TIGHT["atol"]}
+    integrator = ca.integrator("I", "cvodes", {"x": x, "ode": ode}, 0, times[1:], options)
+    made = perf_counter()
+    integrator(x0=START)
+    return {"import": imported - start, "derive": made - imported, "simulate": perf_counter() - made}
 
 
 TASKS: dict[str, Callable[..., Any]] = {
@@ -109,6 +155,8 @@ TASKS: dict[str, Callable[..., Any]] = {
         derive_panda_sympy,
         compile_chain,
         run_double_pendulum_sympy,
+        run_double_pendulum_pydy,
+        run_double_pendulum_casadi,
     )
 }
 
