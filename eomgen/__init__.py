@@ -7,6 +7,7 @@ SymPy, SciPy and the compiler tools only where a call needs them.
 from __future__ import annotations
 
 from importlib import import_module
+from time import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from .runtime import load_trajectory as load_trajectory
 
 __version__ = "0.1.0"
+_STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
 _HOMES = {"Model": "describe", "from_sympy": "describe", "load": "loading"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}

@@ -16,6 +16,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from .. import _STARTED
 from .build import Artifact
 from .cache import Cache, cache_directory, compute_key
 from .compiler import find_compiler
@@ -41,6 +42,8 @@ class Shortcut:
         self.cache = Cache(cache_directory())
         self.note: Path | None = None
         if fingerprint is None or options.native:  # what "native" means takes the compiler as long to say
+            return
+        if changed_since(_STARTED):  # the files are not the code that runs
             return
         compiler = find_compiler(options.compiler)
         parts = {
@@ -73,6 +76,11 @@ class Shortcut:
             attempt = self.note.with_name(f".{self.note.name}.{os.getpid()}")
             attempt.write_text(artifact.key, encoding="ascii")
             os.replace(attempt, self.note)
+
+
+def changed_since(moment: float) -> bool:
+    """Whether any of that code was written, or put in its place, after a moment."""
+    return any(max(found.st_mtime, found.st_ctime) > moment for found in map(os.stat, writers()))
 
 
 @cache

@@ -18,7 +18,7 @@ from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
 from ..runtime.signals import Forcing, Signal
-from ..runtime.simulate import DEFAULTS, find_span, ordered_times
+from ..runtime.simulate import DEFAULTS, check_count, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
@@ -189,6 +189,7 @@ def _plan(
     if (method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     if step is not None:
+        check_count(step, start, end)
         options = {**options, "max_step": step, "first_step": step}
     chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)

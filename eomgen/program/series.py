@@ -14,7 +14,7 @@ from ..graph.traverse import reachable
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.
-MOST_ORDER = 24
+MOST_ORDER = 23
 #: Right-hand sides of more terms have no series: DOP853 is faster then, as work grows with the square of the order.
 MOST_TERMS = 600
 #: Integer powers up to this are products.

@@ -70,7 +70,7 @@ def choose_solver(method: Any) -> Any:
     scipy = require("scipy.integrate", "scipy", "simulate")
     if isinstance(method, str):
         if method not in METHODS:
-            raise unknown("method", method, METHODS)
+            raise unknown("method", method, (*METHODS, "Taylor", "RK4"))
         return getattr(scipy, method)
     if isinstance(method, type) and issubclass(method, scipy.OdeSolver):
         return method

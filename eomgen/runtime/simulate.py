@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from .protocols import Timed
     from .trajectory import Trajectory
 
+#: Steps of one size in one run; storing them takes gigabytes.
+MOST_STEPS = 10**8
 DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
 OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
 
@@ -71,7 +73,7 @@ def simulate(
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
         velocities) each step of the first three starts on the constraints where the last came near
         them.  Implicit ones get the exact Jacobian.  In compiled code only: RK4, which takes steps of one size, and
-        Taylor, of orders up to 24 and without rejected steps, for smooth trees of a few bodies at tight tolerances.
+        Taylor, of orders up to 23, for smooth trees of a few bodies at tight tolerances.
     rtol, atol : float, optional
         The model's own, or 1e-8 and 1e-10.
     t_eval : (n_t,) array, optional
@@ -139,6 +141,8 @@ def simulate(
         title = solver.__name__
         check_options(solver, options, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
+    if step is not None:
+        check_count(step, start, end)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     x0 = find_state(bound, initial, start)
@@ -345,6 +349,12 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
     return float(pair[0]), float(pair[1])
+
+
+def check_count(step: float, start: float, end: float) -> None:
+    """Refuse steps of one size that are too many for a run, or too small for its times."""
+    if abs(end - start) > MOST_STEPS * step or abs(end) + step == abs(end):
+        raise UsageError(f"step = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end")
 
 
 def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:

@@ -18,6 +18,7 @@ from libc.stdint cimport int64_t, uintptr_t
 from libc.string cimport memcmp, memcpy
 
 import json
+import os
 from sys import intern
 from _thread import allocate_lock
 

@@ -18,6 +18,16 @@ lane_width = 1 if LANES == NULL else LANES.width  # states that batches take at 
 # table, or 0. A model whose runs are single ones never pays for them.
 cdef object LATE = None
 cdef object LATE_TURN = allocate_lock()
+
+
+def renew_turn():
+    """In a forked child: the thread that held the lock is not there."""
+    global LATE_TURN
+    LATE_TURN = allocate_lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=renew_turn)
 cdef cnp.npy_intp BATCHED = 0  # columns evaluated without lanes
 cdef frozenset IN_LANES = frozenset(_FACTS.get("lanes", ()))
 

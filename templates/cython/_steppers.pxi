@@ -72,7 +72,10 @@ cdef method_pointer find_method(str name) except NULL:
             if METHODS[i].expands and SERIES == NULL:
                 take_lanes()
                 if SERIES == NULL:
-                    raise RuntimeError(f"the series of {MODEL.name.decode()} could not be compiled")
+                    raise RuntimeError(
+                        f"method Taylor: the series of {MODEL.name.decode()} could not be compiled, as a warning said; "
+                        "compile the model again, or take DOP853"
+                    )
             return METHODS[i]
     raise ValueError(f"no method {name}")
 
@@ -263,7 +266,7 @@ cdef class Stepper:
         """The solution within the last step."""
         cdef Interpolant result = Interpolant.__new__(Interpolant)
         cdef int n = self.run.n
-        eomgen_between(self.method, &self.run, self.run.t, self.run.K + n)  # forms the coefficients
+        eomgen_between(self.method, &self.run, self.run.t, self.run.next)  # forms the coefficients
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
         cdef cnp.npy_intp length = n * (2 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)

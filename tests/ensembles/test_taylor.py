@@ -26,8 +26,8 @@ def test_runs_are_those_of_simulate(pendulum: Any) -> None:
     masses = np.linspace(0.5, 2.0, 19)
     many = pendulum.simulate_many(3, angles(19), {"m2": masses}, t_eval=times, **TIGHT)
     assert many.ok.all()
-    assert (many.rejected == 0).all()
-    np.testing.assert_array_equal(many.evaluations, many.steps)
+    assert many.rejected.sum() < 0.02 * many.steps.sum()
+    np.testing.assert_array_equal(many.evaluations, many.steps + many.rejected + 1)
     for j in range(19):
         alone = pendulum.simulate(3, **many.case(j), t_eval=times, **TIGHT)
         exact = pendulum.simulate(3, **many.case(j), t_eval=times, rtol=1e-13, atol=1e-15)
@@ -83,3 +83,15 @@ def test_what_has_no_series_is_refused() -> None:
         compiled("slider_crank", "cython").simulate_many(1, count=2, method="Taylor")
     with pytest.raises(eg.UsageError, match="constant between corners"):
         compiled("cart_pendulum", "cython").simulate_many(1, count=2, method="Taylor", inputs={"F": "sin(t)"})
+
+
+def test_lanes_end_at_singularities() -> None:
+    """s'' = -1/s^2 falls into 0."""
+    m = eg.Model("well")
+    body = m.body("mass", mass=1.0)
+    m.prismatic("J", m.ground, body, axis="x", coordinate="s")
+    m.torque("pull", "J", "-1/s**2")
+    s = np.linspace(0.5, 1.0, 9)
+    many = m.compile().simulate_many(3, {"s": s}, method="Taylor")
+    assert not many.ok.any()
+    np.testing.assert_allclose(many.t_end, np.pi / np.sqrt(8) * s**1.5, rtol=1e-4)

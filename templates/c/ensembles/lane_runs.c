@@ -156,7 +156,7 @@ static inline real stretch_of(real error, int order)
 static flag judge_steps(lane_run *run, real error, int order)
 {
     const flag moved = run->awake & (error < 1.0), again = run->awake & ~moved;
-    const real factor = 0.8 * stretch_of(error, order), most = choose(run->again, same(1.0), same(10.0));
+    const real factor = order > 0 ? 0.8 * stretch_of(error, order) : same(0.5), most = choose(run->again, same(1.0), same(10.0));
     const real more = choose((factor < most) & (error > 0.0), factor, most);
     const real less = choose(factor > 0.2, factor, same(0.2)); /* also where the error is NaN */
     run->size *= choose(moved, more, choose(again, less, same(1.0)));
@@ -227,19 +227,19 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
         }
         /* a time asked for may be the start */
         sample_lanes(e, method, run, first & run->begins & run->active, direction);
-        if (method == &lane_taylor) {
-            run->begins = (flag){ 0 };
-        } else {
-            begin_lanes(e, method, run, direction);
-        }
-        advance_nodes(e, run, direction, constants); /* a part may have no length */
     }
-    if (method == &lane_taylor) {
-        expand_lanes(e, run);
+    const int taylor = method == &lane_taylor, begins = any_of(run->active & run->begins);
+    if (taylor) {
+        begin_taylor(e, run);
+    } else if (begins) {
+        begin_lanes(e, method, run, direction);
+    }
+    if (begins) {
+        advance_nodes(e, run, direction, constants); /* a part may have no length */
     }
     choose_steps(e, run, direction, constants);
     memcpy(run->y_old, run->y, size);
-    if (method != &lane_taylor) {
+    if (!taylor) {
         memcpy(run->K, run->f, size);
     }
     run->calls = 0;

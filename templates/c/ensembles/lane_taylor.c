@@ -1,49 +1,63 @@
-/* Taylor's method in lanes. Its round differs: coefficients come first and tell the step, and none is tried in vain. */
-/* The polynomial at h from its start. */
-static void taylor_sum(const lane_run *run, real h, real *restrict y)
+/* Taylor's method in lanes. Its round begins with coefficients, which tell the step: those that the last step ended with,
+   or new ones where a lane begins. */
+static void expand_lanes(lane_run *run, real t, const real *y, flag wanted)
 {
-    const int n = run->n;
-    const real *row = run->K + run->order * n;
-    for (int i = 0; i < n; i++) {
-        y[i] = row[i];
+    real *const rows = run->K + (TAYLOR_MOST + 1) * run->n;
+    if (run->signals != NULL) {
+        read_tables(run, t);
     }
-    for (int m = run->order; m-- > 0;) {
-        row -= n;
-        for (int i = 0; i < n; i++) {
-            y[i] = y[i] * h + row[i];
-        }
+    const flag failed = run->expand(t, y, run->u, run->c, run->order, rows, rows + (TAYLOR_MOST + 1) * run->n);
+    real sum = same(0.0); /* NaN where a result is not finite */
+    for (int i = 0; i < run->n; i++) {
+        sum += rows[run->n + i] * 0.0;
+    }
+    const flag bad = failed | (sum != 0.0);
+    if (any_of(bad & wanted)) {
+        run->awake = wanted;
+        note_failures(run, t, y, rows + run->n, failed, bad);
     }
 }
 
 static void taylor_attempt(lane_run *run, real h)
 {
+    const flag awake = run->awake;
+    taylor_sum(run, run->K, h, run->y, run->f);
     run->calls++;
-    taylor_sum(run, h, run->y);
+    expand_lanes(run, run->t_new, run->y, awake);
+    run->awake = awake;
 }
 
 static real taylor_error(const lane_run *run, real h)
 {
-    (void)run, (void)h;
-    return same(0.0);
+    return taylor_defect(run, h, run->f, run->K + (TAYLOR_MOST + 2) * run->n);
 }
 
-static const lane_method lane_taylor = {"Taylor", TAYLOR_MOST + 1, TAYLOR_MOST, 7, taylor_attempt, taylor_error,
-                                        taylor_prepare, taylor_interpolate};
+static const lane_method lane_taylor = {"Taylor", 2 * (TAYLOR_MOST + 1), TAYLOR_MOST, 0, taylor_attempt, taylor_error,
+                                        taylor_prepare, taylor_interpolate}; /* order 0: rejected steps are halved */
 
-/* Coefficients at the states of all lanes, and the sizes of their steps; NaN where there is none to take. */
-static void expand_lanes(const eomgen_ensemble *e, lane_run *run)
+/* Coefficients at the states of all lanes, and the sizes of the steps to try; NaN where there is none. */
+static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
 {
-    const int p = run->order;
-    if (run->signals != NULL) {
-        read_tables(run, run->t);
+    const int p = run->order, last = (p + 1) * run->n;
+    const real *const after = run->K + (TAYLOR_MOST + 1) * run->n;
+    const flag begins = run->begins & run->active, moved = run->active & ~begins & ~run->again;
+    for (int i = 0; i < last; i++) {
+        run->K[i] = choose(moved, after[i], run->K[i]);
     }
-    const flag failed = run->expand(run->t, run->y, run->u, run->c, p, run->K, run->K + (TAYLOR_MOST + 1) * run->n);
-    const real before = taylor_size(run, p - 1), last = taylor_size(run, p);
-    for (int l = 0; l < W; l++) {
-        const double size = failed[l] ? NAN : taylor_reach(before[l], last[l], p);
-        if (run->active[l] && isnan(size)) {
-            run->failure[l] = failed[l] ? EOMGEN_SINGULAR_MASS_MATRIX : EOMGEN_NON_FINITE, run->failure_time[l] = run->t[l];
+    if (any_of(begins)) {
+        expand_lanes(run, run->t, run->y, begins);
+        run->evaluations -= begins;
+        for (int i = 0; i < last; i++) {
+            run->K[i] = choose(begins, after[i], run->K[i]);
         }
-        run->size[l] = run->steps[l] == 0 && e->first_step > 0.0 && e->first_step < size ? e->first_step : size;
     }
+    const real before = taylor_size(run, run->K, p - 1), size = taylor_size(run, run->K, p);
+    for (int l = 0; l < W; l++) {
+        if (!begins[l] && !moved[l]) {
+            continue; /* tries again, or has nothing to do */
+        }
+        const double reach = taylor_reach(before[l], size[l], p);
+        run->size[l] = run->steps[l] == 0 && e->first_step > 0.0 && e->first_step < reach ? e->first_step : reach;
+    }
+    run->begins = (flag){ 0 };
 }

@@ -59,6 +59,7 @@ typedef struct {
     long differentiations, factorizations;
     const eomgen_series *series;  /* of Taylor's method */
     int order;                    /* of its next step */
+    int side, expanded;           /* which half of K has the coefficients at y, and whether it has */
     int stopped;                  /* look said so: results of evaluations are NaN from then on, and no step is taken */
 } eomgen_run;
 

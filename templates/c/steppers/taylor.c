@@ -2,60 +2,78 @@
 static void taylor_begin(eomgen_run *run)
 {
     run->order = taylor_order(run->rtol, run->series->most);
+    run->side = run->expanded = 0;
 }
 
-/* The polynomial at h from its start, and its rate. */
-static void taylor_sum_and_rate(const eomgen_run *run, double h, double *restrict y, double *restrict f)
+/* Coefficients at (t, y) into rows; the status, or EOMGEN_STOPPED. */
+static int taylor_expand(eomgen_run *run, double t, const double *y, double *rows)
 {
-    const int n = run->n;
-    const double *row = run->K + run->order * n;
-    for (int i = 0; i < n; i++) {
-        y[i] = row[i], f[i] = 0.0;
+    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, rows)) {
+        return EOMGEN_STOPPED;
     }
-    for (int m = run->order; m-- > 0;) {
-        row -= n;
-        for (int i = 0; i < n; i++) {
-            f[i] = f[i] * h + y[i];
-            y[i] = y[i] * h + row[i];
-        }
+    double *const work = run->K + 2 * (TAYLOR_MOST + 1) * run->n;
+    int status = run->series->expand(t, y, run->u, run->c, run->order, rows, work);
+    double sum = 0.0;
+    for (int i = 0; i < run->n; i++) {
+        sum += 0.0 * rows[run->n + i];
     }
+    run->evaluations++;
+    status = status == 0 && sum != 0.0 ? EOMGEN_NON_FINITE : status;
+    if (status != 0) {
+        eomgen_note(run, status, t, y);
+    }
+    return status;
 }
 
 static int taylor_step(eomgen_run *run)
 {
-    const int n = run->n, p = run->order;
+    const int n = run->n, p = run->order, half = (TAYLOR_MOST + 1) * n;
+    double *const rows = run->K + run->side * half, *const after = run->K + (1 - run->side) * half;
     const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
         return EOMGEN_TOO_MANY_STEPS;
     }
-    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, run->t, run->y, run->f)) {
-        return EOMGEN_STOPPED;
-    }
-    const int status = run->series->expand(run->t, run->y, run->u, run->c, p, run->K, run->K + (TAYLOR_MOST + 1) * n);
-    run->evaluations++;
-    double h_abs = taylor_reach(taylor_size(run, p - 1), taylor_size(run, p), p);
-    h_abs = run->h_abs > 0.0 && run->h_abs < h_abs ? run->h_abs : h_abs; /* NaN stays */
-    h_abs = h_abs > run->max_step ? run->max_step : h_abs;
-    if (status != 0 || !(h_abs >= least)) {
-        if (status != 0 || isnan(h_abs)) {
-            eomgen_note(run, status != 0 ? status : EOMGEN_NON_FINITE, run->t, run->y);
+    if (!run->expanded) {
+        const int status = taylor_expand(run, run->t, run->y, rows);
+        if (status != 0) {
+            return status == EOMGEN_STOPPED ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
-        return EOMGEN_STEP_TOO_SMALL;
+        run->expanded = 1;
     }
-    double t_new = run->t + h_abs * run->direction;
-    if (run->direction * (t_new - run->t_bound) > 0.0) {
-        t_new = run->t_bound;
+    double h_abs = taylor_reach(taylor_size(run, rows, p - 1), taylor_size(run, rows, p), p);
+    if (isnan(h_abs)) {
+        eomgen_note(run, EOMGEN_NON_FINITE, run->t, run->y);
     }
+    h_abs = run->h_abs > 0.0 && run->h_abs < h_abs ? run->h_abs : h_abs;
+    h_abs = h_abs > run->max_step ? run->max_step : h_abs < least ? least : h_abs;
     double *const spare = run->y_old;
     run->y_old = run->y, run->y = spare;
-    run->t_old = run->t, run->t = t_new, run->step = t_new - run->t_old;
-    taylor_sum_and_rate(run, run->step, run->y, run->f);
+    for (;;) {
+        if (run->stopped || !(h_abs >= least)) { /* also where it is NaN */
+            run->y = run->y_old, run->y_old = spare;
+            return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
+        }
+        double t_new = run->t + h_abs * run->direction;
+        if (run->direction * (t_new - run->t_bound) > 0.0) {
+            t_new = run->t_bound;
+        }
+        const double h = t_new - run->t;
+        taylor_sum(run, rows, h, run->y, run->f);
+        if (taylor_expand(run, t_new, run->y, after) == 0 && taylor_defect(run, h, run->f, after + n) <= 1.0) {
+            run->t_old = run->t, run->t = t_new, run->step = h;
+            break;
+        }
+        h_abs = 0.5 * fabs(h);
+        run->rejected++;
+    }
+    memcpy(run->f, after + n, (size_t)n * sizeof(double));
+    run->side = 1 - run->side;
     run->h_abs = 0.0; /* given for the first step alone */
     run->interpolates = 0;
     run->steps++;
     return 0;
 }
 
-const eomgen_method eomgen_taylor = {.name = "Taylor", .rows_K = TAYLOR_MOST + 1, .rows_F = TAYLOR_MOST, .error_order = 7,
+const eomgen_method eomgen_taylor = {.name = "Taylor", .rows_K = 2 * (TAYLOR_MOST + 1), .rows_F = TAYLOR_MOST,
                                      .prepare = taylor_prepare, .interpolate = taylor_interpolate, .begin = taylor_begin,
                                      .step = taylor_step, .expands = 1};

@@ -1,10 +1,15 @@
 /* Taylor's method: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor
    methods, Experimental Mathematics 14, 2005, section 3: the order by the tolerance, the step by the decay of the last two
-   terms, so that none is tried in vain. Rows of run->K are coefficients. The order is higher than theirs, 1 - log(rtol) / 2,
-   which is best where work grows with its square: here, in vector registers, it grows little faster than the order. */
+   terms. The order is higher than theirs, 1 - log(rtol) / 2, which is best where work grows with its square: here, in
+   vector registers, it grows little faster than the order. What the last terms do not see, as where odd or far
+   singularities make them vanish, the defect does: x' at the end of the step against the rate of the polynomial there;
+   a step whose defect is too large is tried again, shorter. Rows of run->K are coefficients, those of the step, then those
+   at its end, which serve the next one. */
 #ifndef EOMGEN_TAYLOR
 #define EOMGEN_TAYLOR
-enum { TAYLOR_LEAST = 4, TAYLOR_MOST = 24 };
+enum { TAYLOR_LEAST = 4, TAYLOR_MOST = 23 };
+/* The defect times the step may be so many times the tolerance: it is about the first term left out times its order. */
+static const double TAYLOR_DEFECT = 10.0;
 
 static int taylor_order(double rtol, int most)
 {
@@ -47,27 +52,70 @@ static inline double taylor_reach(double before, double last, int p)
 }
 #endif
 
-/* The largest term of order m over all states, for a step of 1, in parts of the tolerance; NaN counts as the largest. */
-static real taylor_size(const RUN *run, int m)
+/* The coefficients of the step taken last: in plain runs the halves of run->K take turns. */
+#ifdef EOMGEN_PLAIN
+#define TAYLOR_ROWS(run) ((run)->K + (1 - (run)->side) * (TAYLOR_MOST + 1) * (run)->n)
+#else
+#define TAYLOR_ROWS(run) ((run)->K)
+#endif
+
+/* The largest term of order m over all states, for a step of 1, in parts of the tolerance; NaN if one is not finite. A
+   state that is zero is judged by what the last step's length would make of it. */
+static real taylor_size(const RUN *run, const real *rows, int m)
 {
-    const real *const row = run->K + m * run->n;
+    const int n = run->n;
+    const real before = abs_of(run->t - run->t_old);
     real largest = same(0.0);
-    for (int i = 0; i < run->n; i++) {
-        const real part = abs_of(row[i]) / (run->atol[i] + abs_of(run->y[i]) * run->rtol);
+    for (int i = 0; i < n; i++) {
+        const real size = abs_of(run->y[i]), grown = abs_of(rows[n + i]) * before, term = abs_of(rows[m * n + i]);
+        const real scale = run->atol[i] + choose(size >= grown, size, grown) * run->rtol;
+        real part = choose(scale > 0.0, term / scale, same(0.0));
+        part = choose(part <= 1e280, part, choose(term < 1e300, same(1e280), term - term + NAN));
         largest = choose((part <= largest) | (largest != largest), largest, part);
     }
     return largest;
+}
+
+/* The defect at the end of a step of size h from y_old to y, where the polynomial's rate is f and x' is g: at most 1. */
+static real taylor_defect(const RUN *run, real h, const real *f, const real *g)
+{
+    real worst = same(0.0);
+    for (int i = 0; i < run->n; i++) {
+        const real a = abs_of(run->y_old[i]), b = abs_of(run->y[i]), off = abs_of((f[i] - g[i]) * h);
+        const real scale = run->atol[i] + choose(a >= b, a, b) * run->rtol;
+        const real part = choose(off == 0.0, same(0.0), off / scale);
+        worst = choose((part <= worst) | (worst != worst), worst, part);
+    }
+    return worst / TAYLOR_DEFECT;
+}
+
+/* The polynomial at h from its start, and its rate. */
+static void taylor_sum(const RUN *run, const real *rows, real h, real *restrict y, real *restrict f)
+{
+    const int n = run->n;
+    const real *row = rows + run->order * n;
+    for (int i = 0; i < n; i++) {
+        y[i] = row[i], f[i] = same(0.0);
+    }
+    for (int m = run->order; m-- > 0;) {
+        row -= n;
+        for (int i = 0; i < n; i++) {
+            f[i] = f[i] * h + y[i];
+            y[i] = y[i] * h + row[i];
+        }
+    }
 }
 
 /* Terms over the part of the step that has passed. */
 static void taylor_prepare(RUN *run)
 {
     const int n = run->n;
+    const real *const rows = TAYLOR_ROWS(run);
     real power = same(1.0);
     for (int m = 1; m <= TAYLOR_MOST; m++) {
         power = power * run->step;
         for (int i = 0; i < n; i++) {
-            run->F[(m - 1) * n + i] = m <= run->order ? power * run->K[m * n + i] : same(0.0);
+            run->F[(m - 1) * n + i] = m <= run->order ? power * rows[m * n + i] : same(0.0);
         }
     }
 }
