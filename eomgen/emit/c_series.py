@@ -7,7 +7,7 @@ first, all together and in vector registers, so that little is left to wait for 
 from __future__ import annotations
 
 from ..program import Program
-from ..program.series import MOST_ORDER, Series, Term, make_series
+from ..program.series import MOST_ORDER, Series, Term, behind, make_series
 from .angles import print_angles
 from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
 from .sources import read_template, render
@@ -15,7 +15,7 @@ from .straight import references
 
 #: Doubles of one row of coefficients: sums may read a zero behind them.
 ROW = MOST_ORDER + 2
-#: Sums made in one loop: their partial sums fit in the registers.
+#: Sums made in one loop: with more, their partial sums no longer fit in the registers.
 TOGETHER = 14
 
 
@@ -52,21 +52,10 @@ class _Printer:
         self._pairs: dict[tuple[tuple[str, int], int], str] = {}  #: rows multiplied -> name of the sum
         self._depth: dict[int, int] = {}  #: how many operations a coefficient waits for
         self.kept: list[str] = []  #: statements before the orders: reciprocals
-        needed = self._needed()
+        states = {i for i, t in enumerate(self._terms) if t.kind == "state"}
+        needed = states | behind(self._terms, series.rates, changing=True)
         self._lines = {i: self._rule(i, t) for i, t in enumerate(self._terms) if i in needed}
         self.rows = len(self._places)
-
-    def _needed(self) -> set[int]:
-        """Terms that change and that x' is made of, with what their recurrences need, and all states."""
-        found = {i for i, t in enumerate(self._terms) if t.kind == "state"}
-        open_ends = list(self._series.rates)
-        while open_ends:
-            i = open_ends.pop()
-            term = self._terms[i]
-            if term.varies and (i not in found or term.kind == "state"):
-                found.add(i)
-                open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
-        return found
 
     # what the recurrences are written with
 

@@ -6,6 +6,7 @@ A. Griewank, A. Walther, Evaluating Derivatives, 2008, section 13.2; A. Jorba, M
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -76,6 +77,19 @@ class Series:
     checks: tuple[int, ...]
 
 
+def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = False) -> set[int]:
+    """The terms that roots are made of, with what their recurrences need; only those that change, if asked for."""
+    found: set[int] = set()
+    open_ends = list(roots)
+    while open_ends:
+        i = open_ends.pop()
+        term = terms[i]
+        if i not in found and (term.varies or not changing):
+            found.add(i)
+            open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
+    return found
+
+
 def make_series(program: Program) -> Series | None:
     """The terms of a program's right-hand side; None where it is not straight-line code of smooth operations."""
     block = next((b for b in program.blocks if b.name == "rhs"), None)
@@ -114,16 +128,10 @@ class _Terms:
     def series(self, block: Block) -> Series:
         """All that is needed, once every node has its term; reciprocals may have gone into quotients."""
         rates, checks = ([self._of[y.id] for y in given] for given in (block.outputs, block.checks))
-        live = {i for i, term in enumerate(self._terms) if term.kind == "state"}
-        open_ends = [*rates, *checks]
-        while open_ends:
-            i = open_ends.pop()
-            term = self._terms[i]
-            if i not in live:
-                live.add(i)
-                open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
-        place = {i: k for k, i in enumerate(sorted(live))}
-        terms = (self._terms[i] for i in sorted(live))
+        states = {i for i, term in enumerate(self._terms) if term.kind == "state"}
+        live = sorted(states | behind(self._terms, [*rates, *checks]))
+        place = {i: k for k, i in enumerate(live)}
+        terms = (self._terms[i] for i in live)
         moved = (
             term._replace(operands=tuple(place[k] for k in term.operands), other=place.get(term.other, -1))
             for term in terms
