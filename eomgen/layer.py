@@ -23,6 +23,7 @@ LAYER = {
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "_journeys.pxi": ("cython/_journeys.pxi",),
+    "_integrators.pxi": ("cython/_integrators.pxi",),
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),
     "eomgen_loop.h": ("c/steppers/eomgen_loop.h",),

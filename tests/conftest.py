@@ -18,11 +18,18 @@ def pytest_configure(config: pytest.Config) -> None:
     # a busy machine is slow, not wrong
     settings.register_profile("eomgen", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
     settings.load_profile("eomgen")
-    config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
+    made = is_worker(config) or tempfile.mkdtemp(prefix="eomgen-tests-")
+    config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"] = made
+
+
+def is_worker(config: pytest.Config) -> str:
+    """The cache of the run, in a process that pytest-xdist has started to run a part of its tests; else nothing."""
+    return os.environ["EOMGEN_CACHE_DIR"] if hasattr(config, "workerinput") else ""
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    shutil.rmtree(config.stash[CACHE], ignore_errors=True)
+    if not is_worker(config):
+        shutil.rmtree(config.stash[CACHE], ignore_errors=True)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

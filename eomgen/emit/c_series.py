@@ -6,14 +6,17 @@ first, all together and in vector registers, so that little is left to wait for 
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, behind, make_series
 from .angles import print_angles
+from .c_lanes import WIDTHS
 from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
 from .sources import read_template, render
 from .straight import references
 
-#: Doubles of one row of coefficients: sums may read a zero behind them.
+#: Doubles of one row of coefficients.  Sums by pairs may take one product too many: of a zero behind a reversed row.
 ROW = MOST_ORDER + 2
 #: Sums made in one loop: with more, their partial sums no longer fit in the registers.
 TOGETHER = 14
@@ -37,6 +40,7 @@ def series_files(program: Program) -> dict[str, str]:
         "most": MOST_ORDER,
         "n_work": printer.rows * ROW,
         "kept": printer.kept,
+        "widths": [(width, tests) for width, (tests, _) in sorted(WIDTHS.items(), reverse=True) if tests],
         "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
     }
     files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
@@ -51,10 +55,19 @@ class _Printer:
         self._places: dict[tuple[str, int], int] = {}  #: forward, weighted or reversed row of a term -> its place
         self._pairs: dict[tuple[tuple[str, int], int], str] = {}  #: rows multiplied -> name of the sum
         self._depth: dict[int, int] = {}  #: how many operations a coefficient waits for
-        self.kept: list[str] = []  #: statements before the orders: reciprocals
+        self.kept: list[str] = []  #: statements before the orders: reciprocals and factors
+        self._shared: set[int] = set()  #: terms whose row serves several multiples of them
         states = {i for i, t in enumerate(self._terms) if t.kind == "state"}
-        needed = states | behind(self._terms, series.rates, changing=True)
-        self._lines = {i: self._rule(i, t) for i, t in enumerate(self._terms) if i in needed}
+        needed = sorted(states | behind(self._terms, series.rates, changing=True))
+        for i in needed:
+            self._rule(i, self._terms[i])
+        users: dict[int, set[int]] = {}
+        for _, i in self._places:
+            users.setdefault(self._multiple(i)[0], set()).add(i)
+        self._shared = {base for base, found in users.items() if len(found) > 1}
+        for made in (self._places, self._pairs, self.kept):
+            made.clear()
+        self._lines = {i: self._rule(i, self._terms[i]) for i in needed}
         self.rows = len(self._places)
 
     # what the recurrences are written with
@@ -64,12 +77,43 @@ class _Printer:
 
     def _sum(self, left: int, right: int, weighted: bool = False) -> str:
         """Sum of left_j right_(k-j) for 0 < j < k, times j if weighted."""
+        (left, first), (right, second) = (self._multiple(i, among=self._shared) for i in (left, right))
         row = ("weighted" if weighted else "forward", left)
         if not weighted and (("forward", right), left) in self._pairs:
-            return self._pairs[("forward", right), left]
+            row, right = ("forward", right), left
         self._row(*row)
         self._row("reversed", right)
-        return self._pairs.setdefault((row, right), f"s{len(self._pairs)}")
+        name = self._pairs.setdefault((row, right), f"s{len(self._pairs)}")
+        return self._scaled(name, [*first, *second])
+
+    def _multiple(self, i: int, among: Container[int] | None = None) -> tuple[int, list[str]]:
+        """The term of which a term is a multiple but for order 0, the furthest or one of these, and the factors."""
+        found, factors = (i, list[str]()), list[str]()
+        while True:
+            kind, (p, q) = self._terms[i].kind, (*self._terms[i].operands, -1, -1)[:2]
+            if kind in ("add", "sub", "mul") and self._changes(p) != self._changes(q):
+                i, still, moves = (p, q, "1") if self._changes(p) else (q, p, "-1" if kind == "sub" else "1")
+                factors = [*factors, self._zero(still) if kind == "mul" else moves]
+            elif kind == "neg":
+                i, factors = p, [*factors, "-1"]
+            else:
+                return found
+            if among is None or i in among:
+                found = i, factors
+
+    def _scaled(self, name: str, factors: list[str]) -> str:
+        """A sum times factors that stay the same."""
+        sign = "-" if factors.count("-1") % 2 else ""
+        product = "*".join(f for f in factors if f not in ("1", "-1"))
+        if "*" in product:
+            made = f" = {product};"
+            line = next((line for line in self.kept if line.endswith(made)), None)
+            if line is None:
+                line = f"const real g{len(self.kept)}{made}"
+                self.kept.append(line)
+            product = line.split()[2]
+        text = f"{product}*{name}" if product else name
+        return f"({sign}{text})" if sign else text
 
     def _reciprocal(self, i: int) -> str:
         """One over a term, made once."""
@@ -184,11 +228,8 @@ class _Printer:
         lines += print_angles([self._zero(i) for i in angles]) if angles else []
         lines += [self._value(i, angles) for i in made if i not in early]
         lines += [f"EOMGEN_REJECT({self._zero(i)} <= 0.0)" for i in self._series.checks]
-        for (kind, i), place in self._places.items():
-            if kind == "reversed":
-                lines.append(f"w[{place * ROW + MOST_ORDER}] = {self._real(i)};")
-            else:
-                lines.append(f"w[{place * ROW + 1}] = same(0.0);")
+        behind_last = (place * ROW + MOST_ORDER for (kind, _), place in self._places.items() if kind == "reversed")
+        lines += [f"w[{at}] = same(0.0);" for at in behind_last]
         return [*lines, *(f"real f{k} = {self._real(i)};" for k, i in enumerate(self._series.rates))]
 
     def _real(self, i: int) -> str:
@@ -252,14 +293,14 @@ class _Printer:
         return lines
 
     def _stores(self, i: int) -> list[str]:
-        """A coefficient of order k into its rows; a sum may read one behind the last."""
+        """A coefficient of order k into its rows."""
         lines = []
         for kind, text in (("forward", f"b{i}"), ("weighted", f"(double)k*b{i}"), ("reversed", f"b{i}")):
             at = self._places.get((kind, i), -1) * ROW
             if at >= 0 and kind == "reversed":
                 lines.append(f"w[{at + MOST_ORDER} - k] = {text};")
             elif at >= 0:
-                lines += [f"w[{at} + k] = {text};", f"w[{at + 1} + k] = same(0.0);"]
+                lines.append(f"w[{at} + k] = {text};")
         return lines
 
     def rates(self) -> list[str]:

@@ -21,6 +21,7 @@ from .momenta import Momenta
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
+    from .integrator import Integrator
     from .minimal import Minimal
     from .paths import Path
     from .protocols import Core, Motion, State, Timed
@@ -301,6 +302,28 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
             options["method"] = "RK4"
             options["step"] = own if options.get("step") is None else options["step"]
         return options
+
+    def integrator(
+        self, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
+    ) -> Integrator:
+        """An integrator held ready, for many short integrations: control, shooting, filters, learning.
+
+        Parameters
+        ----------
+        parameters, inputs : mapping of str to float, or arrays, optional
+            As for :meth:`bind`; inputs are held.
+        method : str, optional
+        **options
+            rtol, atol, max_step, first_step, step, as for :meth:`simulate`.
+
+        Returns
+        -------
+        Integrator
+            ``integrator(t, x, h)`` -> the state at t + h; see :class:`~.integrator.Integrator`.
+        """
+        from .integrator import make_integrator
+
+        return make_integrator(self, parameters, inputs, **self._stepped(method=method, **options))
 
     def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
         """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.

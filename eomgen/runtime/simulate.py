@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cached_property, partial
+from collections.abc import Mapping
+from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -17,15 +17,15 @@ from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, takes_jacobian
 from .layout import number
 from .names import check_names
-from .pace import Crawling, Pace, describe_crawl, steepest
+from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
+from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
 
 if TYPE_CHECKING:
     from .module import Module
-    from .protocols import Timed
     from .trajectory import Trajectory
 
 #: Steps of one size in one run; storing them takes gigabytes.
@@ -122,11 +122,9 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
-    if (isinstance(method, str) and method == "RK4") != (step is not None):
-        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
-    if step is not None:
-        max_step = first_step = check_step("step", step)
-    declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+    if step is not None or method == "RK4":
+        step = max_step = first_step = check_method(method, step)
+    declared = declare(module)
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
     forcing = Forcing(module.layout, inputs)
@@ -152,7 +150,7 @@ def simulate(
         bound.rhs(start, x0, u=u0)  # a failure here is the user's state, not the integration
     else:
         bound.rhs(start, x0)
-    run = _Run(bound, forcing)
+    run = Run(bound, forcing)
     tolerances = {
         "rtol": declared["rtol"] if rtol is None else rtol,
         "atol": declared["atol"] if atol is None else atol,
@@ -234,95 +232,7 @@ def _follow_drivers(
     return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
 
 
-class _Run:
-    """The right-hand side and Jacobian of one run, with NaN for recoverable failures."""
-
-    def __init__(self, module: Module, forcing: Forcing) -> None:
-        self.module = module
-        self.forcing = forcing
-        self.tangent: Timed | None = None
-        self.last: tuple[str, int, float, Array] | None = None
-
-    @cached_property
-    def kernel(self) -> Timed:
-        """The right-hand side."""
-        return self.module.kernels.timed("rhs", nan=True)
-
-    def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
-        """f(t, x) for the solver."""
-        kernel, forcing = self.kernel, self.forcing
-
-        def plain(t: float, x: Array) -> Array:
-            result = kernel(t, x)
-            if kernel.failure is not None:
-                self.remember("rhs", kernel)
-            return result
-
-        def forced(t: float, x: Array) -> Array:
-            result = kernel(t, x, u=forcing(t, x))
-            if kernel.failure is not None:
-                self.remember("rhs", kernel)
-            return result
-
-        call = forced if forcing else plain
-        if watch is None:
-            return call
-
-        def told(t: float, x: Array) -> Array:
-            watch(t)
-            return call(t, x)
-
-        return told
-
-    def remember(self, name: str, kernel: Timed) -> None:
-        """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
-        if kernel.failure is not None and (self.last is None or np.isfinite(kernel.failure[2]).all()):
-            self.last = (name, *kernel.failure)
-        kernel.failure = None
-
-    def jacobian(self, t: float, x: Array) -> Array:
-        """d(x')/dx, inputs that depend on the state included."""
-        if self.tangent is None:
-            self.tangent = self.module.kernels.timed("jacobian", nan=True)
-        J = self.tangent(t, x, u=self.forcing(t, x)) if self.forcing else self.tangent(t, x)
-        self.remember("jacobian", self.tangent)
-        extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
-        return J if extra is None else J + extra
-
-    def cause(self) -> EvaluationError | None:
-        """The last failure of a kernel as an exception."""
-        return None if self.last is None else self.module.kernels.fail.exception(*self.last)
-
-    def troubled(self, t: float, x: Array) -> bool:
-        """Whether a state is at a singularity that can be named."""
-        return self.module.kernels.fail.trouble(x, t) is not None
-
-    def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
-        """The error for a run whose steps led nowhere."""
-        if self.troubled(crawl.t, crawl.x):
-            return self.ended(crawl.t, end, method, "", crawl.x)
-        with np.errstate(all="ignore"):
-            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
-        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
-
-    def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
-        """The error for a run that stopped at time t, at state x if that is known."""
-        cause = self.cause()
-        trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
-        if trouble is not None:
-            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
-        if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):
-            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {self.forcing.lapse}")
-        if cause is None:
-            return SimulationError(
-                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "
-                "tolerances, or look for a motion that grows without bound."
-            )
-        when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"
-        return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
-
-
-def _check(run: _Run, solution: Solution, start: float, end: float, method: str) -> None:
+def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:
     if not np.isfinite(solution.x).all():
         finite = np.isfinite(solution.x).all(axis=0)
         first = int(np.flatnonzero(~finite)[0])
@@ -349,6 +259,18 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
     return float(pair[0]), float(pair[1])
+
+
+def declare(module: Module) -> dict[str, Any]:
+    """What holds for a run where nothing is said: what the model says, or the defaults."""
+    return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+
+
+def check_method(method: Any, step: Any) -> float | None:
+    """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
+    if (isinstance(method, str) and method == "RK4") != (step is not None):
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    return None if step is None else check_step("step", step)
 
 
 def check_count(step: float, start: float, end: float) -> None:

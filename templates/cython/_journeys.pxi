@@ -48,6 +48,7 @@ cdef extern from "eomgen_loop.h" nogil:
         long notes_room
         double *notes
         long node, done, stored, n_pieces, n_notes, resets
+        int begun
     enum: EOMGEN_FULL
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept

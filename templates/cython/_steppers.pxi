@@ -308,6 +308,14 @@ cdef class Stepper:
         return self.run.failure, self.run.failure_time, copy(self.run.failure_state, self.run.n)
 
 
+cdef cnp.ndarray target(out, cnp.npy_intp n):
+    """The array (n,) that a state is written into."""
+    if not (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
+            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_SIZE(<cnp.ndarray>out) == n):
+        raise ValueError(f"out must be a contiguous float64 array of shape ({n},)")
+    return out
+
+
 def march(Context context not None, double t, double h, x, u=None, out=None):
     """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
     cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
@@ -318,13 +326,7 @@ def march(Context context not None, double t, double h, x, u=None, out=None):
     cdef cnp.ndarray result
     if u is not None:
         inputs = vector(u, MODEL.n_u, "u", ValueError)
-    if (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
-            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_SIZE(<cnp.ndarray>out) == n):
-        result = out
-    elif out is None:
-        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
-    else:
-        raise ValueError(f"out must be a contiguous float64 array of shape ({n},)")
+    result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
     if n_work > STACK:
         heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
         w = <double *>cnp.PyArray_DATA(heap)
@@ -337,3 +339,4 @@ def march(Context context not None, double t, double h, x, u=None, out=None):
 stepper = Stepper
 
 include "_journeys.pxi"
+include "_integrators.pxi"

@@ -39,22 +39,27 @@ def test_workers_give_the_same_bits(pendulum: Any, client: Any) -> None:
     np.testing.assert_array_equal(there.evaluations, here.evaluations)
 
 
-def test_killing_a_worker_loses_nothing(pendulum: Any, client: Any) -> None:
+def test_killing_a_worker_loses_nothing(pendulum: Any, client: Any, tmp_path: Path) -> None:
     here = pendulum.simulate_many(500, angles(256), **TIGHT)
-    before = dict(client.run(os.getpid))
-    killed: list[int] = []
+    victim = next(iter(client.run(os.getpid).values()))
+    ready: list[int] = []  # blocks that were there when the worker died
 
     def kill() -> None:
-        time.sleep(0.5)
-        killed.append(next(iter(before.values())))
-        os.kill(killed[0], signal.SIGKILL)
+        deadline = time.monotonic() + 60
+        while not ready and time.monotonic() < deadline:
+            time.sleep(0.005)
+            if done := len(list(tmp_path.glob("runs/block_*.npz"))):
+                os.kill(victim, signal.SIGKILL)
+                ready.append(done)
 
-    threading.Thread(target=kill).start()
-    there = pendulum.simulate_many(500, angles(256), cluster=client, block=8, **TIGHT)
-    assert killed
-    assert killed[0] not in client.run(os.getpid).values()
+    thread = threading.Thread(target=kill)
+    thread.start()
+    there = pendulum.simulate_many(500, angles(256), cluster=client, block=8, store=tmp_path / "runs", **TIGHT)
+    thread.join()
+    assert ready[0] < 16  # of 32: in the midst of the run
     assert there.ok.all()
     np.testing.assert_array_equal(there.x, here.x)
+    client.wait_for_workers(2)
 
 
 def test_failures_are_gathered(crank: Any, client: Any) -> None:

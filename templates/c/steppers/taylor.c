@@ -1,8 +1,20 @@
 /* Taylor's method for one state: see taylor_terms.c. The work of the series follows the rows in run->K. */
+static double *taylor_work(const eomgen_run *run)
+{
+    return run->K + 2 * (TAYLOR_MOST + 1) * run->n;
+}
+
+/* The series' work is finite: it multiplies by zero what it does not mean. */
+static void taylor_clear(eomgen_run *run)
+{
+    memset(taylor_work(run), 0, (size_t)run->series->n_work * sizeof(double));
+}
+
 static void taylor_begin(eomgen_run *run)
 {
     run->order = taylor_order(run->rtol, run->series->most);
     run->side = run->expanded = 0;
+    taylor_clear(run);
 }
 
 /* Coefficients at (t, y) into rows; the status, or EOMGEN_STOPPED. */
@@ -11,8 +23,7 @@ static int taylor_expand(eomgen_run *run, double t, const double *y, double *row
     if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, rows)) {
         return EOMGEN_STOPPED;
     }
-    double *const work = run->K + 2 * (TAYLOR_MOST + 1) * run->n;
-    int status = run->series->expand(t, y, run->u, run->c, run->order, rows, work);
+    int status = run->series->expand(t, y, run->u, run->c, run->order, rows, taylor_work(run));
     double sum = 0.0;
     for (int i = 0; i < run->n; i++) {
         sum += 0.0 * rows[run->n + i];
@@ -20,6 +31,7 @@ static int taylor_expand(eomgen_run *run, double t, const double *y, double *row
     run->evaluations++;
     status = status == 0 && sum != 0.0 ? EOMGEN_NON_FINITE : status;
     if (status != 0) {
+        taylor_clear(run);
         eomgen_note(run, status, t, y);
     }
     return status;

@@ -89,20 +89,23 @@ static real taylor_defect(const RUN *run, real h, const real *f, const real *g)
     return worst / TAYLOR_DEFECT;
 }
 
-/* The polynomial at h from its start, and its rate. */
+/* The polynomial at h from its start, and its rate: even and odd powers apart, as each sum waits for itself. */
 static void taylor_sum(const RUN *run, const real *rows, real h, real *restrict y, real *restrict f)
 {
-    const int n = run->n;
-    const real *row = rows + run->order * n;
+    const int n = run->n, odd = (run->order - 1) | 1, even = run->order & ~1;
+    const real square = h * h;
     for (int i = 0; i < n; i++) {
-        y[i] = row[i], f[i] = same(0.0);
-    }
-    for (int m = run->order; m-- > 0;) {
-        row -= n;
-        for (int i = 0; i < n; i++) {
-            f[i] = f[i] * h + y[i];
-            y[i] = y[i] * h + row[i];
+        real a = rows[even * n + i], b = rows[odd * n + i], slope_a = same(0.0), slope_b = same(0.0);
+        for (int m = even - 2; m >= 0; m -= 2) {
+            slope_a = slope_a * square + a;
+            a = a * square + rows[m * n + i];
         }
+        for (int m = odd - 2; m > 0; m -= 2) {
+            slope_b = slope_b * square + b;
+            b = b * square + rows[m * n + i];
+        }
+        y[i] = a + h * b;
+        f[i] = b + 2.0 * h * (slope_a + h * slope_b);
     }
 }
 

@@ -1,0 +1,179 @@
+"""Stage runtime: Module and tolerances -> an integrator held ready: state at one time -> state at another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .compiled import MESSAGES, TOO_SMALL, can_run, stepper_options
+from .events import Events
+from .integrate import choose_solver
+from .late import eager
+from .names import check_names
+from .pace import Crawling, Pace
+from .run import Run
+from .signals import Forcing
+from .simulate import check_count, check_method, declare, simulate
+from .tolerances import check_tolerances
+
+if TYPE_CHECKING:
+    from .module import Module
+
+ENDED, RESET_FAILED = 1, -103  #: as in eomgen_loop.h
+OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
+
+
+class Integrator:
+    """Integrates from one state to another, again and again, with all that stays the same checked beforehand.
+
+    A call costs a microsecond or two besides the steps themselves, and no call depends on those before it.
+
+    Parameters
+    ----------
+    module : Module
+        With parameters and inputs bound.
+    method : str
+        A method of :func:`~.simulate.simulate`.
+    rtol : float
+    atol : float or (n_x,) array
+    max_step, first_step, step : float, optional
+        As for :func:`~.simulate.simulate`.
+
+    Attributes
+    ----------
+    module : Module
+    method : str
+
+    Raises
+    ------
+    UsageError
+        The module's events reset the state, which takes a run that watches them; values that cannot be.
+    """
+
+    def __init__(
+        self,
+        module: Module,
+        method: str,
+        rtol: float,
+        atol: Any,
+        max_step: float | None = None,
+        first_step: float | None = None,
+        step: float | None = None,
+    ) -> None:
+        if Events(module.layout, None).resets:
+            raise UsageError(f"events of {module.name} reset its state, and an integrator watches none; simulate it")
+        self.module, self.method = module, method
+        self._step = check_method(method, step)
+        sizes = {"max_step": max_step, "first_step": first_step} if step is None else {"max_step": self._step}
+        self._options = check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol, **sizes})
+        self._evaluations = 0
+        self._compiled: Any = None
+        if can_run(module, method, Forcing(module.layout, None)):
+            settings = stepper_options(module.n_x, np.inf, self._options, checked=True)
+            if step is not None:
+                settings["first_step"] = self._step
+            plan = {"nodes": [1.0], "t_eval": [], "dense": False, "events": None, "watch": None}
+            make, nowhere = eager(module.core).integrator, np.zeros(module.n_x)
+            self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
+            self._compiled.pacer = self._pace
+        elif step is not None:
+            raise UsageError("method RK4 runs in compiled code only: target='cython'")
+        else:
+            choose_solver(method)
+
+    def __call__(
+        self, t: float, x: ArrayLike, h: float, p: ArrayLike | None = None, u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array:  # fmt: skip
+        """The state at t + h of the motion through x at t.
+
+        Parameters
+        ----------
+        t, h : float
+            Time, and how long to go on (s); backwards if negative.
+        x : (n_x,) array
+            On the constraints, as from ``x0``, ``project`` or an earlier call.
+        p, u : (n_p,) and (n_u,) arrays, optional
+            Parameters, and inputs held over the whole call; those bound by default.
+        out : (n_x,) array, optional
+            Takes the result; it may be x.
+
+        Returns
+        -------
+        (n_x,) array
+            On the constraints.
+
+        Raises
+        ------
+        SimulationError
+            The integration ended early; its cause is the last failure of a kernel.
+        UsageError
+            Wrong shapes or values.
+        """
+        if self._compiled is None:
+            return self._plainly(float(t), x, float(h), p, u, out)
+        if self._step is not None:
+            check_count(self._step, t, t + h)
+        try:
+            status, result = self._compiled.advance(t, x, h, p, u, out)
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"integrator of {self.module.name}: {error}") from None
+        if status != ENDED:
+            self._explain(status, t + h, p, u)
+        return result  # type: ignore[no-any-return]
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the right-hand side in the last call; of its series, for Taylor."""
+        return self._evaluations if self._compiled is None else int(self._compiled.evaluations)
+
+    def _pace(self, t: float, end: float, x: Array) -> Callable[[float, Array, int], None]:
+        """What watches the steps of a long call."""
+        troubled = Run(self.module, Forcing(self.module.layout, None)).troubled
+        return Pace(t, end, x, self.module.n_q, float(self._options.get("max_step", np.inf)), troubled).look
+
+    def _explain(self, status: int, end: float, p: Any, u: Any) -> None:
+        """Raise the error for a call that ended early."""
+        own, raised = self._compiled, self._compiled.raised
+        bound = self.module if p is None and u is None else self.module.bind(p, u)
+        run = Run(bound, Forcing(bound.layout, None))
+        run.last = None if own.failure is None else ("rhs", *own.failure)
+        if isinstance(raised, Crawling):
+            raise run.gave_up(raised, end, self.method, self._options) from None
+        if raised is not None:
+            raise raised
+        words = MESSAGES.get(status, TOO_SMALL)
+        if status == RESET_FAILED:
+            words = "The state cannot be brought onto the constraints."
+        raise run.ended(own.t, end, self.method, words, own.state()) from run.cause()
+
+    def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None) -> Array:
+        """The same by SciPy, for a module without compiled steppers."""
+        bound = self.module if p is None and u is None else self.module.bind(p, u)
+        state = np.array(x, dtype=float)
+        if state.shape != (bound.n_x,):
+            raise UsageError(f"integrator of {bound.name}: x must have shape ({bound.n_x},), not {state.shape}")
+        if h != 0.0:
+            run = simulate(bound, (t, t + h), state, events=[], t_eval=[t + h], method=self.method, **self._options)
+            state, self._evaluations = run.x[:, -1], run.nfev
+        if out is None:
+            return state
+        out[...] = state
+        return out
+
+    def __repr__(self) -> str:
+        return f"<Integrator of {self.module.name}: {self.method}, rtol {self._options['rtol']:g}>"
+
+
+def make_integrator(module: Module, parameters: Any, inputs: Any, **options: Any) -> Integrator:
+    """See :meth:`~.module.Module.integrator`."""
+    check_names("option of integrator", options, OPTIONS)
+    declared = declare(module)
+    given = {name: declared[name] for name in ("method", "rtol", "atol")}
+    given.update({name: value for name, value in options.items() if value is not None})
+    return Integrator(module if parameters is None and inputs is None else module.bind(parameters, inputs), **given)

@@ -1,0 +1,107 @@
+"""Stage runtime: one integration of a module: its right-hand side for a solver, and the words when it fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import EvaluationError, SimulationError
+from ..numeric.scales import Array
+from .pace import Crawling, describe_crawl, steepest
+from .progress import Progress
+from .signals import Forcing
+
+if TYPE_CHECKING:
+    from .module import Module
+    from .protocols import Timed
+
+
+class Run:
+    """The right-hand side and Jacobian of one run, with NaN for recoverable failures."""
+
+    def __init__(self, module: Module, forcing: Forcing) -> None:
+        self.module = module
+        self.forcing = forcing
+        self.tangent: Timed | None = None
+        self.last: tuple[str, int, float, Array] | None = None
+
+    @cached_property
+    def kernel(self) -> Timed:
+        """The right-hand side."""
+        return self.module.kernels.timed("rhs", nan=True)
+
+    def watched(self, watch: Progress | None) -> Callable[[float, Array], Array]:
+        """f(t, x) for the solver."""
+        kernel, forcing = self.kernel, self.forcing
+
+        def plain(t: float, x: Array) -> Array:
+            result = kernel(t, x)
+            if kernel.failure is not None:
+                self.remember("rhs", kernel)
+            return result
+
+        def forced(t: float, x: Array) -> Array:
+            result = kernel(t, x, u=forcing(t, x))
+            if kernel.failure is not None:
+                self.remember("rhs", kernel)
+            return result
+
+        call = forced if forcing else plain
+        if watch is None:
+            return call
+
+        def told(t: float, x: Array) -> Array:
+            watch(t)
+            return call(t, x)
+
+        return told
+
+    def remember(self, name: str, kernel: Timed) -> None:
+        """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
+        if kernel.failure is not None and (self.last is None or np.isfinite(kernel.failure[2]).all()):
+            self.last = (name, *kernel.failure)
+        kernel.failure = None
+
+    def jacobian(self, t: float, x: Array) -> Array:
+        """d(x')/dx, inputs that depend on the state included."""
+        if self.tangent is None:
+            self.tangent = self.module.kernels.timed("jacobian", nan=True)
+        J = self.tangent(t, x, u=self.forcing(t, x)) if self.forcing else self.tangent(t, x)
+        self.remember("jacobian", self.tangent)
+        extra = self.forcing.jacobian(t, np.asarray(x), self.kernel)
+        return J if extra is None else J + extra
+
+    def cause(self) -> EvaluationError | None:
+        """The last failure of a kernel as an exception."""
+        return None if self.last is None else self.module.kernels.fail.exception(*self.last)
+
+    def troubled(self, t: float, x: Array) -> bool:
+        """Whether a state is at a singularity that can be named."""
+        return self.module.kernels.fail.trouble(x, t) is not None
+
+    def gave_up(self, crawl: Crawling, end: float, method: str, options: Mapping[str, Any]) -> SimulationError:
+        """The error for a run whose steps led nowhere."""
+        if self.troubled(crawl.t, crawl.x):
+            return self.ended(crawl.t, end, method, "", crawl.x)
+        with np.errstate(all="ignore"):
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+        return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
+
+    def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
+        """The error for a run that stopped at time t, at state x if that is known."""
+        cause = self.cause()
+        trouble = None if x is None else self.module.kernels.fail.trouble(x, t)
+        if trouble is not None:
+            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {trouble[0]}; {trouble[1]}")
+        if self.forcing.lapse is not None and (cause is None or self.forcing.lapse.time == cause.time):
+            return SimulationError(f"{method} stopped near t = {t:.6g} s of {end:.6g} s: {self.forcing.lapse}")
+        if cause is None:
+            return SimulationError(
+                f"{method} stopped at t = {t:.6g} s of {end:.6g} s: {words} Try an implicit method (Radau), other "
+                "tolerances, or look for a motion that grows without bound."
+            )
+        when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"
+        return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")

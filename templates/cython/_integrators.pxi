@@ -1,0 +1,84 @@
+# Integrators: a method and its tolerances held ready, for integrations that begin anew again and again.
+
+from libc.math cimport isfinite
+
+cdef enum:
+    WATCHED_AFTER = 200  # milliseconds after which a call is told of its steps, in case they lead nowhere
+
+
+cdef class Integrator(Journey):
+    """Integrations from one state to another, each as if it were the first.
+
+    Parameters
+    ----------
+    method, context, t0, y0, t_bound, rtol, atol, max_step, first_step
+        As for Stepper; times and state mean nothing.
+    plan : dict
+        Of a Journey that stores nothing, with a node whose value means nothing.
+    """
+
+    cdef eomgen_function project
+    cdef double *end
+    cdef double first, begun, start
+    cdef bint busy
+    cdef public object pacer
+
+    def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
+                  double max_step, double first_step=0.0, signals=(), plan=None):
+        self.end, self.first, self.busy = <double *>self.journey.nodes, first_step, False
+        if _FACTS.get("n_c", 0) or _FACTS.get("balls"):
+            self.project = MODEL.kernels[find("project", ValueError)].call
+
+    def advance(self, double t, x, double h, p=None, u=None, out=None):
+        """From x (n_x,) at time t over a time h: (status, state); 1 is success."""
+        cdef eomgen_run *run = &self.run
+        cdef eomgen_journey *j = &self.journey
+        cdef int n = run.n, status = 1
+        cdef cnp.npy_intp length = n
+        cdef cnp.ndarray state = vector(x, n, "x", ValueError)
+        cdef cnp.ndarray inputs = self.context.u if u is None else vector(u, MODEL.n_u, "u", ValueError)
+        cdef cnp.ndarray constants = self.context.c
+        cdef cnp.ndarray result
+        if p is not None:
+            constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
+        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
+        if not (isfinite(t) and isfinite(h)):
+            raise ValueError(f"t and h must be finite, not {t} and {h}")
+        if self.busy:
+            raise RuntimeError("this integrator is at work in another thread; make one for each")
+        self.busy = True
+        try:
+            memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
+            memcpy(run.u, cnp.PyArray_DATA(inputs), MODEL.n_u * sizeof(double))
+            run.c = <const double *>cnp.PyArray_DATA(constants)
+            run.t = run.t_old = self.start = t
+            run.step, run.h_abs = 0.0, self.first
+            self.end[0], j.span = t + h, abs(h)
+            run.evaluations = run.rejected = run.steps = run.differentiations = run.factorizations = 0
+            run.failure, run.stopped, run.look_in = 0, 0, self.stride
+            j.begun, j.node, self.seen, self.pace, self.raised = 0, 0, 0, None, None
+            self.looked = self.begun = perf_counter()
+            if h != 0.0:
+                with nogil:
+                    status = eomgen_travel(self.method, run, j)
+            if status == 1 and self.project != NULL:
+                state = copy(run.y, n)
+                if self.project(run.t, <double *>cnp.PyArray_DATA(state), run.u, run.c, run.y, run.w) != 0:
+                    status = -103
+            memcpy(cnp.PyArray_DATA(result), run.y, n * sizeof(double))
+        finally:
+            run.c, self.busy = <const double *>cnp.PyArray_DATA(self.context.c), False
+        return status, result
+
+    cdef long look(self, double t):
+        cdef long stride
+        if self.pace is None and self.looked - self.begun > 1e-3 * WATCHED_AFTER:
+            try:
+                self.pace, self.seen = self.pacer(t, self.end[0], copy(self.run.y_old, self.run.n)), self.run.steps
+            except BaseException as error:
+                self.raised = error
+                return 0
+        return Journey.look(self, t)
+
+
+integrator = Integrator
