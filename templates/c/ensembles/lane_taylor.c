@@ -51,7 +51,8 @@ static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
             run->K[i] = choose(begins, after[i], run->K[i]);
         }
     }
-    const real before = taylor_size(run, run->K, p - 1), size = taylor_size(run, run->K, p);
+    real before, size;
+    taylor_sizes(run, run->K, p, &before, &size);
     for (int l = 0; l < W; l++) {
         if (!begins[l] && !moved[l]) {
             continue; /* tries again, or has nothing to do */

@@ -41,7 +41,6 @@ static int taylor_step(eomgen_run *run)
 {
     const int n = run->n, p = run->order, half = (TAYLOR_MOST + 1) * n;
     double *const rows = run->K + run->side * half, *const after = run->K + (1 - run->side) * half;
-    const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
         return EOMGEN_TOO_MANY_STEPS;
     }
@@ -52,16 +51,18 @@ static int taylor_step(eomgen_run *run)
         }
         run->expanded = 1;
     }
-    double h_abs = taylor_reach(taylor_size(run, rows, p - 1), taylor_size(run, rows, p), p);
+    double before, last;
+    taylor_sizes(run, rows, p, &before, &last);
+    double h_abs = taylor_reach(before, last, p);
     if (isnan(h_abs)) {
         eomgen_note(run, EOMGEN_NON_FINITE, run->t, run->y);
     }
     h_abs = run->h_abs > 0.0 && run->h_abs < h_abs ? run->h_abs : h_abs;
-    h_abs = h_abs > run->max_step ? run->max_step : h_abs < least ? least : h_abs;
+    h_abs = h_abs > run->max_step ? run->max_step : too_small(run, h_abs) && h_abs > 0.0 ? least_step(run) : h_abs;
     double *const spare = run->y_old;
     run->y_old = run->y, run->y = spare;
     for (;;) {
-        if (run->stopped || !(h_abs >= least)) { /* also where it is NaN */
+        if (run->stopped || too_small(run, h_abs)) { /* also where it is NaN */
             run->y = run->y_old, run->y_old = spare;
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }

@@ -59,53 +59,72 @@ static inline double taylor_reach(double before, double last, int p)
 #define TAYLOR_ROWS(run) ((run)->K)
 #endif
 
-/* The largest term of order m over all states, for a step of 1, in parts of the tolerance; NaN if one is not finite. A
-   state that is zero is judged by what the last step's length would make of it. */
-static real taylor_size(const RUN *run, const real *rows, int m)
+/* The largest terms of orders p - 1 and p over all states, for a step of 1, in parts of the tolerance; NaN if one is not
+   finite. A state that is zero is judged by what the last step's length would make of it. */
+static void taylor_sizes(const RUN *run, const real *rows, int p, real *before, real *last)
 {
     const int n = run->n;
-    const real before = abs_of(run->t - run->t_old);
-    real largest = same(0.0);
-    for (int i = 0; i < n; i++) {
-        const real size = abs_of(run->y[i]), grown = abs_of(rows[n + i]) * before, term = abs_of(rows[m * n + i]);
-        const real scale = run->atol[i] + choose(size >= grown, size, grown) * run->rtol;
-        real part = choose(scale > 0.0, term / scale, same(0.0));
-        part = choose(part <= 1e280, part, choose(term < 1e300, same(1e280), term - term + NAN));
-        largest = choose((part <= largest) | (largest != largest), largest, part);
+    const real passed = abs_of(run->t - run->t_old);
+    const real *const first = rows + n, *const lower = rows + (p - 1) * n, *const upper = rows + p * n;
+    real most = same(0.0), most_lower = same(0.0), bad = same(0.0);
+    for (int i = 0; i < n; i++) { /* comparisons that turn out one way or the other must not become branches */
+        const real size = abs_of(run->y[i]), grown = abs_of(first[i]) * passed;
+        const real scale = run->atol[i] + choose(size > grown, size, grown) * run->rtol;
+        const real inverse = choose(scale > 0.0, 1.0 / scale, same(0.0));
+        const real a = abs_of(lower[i]) * inverse, b = abs_of(upper[i]) * inverse;
+        bad += 0.0 * (lower[i] + upper[i]);
+        most_lower = choose(a > most_lower, a, most_lower);
+        most = choose(b > most, b, most);
     }
-    return largest;
+    *before = choose(most_lower < 1e280, most_lower, same(1e280)) + bad;
+    *last = choose(most < 1e280, most, same(1e280)) + bad;
 }
 
-/* The defect at the end of a step of size h from y_old to y, where the polynomial's rate is f and x' is g: at most 1. */
+/* Whether the defect at the end of a step of size h from y_old to y, where the polynomial's rate is f and x' is g, is small
+   enough in all states: 0, else 2. */
 static real taylor_defect(const RUN *run, real h, const real *f, const real *g)
 {
-    real worst = same(0.0);
+    real found = same(0.0);
     for (int i = 0; i < run->n; i++) {
         const real a = abs_of(run->y_old[i]), b = abs_of(run->y[i]), off = abs_of((f[i] - g[i]) * h);
-        const real scale = run->atol[i] + choose(a >= b, a, b) * run->rtol;
-        const real part = choose(off == 0.0, same(0.0), off / scale);
-        worst = choose((part <= worst) | (worst != worst), worst, part);
+        const real most = TAYLOR_DEFECT * (run->atol[i] + choose(a >= b, a, b) * run->rtol);
+        found = choose(off <= most, found, same(2.0));
     }
-    return worst / TAYLOR_DEFECT;
+    return found;
 }
 
-/* The polynomial at h from its start, and its rate: even and odd powers apart, as each sum waits for itself. */
+/* The polynomial at h from its start, and its rate, of the states in `kind` at i. Even and odd powers apart, as each sum
+   waits for itself. */
+#define TAYLOR_SUM(kind) \
+    do { \
+        const int odd = (run->order - 1) | 1, even = run->order & ~1; \
+        const real square = h * h; \
+        kind a = *(const kind *)(rows + even * n + i), b = *(const kind *)(rows + odd * n + i); \
+        kind slope_a = a - a, slope_b = b - b; \
+        for (int m = even - 2; m >= 0; m -= 2) { \
+            slope_a = slope_a * square + a; \
+            a = a * square + *(const kind *)(rows + m * n + i); \
+        } \
+        for (int m = odd - 2; m > 0; m -= 2) { \
+            slope_b = slope_b * square + b; \
+            b = b * square + *(const kind *)(rows + m * n + i); \
+        } \
+        *(kind *)(y + i) = a + h * b; \
+        *(kind *)(f + i) = b + 2.0 * h * (slope_a + h * slope_b); \
+    } while (0)
+
 static void taylor_sum(const RUN *run, const real *rows, real h, real *restrict y, real *restrict f)
 {
-    const int n = run->n, odd = (run->order - 1) | 1, even = run->order & ~1;
-    const real square = h * h;
-    for (int i = 0; i < n; i++) {
-        real a = rows[even * n + i], b = rows[odd * n + i], slope_a = same(0.0), slope_b = same(0.0);
-        for (int m = even - 2; m >= 0; m -= 2) {
-            slope_a = slope_a * square + a;
-            a = a * square + rows[m * n + i];
-        }
-        for (int m = odd - 2; m > 0; m -= 2) {
-            slope_b = slope_b * square + b;
-            b = b * square + rows[m * n + i];
-        }
-        y[i] = a + h * b;
-        f[i] = b + 2.0 * h * (slope_a + h * slope_b);
+    const int n = run->n;
+    int i = 0;
+#if defined(EOMGEN_PLAIN) && defined(EOMGEN_VECTORS)
+    typedef double pair __attribute__((vector_size(16), aligned(8), may_alias));
+    for (; i + 1 < n; i += 2) {
+        TAYLOR_SUM(pair);
+    }
+#endif
+    for (; i < n; i++) {
+        TAYLOR_SUM(real);
     }
 }
 
