@@ -1,5 +1,5 @@
 # make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png
-# make test   ruff, mypy, then every test, fast ones first; fails if anything was skipped
+# make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
 # make clean  removes what the other targets made, .venv included
@@ -18,7 +18,7 @@ demo: $(VENV)/.installed-plot
 	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png
 
 test: lint
-	@$(BIN)/python -m pytest --no-skips
+	@$(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal
 
 lint: $(VENV)/.installed-test
 	@$(BIN)/ruff check .

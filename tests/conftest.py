@@ -18,18 +18,19 @@ def pytest_configure(config: pytest.Config) -> None:
     # a busy machine is slow, not wrong
     settings.register_profile("eomgen", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
     settings.load_profile("eomgen")
-    made = is_worker(config) or tempfile.mkdtemp(prefix="eomgen-tests-")
-    config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"] = made
-
-
-def is_worker(config: pytest.Config) -> str:
-    """The cache of the run, in a process that pytest-xdist has started to run a part of its tests; else nothing."""
-    return os.environ["EOMGEN_CACHE_DIR"] if hasattr(config, "workerinput") else ""
+    if not is_worker(config):
+        os.environ["EOMGEN_CACHE_DIR"] = tempfile.mkdtemp(prefix="eomgen-tests-")
+    config.stash[CACHE] = os.environ["EOMGEN_CACHE_DIR"]
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     if not is_worker(config):
         shutil.rmtree(config.stash[CACHE], ignore_errors=True)
+
+
+def is_worker(config: pytest.Config) -> bool:
+    """Whether this process runs a part of the tests for another, whose cache it shares."""
+    return hasattr(config, "workerinput")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -154,10 +154,18 @@ class Integrator:
 
     def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None) -> Array:
         """The same by SciPy, for a module without compiled steppers."""
+        who, n = f"integrator of {self.module.name}", self.module.n_x
         bound = self.module if p is None and u is None else self.module.bind(p, u)
-        state = np.array(x, dtype=float)
-        if state.shape != (bound.n_x,):
-            raise UsageError(f"integrator of {bound.name}: x must have shape ({bound.n_x},), not {state.shape}")
+        try:
+            state = np.array(x, dtype=float)
+        except (TypeError, ValueError):
+            raise UsageError(f"{who}: x must have shape ({n},), not be {x!r}") from None
+        if state.shape != (n,):
+            raise UsageError(f"{who}: x must have shape ({n},), not {state.shape}")
+        if not (np.isfinite(t) and np.isfinite(h)):
+            raise UsageError(f"{who}: t and h must be finite, not {t} and {h}")
+        if out is not None and not (isinstance(out, np.ndarray) and out.dtype == float and out.shape == (n,)):
+            raise UsageError(f"{who}: out must be a contiguous float64 array of shape ({n},)")
         if h != 0.0:
             run = simulate(bound, (t, t + h), state, events=[], t_eval=[t + h], method=self.method, **self._options)
             state, self._evaluations = run.x[:, -1], run.nfev

@@ -31,7 +31,6 @@ static int taylor_expand(eomgen_run *run, double t, const double *y, double *row
     run->evaluations++;
     status = status == 0 && sum != 0.0 ? EOMGEN_NON_FINITE : status;
     if (status != 0) {
-        taylor_clear(run);
         eomgen_note(run, status, t, y);
     }
     return status;
@@ -58,7 +57,7 @@ static int taylor_step(eomgen_run *run)
         eomgen_note(run, EOMGEN_NON_FINITE, run->t, run->y);
     }
     h_abs = run->h_abs > 0.0 && run->h_abs < h_abs ? run->h_abs : h_abs;
-    h_abs = h_abs > run->max_step ? run->max_step : too_small(run, h_abs) && h_abs > 0.0 ? least_step(run) : h_abs;
+    h_abs = h_abs > run->max_step ? run->max_step : h_abs >= 0.0 && too_small(run, h_abs) ? least_step(run) : h_abs;
     double *const spare = run->y_old;
     run->y_old = run->y, run->y = spare;
     for (;;) {
@@ -78,6 +77,7 @@ static int taylor_step(eomgen_run *run)
         }
         h_abs = 0.5 * fabs(h);
         run->rejected++;
+        taylor_clear(run); /* coefficients may have overflown */
     }
     memcpy(run->f, after + n, (size_t)n * sizeof(double));
     run->side = 1 - run->side;
