@@ -8,6 +8,7 @@ from typing import Any
 
 from ..program import KERNELS, Block, Program
 from ..program.loops import LARGE
+from ..program.series import NoSeriesError
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
@@ -34,8 +35,13 @@ def emit_c(program: Program) -> SourceSet:
         ``<name>_tables.c``, native functions in ``<name>_native_<first of them>.c``.
     """
     in_lanes = lane_kernels(program)
-    series = series_files(program)
-    program = replace(program, metadata={**program.metadata, "lanes": in_lanes, "series": bool(series)})
+    series: dict[str, str] = {}
+    about: dict[str, Any] = {"lanes": in_lanes, "series": True}
+    try:
+        series = series_files(program)
+    except NoSeriesError as error:
+        about |= {"series": False, "no_series": str(error)}
+    program = replace(program, metadata={**program.metadata, **about})
     printed = _print(program)
     parts = distribute(program, printed)
     calls = used_calls(program)

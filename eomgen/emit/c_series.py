@@ -23,10 +23,14 @@ TOGETHER = 14
 
 
 def series_files(program: Program) -> dict[str, str]:
-    """``<name>_series.h`` with the function over ``real``, and ``<name>_series.c``; none without a series."""
+    """``<name>_series.h`` with the function over ``real``, and ``<name>_series.c``.
+
+    Raises
+    ------
+    NoSeriesError
+        The program has none.
+    """
     series = make_series(program)
-    if series is None:
-        return {}
     block = next(b for b in program.blocks if b.name == "rhs")
     printer = _Printer(series, references(program, block.inputs))
     context = {

@@ -90,19 +90,29 @@ def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = Fals
     return found
 
 
-def make_series(program: Program) -> Series | None:
-    """The terms of a program's right-hand side; None where it is not straight-line code of smooth operations."""
+def make_series(program: Program) -> Series:
+    """The terms of a program's right-hand side.
+
+    Raises
+    ------
+    NoSeriesError
+        It is not straight-line code of smooth operations.
+    """
     block = next((b for b in program.blocks if b.name == "rhs"), None)
-    if block is None or program.has_loops:
-        return None
-    try:
-        return _Terms(program, block).series(block)
-    except NotSmooth:
-        return None
+    if program.has_loops:
+        raise NoSeriesError("closed loops are solved for at every state")
+    if block is None:
+        raise NoSeriesError(TOO_LONG)
+    return _Terms(program, block).series(block)
 
 
-class NotSmooth(Exception):
-    """An operation on a value that changes has no recurrence, or there are too many terms."""
+class NoSeriesError(Exception):
+    """Why there are no terms: an operation on a value that changes has no recurrence, or there are too many."""
+
+
+TOO_LONG = f"its right-hand side has more than some {MOST_TERMS} operations"
+#: Operations that have none, in users' words.
+CORNERS = {"abs": "abs", "sign": "sign", "min": "min", "max": "max", "select": "a condition"}
 
 
 class _Terms:
@@ -142,7 +152,7 @@ class _Terms:
         key = (term.kind, term.operands, term.node, term.value)
         if key not in self._found:
             if len(self._terms) >= MOST_TERMS:
-                raise NotSmooth
+                raise NoSeriesError(TOO_LONG)
             self._found[key] = len(self._terms)
             self._terms.append(term)
         return self._found[key]
@@ -180,9 +190,11 @@ class _Terms:
         """The term of an operation, with what its recurrence needs."""
         varies = any(self._terms[k].varies for k in operands)
         if kind not in VALUES:
-            raise NotSmooth  # a function of the user's
-        if self._smooth and varies and (kind not in SMOOTH or (kind == "pow" and self._terms[operands[1]].varies)):
-            raise NotSmooth
+            raise NoSeriesError("a table or a function of your own has no series")
+        if self._smooth and varies and kind not in SMOOTH:
+            raise NoSeriesError(f"{CORNERS.get(kind, 'a comparison')} of what moves has corners or jumps")
+        if self._smooth and varies and kind == "pow" and self._terms[operands[1]].varies:
+            raise NoSeriesError("a power whose exponent moves has no series")
         if not self._smooth or not varies or kind not in (*PARTNERS, "tan", "tanh", "asin", "acos", "atan", "atan2"):
             return self._add(Term(kind, operands, varies=varies))
         if kind in ("asin", "acos"):  # a' = u' sqrt(1 - a^2)

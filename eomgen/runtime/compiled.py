@@ -46,7 +46,7 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     there = isinstance(method, str) and method in getattr(module.core, "methods", ())
     if isinstance(method, str) and method == "Taylor":
         if not there:
-            raise UsageError(no_series(module.name))
+            raise UsageError(no_series(module))
         if not forcing.stepwise:
             raise UsageError(
                 "method Taylor takes inputs that are constant between corners: numbers, and tables that hold their "
@@ -55,12 +55,12 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     return there and not forcing.foreign
 
 
-def no_series(name: str) -> str:
+def no_series(module: Module) -> str:
     """Why a module has no Taylor method."""
+    why = module.metadata.get("no_series", "it was not compiled with target='cython'")
     return (
-        f"{name} has no Taylor series: the method is there with target='cython' for trees of bodies whose equations "
-        "are smooth (no closed loops, contacts, friction with corners, tables, functions of your own) and not too "
-        "long (some 600 operations); take DOP853"
+        f"{module.name} has no Taylor series: {why}; the method is there for trees of bodies whose equations are "
+        "smooth and not too long; take DOP853"
     )
 
 

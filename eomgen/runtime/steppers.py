@@ -24,7 +24,7 @@ def find_solver(module: Module, name: str) -> Any:
     if name in getattr(core, "methods", ()):
         return solver_class(core, name)
     if name == "Taylor":
-        raise UsageError(no_series(module.name))
+        raise UsageError(no_series(module))
     return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
 
 

@@ -111,7 +111,8 @@ def test_the_table_describes_the_model(systems, compiled):
     assert library.table.abi == 3
     assert library.table.name == b"crank"
     lanes = ["mass_matrix", "bias", "inverse_dynamics", "energy"]
-    assert library.metadata == {**system.program().metadata, "lanes": lanes, "series": False}
+    series = {"series": False, "no_series": "closed loops are solved for at every state"}
+    assert library.metadata == {**system.program().metadata, "lanes": lanes, **series}
     assert library.metadata["kernels"]["rhs"] == [6]
     assert {"terms", "position", "precompute"} <= set(library.metadata["operations"])
     assert library.metadata["operations"]["precompute"]["multiplications"] > 0
