@@ -124,7 +124,7 @@ def run(quick: bool) -> Report:
     ours = np.array([x[:, 0], x[:, 1] - x[:, 0], x[:, 2], x[:, 3] - x[:, 2]])
     tolerances = {"rtol": RTOL, "atol": ATOL}
 
-    def simulate_many(threads: int, **options: float) -> np.ndarray:
+    def simulate_many(threads: int, **options: Any) -> np.ndarray:
         last = module.simulate_many(END, ours, threads=threads, **options).x
         return np.array([last[0], last[0] + last[1], last[2], last[2] + last[3]]).T
 
@@ -136,8 +136,10 @@ def run(quick: bool) -> Report:
     with TemporaryDirectory() as folder:
         library = limit_library(Path(folder))
         mine, hand = f"eomgen, {THREADS} threads", f"4 lanes by hand, {THREADS} threads"
+        series = f"eomgen, Taylor, {THREADS} threads"
         actions: dict[str, Callable[[], Any]] = {
             mine: lambda: simulate_many(THREADS, **tolerances),
+            series: lambda: simulate_many(THREADS, method="Taylor", **tolerances),
             hand: lambda: by_hand(library, x, THREADS),
             "eomgen, 1 thread": lambda: simulate_many(1, **tolerances),
             "4 lanes by hand, 1 thread": lambda: by_hand(library, x, 1),
@@ -176,7 +178,7 @@ def run(quick: bool) -> Report:
             0.85,
             at_least=True,
         ),
-        *(Limit(f"over {name}", best[mine] / best[name], 1.8, at_least=True) for name in heyoka),
+        *(Limit(f"over {name}", max(best[mine], best[series]) / best[name], 1.8, at_least=True) for name in heyoka),
     ]
     return Report(
         tables=(
@@ -193,6 +195,7 @@ def run(quick: bool) -> Report:
         notes=(
             f"{count} double pendulums, {END:g} s, rtol {RTOL:g}, atol {ATOL:g}; each run of eomgen has its own steps.",
             "By hand: DOP853 for this pendulum alone, 4 runs with one step size, -O3 -march=native -ffast-math.",
+            "Beside heyoka the better of eomgen's methods counts, DOP853 (the first row) or Taylor.",
             f"eomgen runs {module.core.lane_width} side by side.  Errors are the largest of a run's states at the end.",
             *notes,
         ),

@@ -7,6 +7,8 @@ first, all together and in vector registers, so that little is left to wait for 
 from __future__ import annotations
 
 from collections.abc import Container
+from math import inf
+from typing import NamedTuple
 
 from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, behind, make_series
@@ -51,6 +53,16 @@ def series_files(program: Program) -> dict[str, str]:
     return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
 
 
+class _Factor(NamedTuple):
+    """A number times values by name that stay the same in all orders."""
+
+    number: float = 1.0
+    names: tuple[str, ...] = ()
+
+    def __mul__(self, other: _Factor) -> _Factor:  # type: ignore[override]
+        return _Factor(self.number * other.number, tuple(sorted(self.names + other.names)))
+
+
 class _Printer:
     """Statements of the order 0 and of order k; ``a3`` is the value of term 3, ``b3`` its coefficient of order k."""
 
@@ -88,36 +100,43 @@ class _Printer:
         self._row(*row)
         self._row("reversed", right)
         name = self._pairs.setdefault((row, right), f"s{len(self._pairs)}")
-        return self._scaled(name, [*first, *second])
+        return self._scaled(name, first * second)
 
-    def _multiple(self, i: int, among: Container[int] | None = None) -> tuple[int, list[str]]:
-        """The term of which a term is a multiple but for order 0, the furthest or one of these, and the factors."""
-        found, factors = (i, list[str]()), list[str]()
+    def _multiple(self, i: int, among: Container[int] | None = None) -> tuple[int, _Factor]:
+        """The term of which a term is a multiple but for order 0, the furthest or one of these, and the factor."""
+        found, factor = (i, _Factor()), _Factor()
         while True:
-            kind, (p, q) = self._terms[i].kind, (*self._terms[i].operands, -1, -1)[:2]
-            if kind in ("add", "sub", "mul") and self._changes(p) != self._changes(q):
-                i, still, moves = (p, q, "1") if self._changes(p) else (q, p, "-1" if kind == "sub" else "1")
-                factors = [*factors, self._zero(still) if kind == "mul" else moves]
-            elif kind == "neg":
-                i, factors = p, [*factors, "-1"]
+            term = self._terms[i]
+            kind, (p, q) = term.kind, (*term.operands, -1, -1)[:2]
+            if kind == "neg":
+                i, by = p, _Factor(-1.0)
+            elif kind in ("add", "sub", "mul") and self._changes(p) != self._changes(q):
+                i, still = (p, q) if self._changes(p) else (q, p)
+                by = _Factor(-1.0 if kind == "sub" and i == q else 1.0)
+                if kind == "mul":
+                    number = self._terms[still].kind == "number"
+                    by = _Factor(self._terms[still].value) if number else _Factor(1.0, (self._zero(still),))
             else:
                 return found
+            factor = factor * by
+            if not 0.0 < abs(factor.number) < inf:
+                return found
             if among is None or i in among:
-                found = i, factors
+                found = i, factor
 
-    def _scaled(self, name: str, factors: list[str]) -> str:
-        """A sum times factors that stay the same."""
-        sign = "-" if factors.count("-1") % 2 else ""
-        product = "*".join(f for f in factors if f not in ("1", "-1"))
-        if "*" in product:
-            made = f" = {product};"
-            line = next((line for line in self.kept if line.endswith(made)), None)
-            if line is None:
-                line = f"const real g{len(self.kept)}{made}"
-                self.kept.append(line)
-            product = line.split()[2]
-        text = f"{product}*{name}" if product else name
-        return f"({sign}{text})" if sign else text
+    def _scaled(self, name: str, factor: _Factor) -> str:
+        """A sum times what stays the same."""
+        if not factor.names:
+            return name if factor.number == 1.0 else f"{literal(factor.number)}*{name}"
+        product = "*".join([*([] if factor.number == 1.0 else [literal(factor.number)]), *factor.names])
+        if "*" not in product:
+            return f"{product}*{name}"
+        made = f" = {product};"
+        line = next((line for line in self.kept if line.endswith(made)), None)
+        if line is None:
+            line = f"const real g{len(self.kept)}{made}"
+            self.kept.append(line)
+        return f"{line.split()[2]}*{name}"
 
     def _reciprocal(self, i: int) -> str:
         """One over a term, made once."""

@@ -57,7 +57,7 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
 
 def no_series(module: Module) -> str:
     """Why a module has no Taylor method."""
-    why = module.metadata.get("no_series", "it was not compiled with target='cython'")
+    why = module.metadata.get("no_series", "its module has none compiled, as with target='numpy'")
     return (
         f"{module.name} has no Taylor series: {why}; the method is there for trees of bodies whose equations are "
         "smooth and not too long; take DOP853"

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
-from .compiled import MESSAGES, TOO_SMALL, can_run, stepper_options
+from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
 from .events import Events
 from .integrate import choose_solver
 from .late import eager
@@ -24,7 +25,6 @@ from .tolerances import check_tolerances
 if TYPE_CHECKING:
     from .module import Module
 
-ENDED, RESET_FAILED = 1, -103  #: as in eomgen_loop.h
 OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
 
 
@@ -52,7 +52,8 @@ class Integrator:
     Raises
     ------
     UsageError
-        The module's events reset the state, which takes a run that watches them; values that cannot be.
+        The module's events reset the state, which takes a run that watches them, or its drivers move all of it; values
+        that cannot be.
     """
 
     def __init__(
@@ -65,8 +66,11 @@ class Integrator:
         first_step: float | None = None,
         step: float | None = None,
     ) -> None:
+        if not module.n_dof:
+            raise UsageError(f"{module.name} has no freedom to integrate: its drivers move it; simulate follows them")
         if Events(module.layout, None).resets:
             raise UsageError(f"events of {module.name} reset its state, and an integrator watches none; simulate it")
+        self._given = (module, method, rtol, atol, max_step, first_step, step)
         self.module, self.method = module, method
         self._step = check_method(method, step)
         sizes = {"max_step": max_step, "first_step": first_step} if step is None else {"max_step": self._step}
@@ -97,7 +101,7 @@ class Integrator:
         t, h : float
             Time, and how long to go on (s); backwards if negative.
         x : (n_x,) array
-            On the constraints, as from ``x0``, ``project`` or an earlier call.
+            Brought onto the constraints before anything else.
         p, u : (n_p,) and (n_u,) arrays, optional
             Parameters, and inputs held over the whole call; those bound by default.
         out : (n_x,) array, optional
@@ -113,19 +117,18 @@ class Integrator:
         SimulationError
             The integration ended early; its cause is the last failure of a kernel.
         UsageError
-            Wrong shapes or values.
+            Wrong shapes or values, a time that is lost in rounding, or a call while another thread's goes on.
         """
-        if self._compiled is None:
-            return self._plainly(float(t), x, float(h), p, u, out)
-        if self._step is not None:
-            check_count(self._step, t, t + h)
         try:
-            status, result = self._compiled.advance(t, x, h, p, u, out)
+            if self._step is not None and isfinite(t + h):
+                check_count(self._step, t, t + h)
+            advance = self._plainly if self._compiled is None else self._compiled.advance
+            result, trouble = advance(t, x, h, p, u, out)
         except (TypeError, ValueError) as error:
             raise UsageError(f"integrator of {self.module.name}: {error}") from None
-        if status != ENDED:
-            self._explain(status, t + h, p, u)
-        return result  # type: ignore[no-any-return]
+        if trouble is not None:
+            self._explain(trouble, result, t + h, p, u)
+        return np.asarray(result)
 
     @property
     def evaluations(self) -> int:
@@ -137,42 +140,50 @@ class Integrator:
         troubled = Run(self.module, Forcing(self.module.layout, None)).troubled
         return Pace(t, end, x, self.module.n_q, float(self._options.get("max_step", np.inf)), troubled).look
 
-    def _explain(self, status: int, end: float, p: Any, u: Any) -> None:
-        """Raise the error for a call that ended early."""
-        own, raised = self._compiled, self._compiled.raised
+    def _explain(
+        self, trouble: tuple[int, float, Any, BaseException | None], x: Array, end: float, p: Any, u: Any
+    ) -> None:
+        """Raise the error for a call that came to x at t and no further."""
+        status, t, failure, raised = trouble
         bound = self.module if p is None and u is None else self.module.bind(p, u)
         run = Run(bound, Forcing(bound.layout, None))
-        run.last = None if own.failure is None else ("rhs", *own.failure)
+        run.last = None if failure is None else ("rhs", *failure)
         if isinstance(raised, Crawling):
             raise run.gave_up(raised, end, self.method, self._options) from None
         if raised is not None:
             raise raised
-        words = MESSAGES.get(status, TOO_SMALL)
-        if status == RESET_FAILED:
-            words = "The state cannot be brought onto the constraints."
-        raise run.ended(own.t, end, self.method, words, own.state()) from run.cause()
+        off = "The state cannot be brought onto the constraints."
+        raise run.ended(t, end, self.method, off if status == RESET_FAILED else TOO_SMALL, x) from run.cause()
 
-    def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None) -> Array:
+    def _plainly(self, t: Any, x: Any, h: Any, p: Any, u: Any, out: Array | None) -> tuple[Array, None]:
         """The same by SciPy, for a module without compiled steppers."""
-        who, n = f"integrator of {self.module.name}", self.module.n_x
+        layout, t, h = self.module.layout, float(t + 0.0), float(h + 0.0)
+        state, p, u = _vector("x", x, layout.n_x), _vector("p", p, layout.n_p), _vector("u", u, layout.n_u)
+        if not isfinite(t + h):
+            raise ValueError(f"t and t + h must be finite, not {t} and {t + h}")
+        if h != 0.0 and t + h == t:
+            raise ValueError(f"h = {h} is lost in rounding at t = {t}")
+        shape = (layout.n_x,)
+        if out is not None and not (
+            isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and out.flags.carray
+        ):
+            raise ValueError(f"out must be a contiguous writeable float64 array of shape {shape}")
         bound = self.module if p is None and u is None else self.module.bind(p, u)
-        try:
-            state = np.array(x, dtype=float)
-        except (TypeError, ValueError):
-            raise UsageError(f"{who}: x must have shape ({n},), not be {x!r}") from None
-        if state.shape != (n,):
-            raise UsageError(f"{who}: x must have shape ({n},), not {state.shape}")
-        if not (np.isfinite(t) and np.isfinite(h)):
-            raise UsageError(f"{who}: t and h must be finite, not {t} and {h}")
-        if out is not None and not (isinstance(out, np.ndarray) and out.dtype == float and out.shape == (n,)):
-            raise UsageError(f"{who}: out must be a contiguous float64 array of shape ({n},)")
+        options = {k: min(v, abs(h)) if k == "first_step" else v for k, v in self._options.items()}
         if h != 0.0:
-            run = simulate(bound, (t, t + h), state, events=[], t_eval=[t + h], method=self.method, **self._options)
+            try:
+                run = simulate(bound, (t, t + h), state, events=[], t_eval=[t + h], method=self.method, **options)
+            except (EvaluationError, ArithmeticError) as error:
+                raise SimulationError(f"{self.method} stopped near t = {t:.6g} s of {t + h:.6g} s: {error}") from error
             state, self._evaluations = run.x[:, -1], run.nfev
         if out is None:
-            return state
+            return state, None
         out[...] = state
-        return out
+        return out, None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy works on memory of its own."""
+        return type(self), self._given
 
     def __repr__(self) -> str:
         return f"<Integrator of {self.module.name}: {self.method}, rtol {self._options['rtol']:g}>"
@@ -185,3 +196,15 @@ def make_integrator(module: Module, parameters: Any, inputs: Any, **options: Any
     given = {name: declared[name] for name in ("method", "rtol", "atol")}
     given.update({name: value for name, value in options.items() if value is not None})
     return Integrator(module if parameters is None and inputs is None else module.bind(parameters, inputs), **given)
+
+
+def _vector(label: str, given: Any, n: int) -> Any:
+    """A new array (n,) of what is given, or None."""
+    if given is None and label != "x":
+        return None
+    if np.iscomplexobj(given):
+        raise ValueError(f"{label} must hold real numbers, not complex ones")
+    values = np.array(given, dtype=float)
+    if values.shape != (n,):
+        raise ValueError(f"{label} must have shape ({n},), not {values.shape}")
+    return values

@@ -122,8 +122,7 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
-    if step is not None or method == "RK4":
-        step = max_step = first_step = check_method(method, step)
+    step = check_method(method, step)
     declared = declare(module)
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
@@ -141,6 +140,7 @@ def simulate(
     start, end = find_span(span, float(declared["end"]))
     if step is not None:
         check_count(step, start, end)
+        max_step, first_step = step, min(step, abs(end - start)) or None
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     x0 = find_state(bound, initial, start)

@@ -40,7 +40,7 @@ typedef int (*eomgen_lane_function)(const double *t, const double *x, const doub
    m = 0 .. order. Returns a status, as above. */
 typedef struct {
     int most;   /* the highest order */
-    int n_work; /* length of w, all of it finite: zero at first, and after a failure */
+    int n_work; /* length of w, all of it finite: zero at first, and after a failure or an overflow */
     int (*expand)(double t, const double *x, const double *u, const double *c, int order, double *out, double *w);
 } eomgen_series;
 

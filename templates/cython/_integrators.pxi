@@ -30,7 +30,8 @@ cdef class Integrator(Journey):
             self.project = MODEL.kernels[find("project", ValueError)].call
 
     def advance(self, double t, x, double h, p=None, u=None, out=None):
-        """From x (n_x,) at time t over a time h: (status, state); 1 is success."""
+        """From x (n_x,) at time t over a time h: (state, None), or (state reached, what happened): the status, the time,
+        the last failure of an evaluation, and what a signal or the watch raised."""
         cdef eomgen_run *run = &self.run
         cdef eomgen_journey *j = &self.journey
         cdef int n = run.n, status = 1
@@ -42,10 +43,12 @@ cdef class Integrator(Journey):
         if p is not None:
             constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
         result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
-        if not (isfinite(t) and isfinite(h)):
-            raise ValueError(f"t and h must be finite, not {t} and {h}")
+        if not isfinite(t + h):
+            raise ValueError(f"t and t + h must be finite, not {t} and {t + h}")
+        if h != 0.0 and t + h == t:
+            raise ValueError(f"h = {h} is lost in rounding at t = {t}")
         if self.busy:
-            raise RuntimeError("this integrator is at work in another thread; make one for each")
+            raise ValueError("it is at work in another thread; make one for each")
         self.busy = True
         try:
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
@@ -58,17 +61,25 @@ cdef class Integrator(Journey):
             run.failure, run.stopped, run.look_in = 0, 0, self.stride
             j.begun, j.node, self.seen, self.pace, self.raised = 0, 0, 0, None, None
             self.looked = self.begun = perf_counter()
-            if h != 0.0:
+            if not self.correct():
+                status = EOMGEN_RESET_FAILED
+            elif h != 0.0:
                 with nogil:
                     status = eomgen_travel(self.method, run, j)
-            if status == 1 and self.project != NULL:
-                state = copy(run.y, n)
-                if self.project(run.t, <double *>cnp.PyArray_DATA(state), run.u, run.c, run.y, run.w) != 0:
-                    status = -103
+                if status == 1 and not self.correct():
+                    status = EOMGEN_RESET_FAILED
             memcpy(cnp.PyArray_DATA(result), run.y, n * sizeof(double))
+            return result, None if status == 1 else (status, run.t, self.failure, self.raised)
         finally:
             run.c, self.busy = <const double *>cnp.PyArray_DATA(self.context.c), False
-        return status, result
+
+    cdef bint correct(self):
+        """Bring the state onto the constraints, if there are any; whether that could be done."""
+        cdef eomgen_run *run = &self.run
+        if self.project == NULL:
+            return True
+        memcpy(run.y_old, run.y, run.n * sizeof(double))
+        return self.project(run.t, run.y_old, run.u, run.c, run.y, run.w) == 0
 
     cdef long look(self, double t):
         cdef long stride

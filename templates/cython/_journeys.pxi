@@ -49,7 +49,7 @@ cdef extern from "eomgen_loop.h" nogil:
         double *notes
         long node, done, stored, n_pieces, n_notes, resets
         int begun
-    enum: EOMGEN_FULL
+    enum: EOMGEN_FULL, EOMGEN_RESET_FAILED
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
 

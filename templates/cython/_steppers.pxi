@@ -311,8 +311,9 @@ cdef class Stepper:
 cdef cnp.ndarray target(out, cnp.npy_intp n):
     """The array (n,) that a state is written into."""
     if not (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
-            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_SIZE(<cnp.ndarray>out) == n):
-        raise ValueError(f"out must be a contiguous float64 array of shape ({n},)")
+            and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_NDIM(<cnp.ndarray>out) == 1
+            and cnp.PyArray_DIM(<cnp.ndarray>out, 0) == n):
+        raise ValueError(f"out must be a contiguous writeable float64 array of shape ({n},)")
     return out
 
 

@@ -56,9 +56,15 @@ def test_killing_a_worker_loses_nothing(pendulum: Any, client: Any, tmp_path: Pa
     thread.start()
     there = pendulum.simulate_many(500, angles(256), cluster=client, block=8, store=tmp_path / "runs", **TIGHT)
     thread.join()
+    assert ready, "no block came in a minute"
     assert ready[0] < 16  # of 32: in the midst of the run
     assert there.ok.all()
     np.testing.assert_array_equal(there.x, here.x)
+    deadline = time.monotonic() + 30
+    with pytest.raises(ProcessLookupError):
+        while time.monotonic() < deadline:
+            os.kill(victim, 0)
+            time.sleep(0.05)
     client.wait_for_workers(2)
 
 

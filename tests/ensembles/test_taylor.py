@@ -9,7 +9,7 @@ import pytest
 
 import eomgen as eg
 
-from ..runtime.test_taylor import FORCES, START_OF_ALL
+from ..runtime.test_taylor import FORCES, START_OF_ALL, A, B
 from .conftest import compiled
 
 TIGHT = {"method": "Taylor", "rtol": 1e-11, "atol": 1e-13}
@@ -49,6 +49,7 @@ def test_bits_do_not_depend_on_threads_blocks_or_lanes(pendulum: Any) -> None:
 
 def test_every_recurrence_in_lanes() -> None:
     m = eg.Model("masses_in_lanes")
+    m.parameter("a", A), m.parameter("b", B)
     for k, (text, _) in enumerate(FORCES.values()):
         body = m.body(f"body{k}", mass=1.0)
         m.prismatic(f"J{k}", m.ground, body, axis="x", coordinate=f"x{k}")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import os
+import pickle
 import signal
 import threading
-import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import pytest
 
 import eomgen as eg
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
 
@@ -38,9 +41,7 @@ def compiled() -> Any:
 
 @pytest.fixture(scope="module")
 def four_bar() -> Any:
-    from pathlib import Path
-
-    return eg.load(Path(__file__).parents[2] / "examples" / "four_bar.yaml").compile()
+    return eg.load(EXAMPLES / "four_bar.yaml").compile()
 
 
 def closed_form(x: Any, h: float, k: float = 9.0, force: float = 0.0) -> np.ndarray:
@@ -76,6 +77,16 @@ def test_out_may_be_the_state(cart: Any) -> None:
     np.testing.assert_array_equal(x, expected)
 
 
+def test_states_that_are_no_numbers_are_told(cart: Any) -> None:
+    with pytest.raises(eg.SimulationError, match="stopped near t = 0 s of 1 s"):
+        cart.integrator()(0.0, [np.nan, 0.0], 1.0)
+
+
+def test_a_first_step_may_be_longer_than_a_call(cart: Any) -> None:
+    go = cart.integrator(first_step=0.5, **TIGHT)
+    np.testing.assert_allclose(go(0.0, [0.3, 0.0], 0.1), closed_form([0.3, 0.0], 0.1), atol=1e-8)
+
+
 @pytest.mark.parametrize("method", ["DOP853", "RK45", "RK23", "Taylor", "Radau"])
 def test_calls_have_the_bits_of_whole_runs_and_forget_each_other(compiled: Any, method: str) -> None:
     go, x = compiled.integrator(method=method, **TIGHT), compiled.x0()
@@ -101,6 +112,31 @@ def test_the_model_says_how(cart: Any) -> None:
     assert repr(cart.integrator()) == "<Integrator of spring: DOP853, rtol 1e-08>"
 
 
+def test_calls_of_loops_have_the_bits_of_whole_runs(four_bar: Any) -> None:
+    go, x = four_bar.integrator(**TIGHT), four_bar.x0()
+    np.testing.assert_array_equal(go(0.0, x, 1.5), four_bar.simulate((0.0, 1.5), x, t_eval=[1.5], **TIGHT).x[:, -1])
+
+
+def test_states_off_the_constraints_are_brought_onto_them_first(four_bar: Any) -> None:
+    off = four_bar.x0()
+    off[: four_bar.n_q] += 0.1
+    go = four_bar.integrator(**TIGHT)
+    found = four_bar.simulate((0.0, 0.5), off, t_eval=[0.5], **TIGHT).x[:, -1]
+    np.testing.assert_array_equal(go(0.0, off, 0.5), found)
+    np.testing.assert_allclose(go(0.0, off, 0.0), four_bar.project(off), atol=1e-12)
+
+
+def test_mechanisms_without_freedom_are_refused() -> None:
+    with pytest.raises(eg.UsageError, match="driven_slider_crank has no freedom"):
+        eg.load(EXAMPLES / "driven_slider_crank.yaml").compile().integrator()
+
+
+def test_copies_work_apart(cart: Any) -> None:
+    go, x = cart.integrator(**TIGHT), np.array([0.3, 0.0])
+    for other in (copy.copy(go), pickle.loads(pickle.dumps(go))):
+        np.testing.assert_array_equal(other(0.0, x, 1.0), go(0.0, x, 1.0))
+
+
 def test_loops_stay_closed(four_bar: Any) -> None:
     go, x = four_bar.integrator(**TIGHT), four_bar.x0()
     energy = four_bar.energy(x).sum()
@@ -119,9 +155,18 @@ def test_loops_stay_closed(four_bar: Any) -> None:
         (((0.0, [1.0, 2.0], 1.0), {"p": [1.0, 2.0]}), r"p.* shape \(1,\)"),
         (((0.0, [1.0, 2.0], float("nan")), {}), "finite"),
         (((float("inf"), [1.0, 2.0], 1.0), {}), "finite"),
-        (((0.0, {"x": 1.0}, 1.0), {}), "x"),
+        (((0.0, {"x": 1.0}, 1.0), {}), "integrator of spring"),
+        (((0.0, [1j, 2.0], 1.0), {}), "real numbers"),
         (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(3)}), r"out.* shape \(2,\)"),
         (((0.0, [1.0, 2.0], 1.0), {"out": [0.0, 0.0]}), r"out.* shape \(2,\)"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros((1, 2))}), r"out.* shape \(2,\)"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(4)[::2]}), "out must be a contiguous"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.broadcast_to(0.0, (2,))}), "out must be a contiguous writeable"),
+        (((0.0, [1.0, 2.0], 1.0), {"out": np.zeros(2, dtype=np.float32)}), "float64"),
+        (((0.0, [1.0, 2.0], 1.0), {"p": {"k": 1.0}}), "integrator of spring"),
+        ((("0", [1.0, 2.0], 1.0), {}), "integrator of spring"),
+        (((1e16, [1.0, 2.0], 1.0), {}), "lost in rounding"),
+        (((1e308, [1.0, 2.0], 1e308), {}), "finite"),
     ],
 )
 def test_wrong_calls_are_told(cart: Any, call: Any, words: str) -> None:
@@ -194,17 +239,20 @@ def test_an_interrupt_stops_a_long_call(compiled: Any) -> None:
 
 
 def test_one_thread_at_a_time(compiled: Any) -> None:
-    go, found = compiled.integrator(**TIGHT), []
-    thread = threading.Thread(target=lambda: found.append(go(0.0, compiled.x0(), 3e4)))
-    thread.start()
-    refused = None
-    while thread.is_alive() and refused is None:
-        time.sleep(0.01)
+    go, refused = compiled.integrator(**TIGHT), []
+
+    def disturb() -> None:
         try:
             go(0.0, compiled.x0(), 1e-3)
-        except RuntimeError as error:
-            refused = str(error)
-    thread.join()
-    assert refused is not None
-    assert "make one for each" in refused
-    np.testing.assert_array_equal(found[0], go(0.0, compiled.x0(), 3e4))
+        except eg.UsageError as error:
+            refused.append(str(error))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.3, disturb).start()
+        with pytest.raises(KeyboardInterrupt):
+            go(0.0, compiled.x0(), 1e9)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert refused == ["integrator of spring: it is at work in another thread; make one for each"]

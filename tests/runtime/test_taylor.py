@@ -33,10 +33,28 @@ FORCES = {
     "negative real powers": ("-(2 + x)**(-1.3)", lambda m, x, v, t: -((2 + x) ** m.mpf(-1.3))),
     "powers through 0": ("-x**5 - v**3/7", lambda m, x, v, t: -(x**5) - v**3 / 7),
     "a power below 0": ("(2 + x)**(-3) - x", lambda m, x, v, t: (2 + x) ** (-3) - x),
+    "multiples": ("-(1 + 2*(3 + 4*x))*x/9", lambda m, x, v, t: -(1 + 2 * (3 + 4 * x)) * x / 9),
+    "multiples in a function": (
+        "-x*sin(2*(1 + 3*x)) - sin(x)",
+        lambda m, x, v, t: -x * m.sin(2 * (1 + 3 * x)) - m.sin(x),
+    ),
+    "negative multiples": (
+        "-2*(1 - x)*(1 - x) - (1 - 2*x)*x/2",
+        lambda m, x, v, t: -2 * (1 - x) ** 2 - (1 - 2 * x) * x / 2,
+    ),
+    "multiples squared": (
+        "-x*((1 + 2*x)*(1 + 2*x)*3 - 2*(1 + 0.5*x*x)*x*x)/9",
+        lambda m, x, v, t: -x * (3 * (1 + 2 * x) ** 2 - 2 * (1 + x * x / 2) * x * x) / 9,
+    ),
+    "multiples by parameters": (
+        "(b - 3*a*x)*(a*x)*v/3 + b*x*(2 - a*v)/(1 + a*x*a*x)",
+        lambda m, x, v, t: (B - 3 * A * x) * (A * x) * v / 3 + B * x * (2 - A * v) / (1 + A * x * A * x),
+    ),
     "time": ("sin(2*t)*x - t*v/5 - x", lambda m, x, v, t: m.sin(2 * t) * x - t * v / 5 - x),
 }  # fmt: skip
 
 
+A, B = 0.75, -1.5  #: parameters a and b
 NAMES = list(FORCES)
 START_OF_ALL = np.repeat([0.4, 0.3], len(FORCES))
 
@@ -45,6 +63,7 @@ START_OF_ALL = np.repeat([0.4, 0.3], len(FORCES))
 def masses() -> Any:
     """A mass of 1 kg on a line for each force, in one model."""
     m = eg.Model("masses")
+    m.parameter("a", A), m.parameter("b", B)
     for k, (text, _) in enumerate(FORCES.values()):
         body = m.body(f"body{k}", mass=1.0)
         m.prismatic(f"J{k}", m.ground, body, axis="x", coordinate=f"x{k}")
@@ -160,7 +179,7 @@ def test_models_without_series_say_so() -> None:
     body = m.body("mass", mass=1.0)
     m.prismatic("J", m.ground, body, axis="x", coordinate="s")
     m.torque("push", "J", "-max(s, 0)")
-    for target, why in (("cython", "max of what moves has corners"), ("numpy", "it was not compiled")):
+    for target, why in (("cython", "max of what moves has corners"), ("numpy", "its module has none compiled")):
         with pytest.raises(eg.UsageError, match=f"no Taylor series: {why}"):
             m.compile(target=target).simulate(1, method="Taylor")
 

@@ -211,7 +211,8 @@ static void lay_out(lane_run *run, const eomgen_ensemble *e, const eomgen_thread
     run->y = run->w + e->model->n_work;
     run->y_old = run->y + n, run->f = run->y_old + n, run->z = run->f + n;
     run->K = run->z + n;
-    run->F = run->K + method->rows_K * n + eomgen_further(e->method, n, e->series);
+    run->after = run->K + (TAYLOR_MOST + 1) * n, run->series_work = run->K + method->rows_K * n;
+    run->F = run->series_work + eomgen_further(e->method, n, e->series);
     run->expand = (lane_series)e->lane_series;
     run->order = method == &lane_taylor ? taylor_order(e->rtol, e->series->most) : 0;
 }

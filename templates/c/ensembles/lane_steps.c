@@ -25,6 +25,7 @@ typedef struct {
     const double *atol;
     real t, t_old, step, hold; /* hold: as in eomgen_run */
     real *c, *u, *w, *y, *y_old, *f, *K, *F, *z; /* constants, inputs, work; states as in eomgen_run; a state between */
+    real *after, *series_work; /* of Taylor: coefficients at the ends of the steps, and the series' work */
     int calls;
     flag active, begins, awake, again; /* has a trajectory; needs x' and a first step; evaluations count; was rejected */
     real size, size_before, t_new, t_bound; /* size_before: as it was before the last step */
