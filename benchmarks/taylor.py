@@ -55,18 +55,17 @@ def system(program: Any, values: dict[str, float]) -> list[tuple[Any, Any]]:
 
 
 class Taylor:
-    """One system, ready to be integrated again and again from one state."""
+    """One system, ready to be integrated again and again."""
 
-    def __init__(self, equations: list[tuple[Any, Any]], x0: np.ndarray, tolerance: float) -> None:
+    def __init__(self, equations: list[tuple[Any, Any]], tolerance: float) -> None:
         import heyoka as hk
 
-        self.x0 = x0
-        self.integrator = hk.taylor_adaptive(equations, x0.tolist(), tol=tolerance)
+        self.integrator = hk.taylor_adaptive(equations, [0.0] * len(equations), tol=tolerance)
 
-    def __call__(self, end: float) -> np.ndarray:
-        """The state at a time."""
+    def __call__(self, x0: np.ndarray, end: float) -> np.ndarray:
+        """The state at a time, from x0 at time 0."""
         self.integrator.time = 0.0
-        self.integrator.state[:] = self.x0
+        self.integrator.state[:] = x0
         self.integrator.propagate_until(end)
         return np.array(self.integrator.state)
 
