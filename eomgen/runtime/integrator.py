@@ -170,7 +170,9 @@ class Integrator:
             raise ValueError(f"out must be a contiguous writeable float64 array of shape {shape}")
         bound = self.module if p is None and u is None else self.module.bind(p, u)
         options = {k: min(v, abs(h)) if k == "first_step" else v for k, v in self._options.items()}
-        if h != 0.0:
+        if h == 0.0:
+            state = bound.project(state, t=t)
+        else:
             try:
                 run = simulate(bound, (t, t + h), state, events=[], t_eval=[t + h], method=self.method, **options)
             except (EvaluationError, ArithmeticError) as error:

@@ -19,7 +19,7 @@ cdef class Integrator(Journey):
 
     cdef eomgen_function project
     cdef double *end
-    cdef double first, begun, start
+    cdef double first, begun
     cdef bint busy
     cdef public object pacer
 
@@ -54,7 +54,7 @@ cdef class Integrator(Journey):
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
             memcpy(run.u, cnp.PyArray_DATA(inputs), MODEL.n_u * sizeof(double))
             run.c = <const double *>cnp.PyArray_DATA(constants)
-            run.t = run.t_old = self.start = t
+            run.t = run.t_old = t
             run.step, run.h_abs = 0.0, self.first
             self.end[0], j.span = t + h, abs(h)
             run.evaluations = run.rejected = run.steps = run.differentiations = run.factorizations = 0
@@ -68,8 +68,10 @@ cdef class Integrator(Journey):
                     status = eomgen_travel(self.method, run, j)
                 if status == 1 and not self.correct():
                     status = EOMGEN_RESET_FAILED
+            if status != 1:
+                return copy(run.y, n), (status, run.t, self.failure, self.raised)
             memcpy(cnp.PyArray_DATA(result), run.y, n * sizeof(double))
-            return result, None if status == 1 else (status, run.t, self.failure, self.raised)
+            return result, None
         finally:
             run.c, self.busy = <const double *>cnp.PyArray_DATA(self.context.c), False
 
@@ -82,7 +84,6 @@ cdef class Integrator(Journey):
         return self.project(run.t, run.y_old, run.u, run.c, run.y, run.w) == 0
 
     cdef long look(self, double t):
-        cdef long stride
         if self.pace is None and self.looked - self.begun > 1e-3 * WATCHED_AFTER:
             try:
                 self.pace, self.seen = self.pacer(t, self.end[0], copy(self.run.y_old, self.run.n)), self.run.steps

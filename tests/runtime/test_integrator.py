@@ -223,6 +223,10 @@ def test_what_stops_a_call_is_named(method: str) -> None:
     with pytest.raises(eg.SimulationError, match=r"stopped near t = .* of 10 s. Last failure: rhs at .*x = ") as caught:
         root(0.0, [1.0, -1.0], 10.0)
     assert isinstance(caught.value.__cause__, eg.EvaluationError)
+    x = np.array([1.0, -1.0])
+    with pytest.raises(eg.SimulationError):
+        root(0.0, x, 10.0, out=x)
+    np.testing.assert_array_equal(x, [1.0, -1.0])  # a call that fails leaves it as it was
     np.testing.assert_allclose(go(1.0, mod.x0(), 0.1), mod.simulate((1.0, 1.1), method=method).x[:, -1], rtol=1e-6)
 
 
