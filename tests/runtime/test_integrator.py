@@ -104,6 +104,8 @@ def test_steps_of_one_size(compiled: Any) -> None:
     for k in range(10):
         by_hand = compiled.step(k * 0.01, by_hand, 0.01)
     np.testing.assert_allclose(go(0.0, x, 0.1), by_hand, rtol=1e-14)
+    short = compiled.simulate((0.0, 1e-3), x, method="RK4", step=0.01)  # a run shorter than a step
+    np.testing.assert_array_equal(short.x[:, -1], go(0.0, x, 1e-3))
     with pytest.raises(eg.UsageError, match="would not end"):
         go(0.0, x, 1e12)
 
