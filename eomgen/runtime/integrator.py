@@ -120,14 +120,19 @@ class Integrator:
             Wrong shapes or values, a time that is lost in rounding, or a call while another thread's goes on.
         """
         try:
-            if self._step is not None and isfinite(t + h):
-                check_count(self._step, t, t + h)
+            end = t + h
+            if not isfinite(end):
+                raise ValueError(f"t and t + h must be finite, not {t} and {end}")
+            if end == t and h != 0.0:
+                raise ValueError(f"h = {h} is lost in rounding at t = {t}")
+            if self._step is not None:
+                check_count(self._step, t, end)
             advance = self._plainly if self._compiled is None else self._compiled.advance
             result, trouble = advance(t, x, h, p, u, out)
         except (TypeError, ValueError) as error:
             raise UsageError(f"integrator of {self.module.name}: {error}") from None
         if trouble is not None:
-            self._explain(trouble, result, t + h, p, u)
+            self._explain(trouble, result, end, p, u)
         return np.asarray(result)
 
     @property
@@ -159,10 +164,6 @@ class Integrator:
         """The same by SciPy, for a module without compiled steppers."""
         layout, t, h = self.module.layout, float(t + 0.0), float(h + 0.0)
         state, p, u = _vector("x", x, layout.n_x), _vector("p", p, layout.n_p), _vector("u", u, layout.n_u)
-        if not isfinite(t + h):
-            raise ValueError(f"t and t + h must be finite, not {t} and {t + h}")
-        if h != 0.0 and t + h == t:
-            raise ValueError(f"h = {h} is lost in rounding at t = {t}")
         shape = (layout.n_x,)
         if out is not None and not (
             isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and out.flags.carray

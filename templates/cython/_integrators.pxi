@@ -1,7 +1,5 @@
 # Integrators: a method and its tolerances held ready, for integrations that begin anew again and again.
 
-from libc.math cimport isfinite
-
 cdef enum:
     WATCHED_AFTER = 200  # milliseconds after which a call is told of its steps, in case they lead nowhere
 
@@ -30,8 +28,8 @@ cdef class Integrator(Journey):
             self.project = MODEL.kernels[find("project", ValueError)].call
 
     def advance(self, double t, x, double h, p=None, u=None, out=None):
-        """From x (n_x,) at time t over a time h: (state, None), or (state reached, what happened): the status, the time,
-        the last failure of an evaluation, and what a signal or the watch raised."""
+        """From x (n_x,) at time t over a time h, both checked: (state, None), or (state reached, what happened): the
+        status, the time, the last failure of an evaluation, and what a signal or the watch raised."""
         cdef eomgen_run *run = &self.run
         cdef eomgen_journey *j = &self.journey
         cdef int n = run.n, status = 1
@@ -43,10 +41,6 @@ cdef class Integrator(Journey):
         if p is not None:
             constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
         result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
-        if not isfinite(t + h):
-            raise ValueError(f"t and t + h must be finite, not {t} and {t + h}")
-        if h != 0.0 and t + h == t:
-            raise ValueError(f"h = {h} is lost in rounding at t = {t}")
         if self.busy:
             raise ValueError("it is at work in another thread; make one for each")
         self.busy = True

@@ -73,8 +73,8 @@ cdef method_pointer find_method(str name) except NULL:
                 take_lanes()
                 if SERIES == NULL:
                     raise RuntimeError(
-                        f"method Taylor: the series of {MODEL.name.decode()} could not be compiled, as a warning said; "
-                        "compile the model again, or take DOP853"
+                        f"method Taylor: the series of {MODEL.name.decode()} could not be compiled; "
+                        "a warning said why: mend that and start again, or take DOP853"
                     )
             return METHODS[i]
     raise ValueError(f"no method {name}")
