@@ -94,8 +94,10 @@ def drivers(module: Any, x0: np.ndarray, hand: HandWritten) -> dict[str, State]:
     def plain(method: Any, t_eval: Any = None) -> np.ndarray:
         return np.asarray(solve_ivp(rhs, (0.0, END), x0, method=method, t_eval=t_eval, **tight).y[:, -1])
 
+    go = module.integrator(**tight)
     found: dict[str, State] = {
         "hand-written C loop": hand,
+        "integrator": lambda: np.asarray(go(0.0, x0, END)),
         "simulate": lambda: module.simulate((0.0, END), x0, **tight).x[:, -1],
         "simulate, one step": lambda: module.simulate((0.0, 1e-4), x0, first_step=1e-4, **tight).x[:, -1],
         "simulate, 1,001 points": lambda: module.simulate((0.0, END), x0, t_eval=times, **tight).x[:, -1],
@@ -233,8 +235,11 @@ def judge(n: int, samples: dict[str, Sample], steps: int) -> list[Limit]:
     best = {name: sample.best for name, sample in samples.items()}
     base, name = best["hand-written C loop"], "solve_ivp, our DOP853"
     over = {key: (best[key] - base) / steps * 1e6 for key in (name, f"{name}, 1,001 points")}
+    soda = "numbalsoda DOP853"
+    beside = [who for who in ("simulate", "integrator") if soda in best]
     return [
         Limit(f"{n} links: simulate over a hand-written C loop", best["simulate"] / base, 1.15),
+        *(Limit(f"{n} links: {who} over {soda}", best[who] / best[soda], 1.0) for who in beside),
         Limit(f"{n} links: {name}, above the loop", over[name], 4.0, "us a step"),
         Limit(f"{n} links: {name}, 1,001 points, above the loop", over[f"{name}, 1,001 points"], 10.0, "us a step"),
         Limit(
