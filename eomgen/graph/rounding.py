@@ -124,6 +124,25 @@ def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     return np.asarray(np.isfinite(bounds) & (np.abs(values) <= ROUNDED * bounds))
 
 
+def terms_of(x: Expr) -> Expr:
+    """The sum of the magnitudes of the terms of a sum of products, as an expression; |x| where nothing is added."""
+    graph = x.graph
+    found: dict[int, Expr] = {}
+    for i in reachable(graph, [x.id]):
+        operation, *operands = graph.nodes[i]
+        if operation in ("add", "sub"):
+            found[i] = found[operands[0]] + found[operands[1]]
+        elif operation == "mul":
+            found[i] = found[operands[0]] * found[operands[1]]
+        elif operation == "div":
+            found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
+        elif operation == "neg":
+            found[i] = found[operands[0]]
+        else:
+            found[i] = graph.apply("abs", Expr(graph, i))
+    return found[x.id]
+
+
 def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
     found: dict[int, bool] = {}
     for i in reachable(graph, (y.id for y in outputs)):

@@ -174,7 +174,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
-    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state)
+    length = _length_scale(mechanism)
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
@@ -199,7 +200,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         hints=tuple(hint for hint in coupled.hints if hint[0] in names),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
-        length_scale=_length_scale(mechanism),
+        length_scale=length,
     )
 
 

@@ -9,7 +9,7 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
-from ..graph.rounding import vanishing
+from ..graph.rounding import ROUNDED, vanishing
 from ..graph.substitute import substitute, symbols_of
 from ..records import dataclass
 from .state import State
@@ -100,10 +100,14 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State, length: Expr
 ) -> Constraints:
-    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
-    identical = dict(zip(rows, vanishing([r.expression for r in rows]), strict=True))
+    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically; ``length`` is that of the mechanism."""
+    sizes = {"length": length.value or 0.0, "angle": 1.0}
+    identical = {
+        r: zero or _is_closed(r, sizes[r.kind])
+        for r, zero in zip(rows, vanishing([r.expression for r in rows]), strict=True)
+    }
     kept = [r for r in rows if not identical[r]]
     kept.sort(key=lambda r: r.level != "position")
     values = [r.expression for r in kept if r.level == "position"]
@@ -133,6 +137,12 @@ def differentiate_constraints(
         vanishing=tuple(r.label for r in rows if identical[r]),
         declared=len(rows),
     )
+
+
+def _is_closed(row: Row, size: float) -> bool:
+    """Whether a row is a number that is nothing but rounding of the places in it."""
+    value = row.expression.value
+    return value is not None and not row.written and abs(value) <= ROUNDED * size
 
 
 def own_rows(mechanism: Mechanism) -> list[Row]:

@@ -48,12 +48,6 @@ class Scales(NamedTuple):
             np.array([float(kind == "length") for kind in velocities]),
         )
 
-    def resized(self, C_q: Array, rows: Indices) -> Scales:
-        """The same with the lengths of the scaled gradients C_q (m, n) for the sizes of some rows."""
-        sizes, new = np.array(self.c), np.linalg.norm(C_q[rows] * self.q, axis=1)
-        sizes[rows] = np.where(np.isfinite(new) & (new > 0.0), new, sizes[rows])
-        return self._replace(c=sizes)
-
     def jacobian(self, C_q: Array) -> Array:
         """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first; or (..., m, n)."""
         return C_q * self.q / self.c[: C_q.shape[-2], None]

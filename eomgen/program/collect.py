@@ -18,7 +18,7 @@ from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
 from ..kinematics.mobility import Mobility
-from ..kinematics.row_scales import coefficient_rows, row_scales
+from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
 from .discs import describe_discs
@@ -203,7 +203,6 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "constraint_labels": list(c.labels),
         "constraint_kinds": list(c.kinds),
         "constraint_scales": list(mobility.row_scales),
-        "coefficient_rows": list(coefficient_rows(kinematics)),
         "alignment_labels": list(c.aligned_joints),
         "fragile_forces": [name for name, _ in flag_forces(kinematics)],
         "p_values": [p.value for p in m.parameters],

@@ -40,7 +40,7 @@ def singular_values(module: Module, t: Array, x: Array) -> Array:
     """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
     layout = module.layout
     C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, rows="all"), -1, 0)
-    J = layout.sized(lambda: C_q[0])[0].jacobian(C_q)
+    J = module.kernels.sizes[0].jacobian(C_q)
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values / np.maximum(values[:, :1], 1e-300))
 

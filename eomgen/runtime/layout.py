@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -82,7 +82,6 @@ class Layout:
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
-        self.coefficient_rows = np.array(data.get("coefficient_rows", ()), dtype=np.intp)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
@@ -103,14 +102,12 @@ class Layout:
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
 
-    def sized(self, C_q: Callable[[], Array]) -> tuple[Scales, Scales]:
-        """The scales, and those of positions, with parameters that may have other values than declared.
-
-        ``C_q`` gives the Jacobian (m, n) with the parameters' own values.
-        """
-        if not self.coefficient_rows.size:
-            return self.scales, self.place_scales
-        scales = self.scales.resized(C_q(), self.coefficient_rows)
+    def sized(self, sizes: Array) -> tuple[Scales, Scales]:
+        """The scales, and those of positions, from typical sizes of velocities and rows (n_v + n_c,) at parameters that
+        may have other values than declared."""
+        scales = self.scales._replace(q=sizes[: self.n_v], c=sizes[self.n_v :])
+        if not self.given_rates:
+            return scales, scales
         return scales, self.place_scales._replace(c=scales.c[: len(self.place_scales.c)])
 
     def require_minimal_form(self) -> None:
