@@ -8,6 +8,7 @@ from ..errors import ExpressionError, ModelError, Problem
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
+from ..graph.rounding import ROUNDED, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from .sympy_face import lower_sympy, name_of
 from .sympy_forms import Forms
@@ -56,9 +57,9 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     random = np.random.default_rng(0)
     for _ in range(TRIES):  # a place may lie outside the domain of a root
         values = {name: float(random.uniform(0.3, 1.2)) for name in sorted(used)}
-        matrix = np.zeros((len(rows), len(v)))
-        for place, value in zip(entries, evaluate(list(entries.values()), values), strict=True):
-            matrix[place] = value
+        matrix, rounding = np.zeros((len(rows), len(v))), np.zeros((len(rows), len(v)))
+        for place, value, bound in zip(entries, *with_bounds(list(entries.values()), values), strict=True):
+            matrix[place], rounding[place] = value, ROUNDED * bound
         right = np.array(evaluate(constant, values), dtype=float)
         if np.isfinite(matrix).all() and np.isfinite(right).all():
             break
@@ -66,12 +67,12 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
         return list(range(len(motion))), False
     basis = np.empty((0, len(v)))
     fresh: list[bool] = []
-    for row in matrix:
+    for row, noise in zip(matrix, rounding, strict=True):
         length = np.linalg.norm(row)
         left = row - basis.T @ (basis @ row)
         left -= basis.T @ (basis @ left)
         size = np.linalg.norm(left)
-        fresh.append(bool(size > SMALL * length))
+        fresh.append(bool(size > SMALL * length and size > np.linalg.norm(noise)))
         if fresh[-1]:
             basis = np.vstack([basis, left / size])
     h = len(configuration)
