@@ -177,6 +177,44 @@ class Rows:
         return _write(out, result)
 
 
+class Projection:
+    """The projection, whose second argument is the time: the constraints of drivers move with it."""
+
+    def __init__(self, kernel: State) -> None:
+        self.kernel = kernel
+
+    @property
+    def failure(self) -> tuple[int, float, Array] | None:
+        """Status, time and state of the last failure that was returned as NaN."""
+        return self.kernel.failure
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        t: ArrayLike = 0.0,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """The nearest state on the constraints.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_x, k) array
+        t : float or (k,) array
+            Time (s).
+        p, u : arrays, optional
+            Parameters (n_p,) and inputs, (n_u,) or (n_u, k); those bound by default.
+        out : array, optional
+            Where the result goes.
+
+        Returns
+        -------
+        (n_x,) or (n_x, k) array
+        """
+        return self.kernel(x, p=p, u=u, out=out, t=t)
+
+
 class Constant:
     """A kernel whose result has no entries, such as the constraints of a tree."""
 
