@@ -40,6 +40,9 @@ class _Writer:
             values={"name": clean_model_name(robot.name), "gravity": gravity}, lines={"": (robot.file, 1)}
         )
         self.out.notes = list(robot.notes)
+        check = "note" if found.massless and options.check_inertia == "error" else options.check_inertia
+        if check != "error":
+            self.out.values["check_inertia"] = check
         self.names = Names()
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours

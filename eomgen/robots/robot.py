@@ -41,6 +41,11 @@ class Options:
         data only.
     snap : float
         Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
+    check_inertia : {'error', 'note', 'off'} or bool
+        What becomes of masses and inertias that no body can have, and of joints that move no mass: refused, noted, or
+        taken in silence.  A robot without any mass is one for kinematics, which is noted.
+    limits : {'note', 'off'}
+        Whether a note says which limits of joints are data only.
     assets : str, optional
         Folder within which an MJCF file may read other files; its own folder by default.
     """
@@ -56,6 +61,8 @@ class Options:
     friction: Any = False
     snap: float = 1e-11
     assets: str | None = None
+    check_inertia: Any = "error"
+    limits: str = "note"
 
     @property
     def smoothing(self) -> float:

@@ -78,6 +78,8 @@ class Fail:
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
+        elif status == 2 and (idle := self.layout.metadata.get("no_inertia")):
+            what, remedy = f"the model is one for kinematics only: {idle}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t)):
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif self.culprit is not None and names:
