@@ -146,8 +146,10 @@ class _Reader:
         limits: dict[str, float] = {}
         if m.jnt_limited[j] and not self.off("LIMIT", "CONSTRAINT"):
             limits |= dict(zip(("lower", "upper"), numbers(m.jnt_range[j]), strict=True))
+        clamp = None
         if m.jnt_actfrclimited[j]:
-            limits["effort"] = float(np.abs(m.jnt_actfrcrange[j]).max())
+            clamp = float(m.jnt_actfrcrange[j][0]), float(m.jnt_actfrcrange[j][1])
+            limits["effort"] = max(map(abs, clamp))
         return replace(
             joint,
             outer=joint.outer @ back,
@@ -159,6 +161,7 @@ class _Reader:
             stiffness=0.0 if self.off("SPRING") else float(m.jnt_stiffness[j]),
             rest=float(m.qpos_spring[start]),
             initial=q0,
+            clamp=clamp,
         )
 
     # -- what has no counterpart ----------------------------------------------------------------------------------

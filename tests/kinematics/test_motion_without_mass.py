@@ -1,4 +1,4 @@
-"""Kinematics needs no masses: a mechanism without any is led like one with masses, in every target; dynamics refuses."""
+"""Kinematics needs no masses: a mechanism without any is led like one with masses; dynamics refuses by name."""
 
 from __future__ import annotations
 
