@@ -63,7 +63,7 @@ class _Writer:
         self._loops()
         self._mimics()
         self._drives()
-        self._note_limits()
+        self._note_data()
         for section, names in self.names.renamed.items():
             self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
         self.out.renamed = self.names.renamed
@@ -262,20 +262,25 @@ class _Writer:
             name = self.names.symbol(drive.name)
             self._add("inputs", name, {"value": 0.0}, drive.place)
             terms.insert(0, (drive.gain, _cut(name, drive.control) if drive.control else name))
-        return name, " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
+        return name, " + ".join(
+            [f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x]
+        )
 
-    def _note_limits(self) -> None:
-        """Say which joints have limits that are data."""
-        if self.options.limits == "off":
-            return
-        names = []
-        for body in self.found.bodies.values():
-            joint = body.joint
-            if joint is not None and any(key != "effort" or joint.clamp is None for key in joint.limits):
-                names.append(self.joints[joint.name])
-        if names:
-            shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-            self.out.notes.append(f"limits of joints are data, nothing stops there ({shown}); limits='off' is silent")
+    def _note_data(self) -> None:
+        """Say of which joints limits and dry friction are data that do not act."""
+        moving = [body.joint for body in self.found.bodies.values() if body.joint is not None]
+        limited = [j for j in moving if any(key != "effort" or j.clamp is None for key in j.limits)]
+        if limited and self.options.limits != "off":
+            names = self._few(limited)
+            self.out.notes.append(f"limits of joints are data, nothing stops there ({names}); limits='off' is silent")
+        rubbing = [j for j in moving if j.dry_friction]
+        if rubbing and not self.options.smoothing:
+            names = self._few(rubbing)
+            self.out.notes.append(f"dry friction of joints is data and does not act ({names}); friction=0.01 lets it")
+
+    def _few(self, joints: list[Joint]) -> str:
+        names = [self.joints[joint.name] for joint in joints]
+        return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
 
 
 def _cut(law: str, bounds: Range) -> str:
