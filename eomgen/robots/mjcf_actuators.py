@@ -1,8 +1,8 @@
 """Robots, MJCF's actuators and fixed tendons: those that act on joints of one degree -> drives.
 
-A drive of length L = sum c_j q_j has the force f = gain u + b0 + b1 L + b2 L', and pushes c_j f along q_j.  As in MuJoCo
-u is cut to ctrlrange, the forces along a tendon are scaled where their sum leaves the tendon's actuatorfrcrange, f is cut
-to forcerange, and what all drives together do along a joint to the joint's actuatorfrcrange.
+A drive of length L = sum c_j q_j has the force f = gain u + b0 + b1 L + b2 L', and pushes c_j f along q_j.  As in
+MuJoCo u is cut to ctrlrange, the forces along a tendon are scaled where their sum leaves the tendon's actuatorfrcrange,
+f is cut to forcerange, and what all drives together do along a joint to the joint's actuatorfrcrange.
 """
 
 from __future__ import annotations
