@@ -102,8 +102,10 @@ def test_what_is_not_known_or_given_twice_is_noted(tmp_path: Path) -> None:
         "left out: shapes that touch, and contact (<collision>)",
         "left out: words of other formats and simulators (<dynamics spring_stiffness>, <gazebo>)",
         "left out: limits and reference positions of controllers (<safety_controller>)",
-        "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) "
-        "(<transmission>)",
+        (
+            "left out: drives and their reductions (`actuate` gives inputs, `armature` the inertia of a rotor) "
+            "(<transmission>)"
+        ),
         "link.b: 2 <inertial>; the first counts",
     )
 
