@@ -95,7 +95,7 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    check_bodies(bodies, numbers, faults)
+    inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
@@ -124,6 +124,8 @@ def build(description: Description) -> Mechanism:
         constraints=constraints,
         lines=dict(description.lines),
         doc=doc,
+        check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        notes=inertia_notes,
     )
 
 
@@ -186,7 +188,7 @@ def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
         for marker in check_names(_marker_entries(reader, entry), "marker", faults):
             label = f"{entry.name}.{marker.name}"
             reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
-    check = reader.flag("check_inertia", reader.description.values.get("check_inertia", True))
+    check = reader.check_word("check_inertia", reader.description.values.get("check_inertia", True))
     return tuple(read_body(reader, entry, check) for entry in usable)
 
 

@@ -12,10 +12,14 @@ from .layout import KERNELS, Layout
 
 LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
 FLAT = 1e-3  #: sine of the angle between a disc's axle and its plane's normal below which it counts as flat
+LARGE = 1e150  #: a number whose square is beyond double precision
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
-    1: ("the result is not finite", "look for a division by zero, or a root or logarithm of a negative number"),
+    1: (
+        "the result is not finite",
+        "look for an input that is no number, a division by zero, or a root or logarithm of a negative number",
+    ),
     2: (
         "the mass matrix of the degrees of freedom is not positive definite",
         "give the bodies behind the named coordinates mass or inertia",
@@ -78,10 +82,17 @@ class Fail:
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
+        elif status == 2 and (idle := self.layout.metadata.get("no_inertia")):
+            what, remedy = f"the model is one for kinematics only: {idle}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t)):
             blame, remedy = f": {trouble[0]}", trouble[1]
+        elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE]):
+            blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif self.culprit is not None and names:
-            found = self.culprit(status, t, x)
+            if status == 5 and (found := self.culprit(1, t, x)):
+                status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
+            else:
+                found = self.culprit(status, t, x)
             blame = f": {found}" if found else ""
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)

@@ -192,7 +192,11 @@ class Layout:
         shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
         head = "the constants that follow from the parameters are not finite"
         which = " (changed from their declared values)" if changed else ""
-        return f"{head} with {', '.join(shown)}{which}; look for a division by zero, a root or an overflow in a law"
+        masses = self.metadata.get("masses", {})
+        nought = [f"{name} is the mass of body {masses[name]!r}" for name, x, _ in named if name in masses and x == 0.0]
+        cause = f": {', '.join(nought)}" if nought else ""
+        remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
+        return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
 
     def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
         """Refuse a negative value of a parameter that is a body's mass."""
