@@ -115,7 +115,7 @@ def _held_motion(search: Search, module: Module, here: Balance, t: float) -> Arr
     """A of the motion with the held coordinates held."""
     n_q = module.n_q
     M = here.B.T @ module.mass_matrix(here.x[:n_q], t=t) @ here.B
-    K = -force_slopes(module, t, here, lambda q: search.gradients(module, q))
+    K = -force_slopes(module, t, here, lambda q: search.gradients(module, q))[0]
     tree = module.mass_matrix(here.x[:n_q], t=t)
     C = -here.B.T @ tree @ module.jacobian(t, here.x)[n_q:, n_q:] @ here.B
     n = len(M)
