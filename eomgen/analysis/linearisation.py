@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.names import unknown
-from .rounding import judge
+from .rounding import BALANCED, judge
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
@@ -101,8 +101,23 @@ class Linearisation:
 
     @property
     def is_steady(self) -> bool:
-        """Whether no velocity changes, up to 1e-7."""
-        return bool((np.abs(self._scaled_drift[len(self.position_names) :]) <= STILL * self._forces).all())
+        """Whether no velocity changes, up to 1e-7.
+
+        Where forces are stiff, up to what a relative rounding of the state (100 eps) makes of them.
+        """
+        left = np.abs(self._scaled_drift[len(self.position_names) :])
+        return bool((left <= np.maximum(STILL * self._forces, self._rounding)).all())
+
+    @property
+    def _rounding(self) -> Array | float:
+        """Accelerations (n_dof,) that rounding of the state alone can make, scaled."""
+        if self.tangent is None:
+            return 0.0
+        n, layout, tangent = len(self.position_names), self.layout, self.tangent
+        s, places = layout.scales.q, layout.place_scales.q
+        v = np.abs(self.x[layout.n_q :][tangent.velocities])
+        moves = np.abs(self.A[n:, :n]) @ places[tangent.positions] + np.abs(self.A[n:, n:]) @ v
+        return np.asarray(BALANCED * moves / s[tangent.velocities])
 
     @property
     def _forces(self) -> float:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..numeric.scales import Array
+from .rounding import BALANCED
 
 if TYPE_CHECKING:
     from .search import Point, Search
@@ -24,8 +25,9 @@ CLOSE = 1e-6  #: the same where rounding of the forces leaves no more
 EPS = float(np.finfo(float).eps)
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 DIFFERENCES = 1e-8  #: the same of central differences
-ROUNDED = 100.0 * EPS  #: what rounding leaves of a balance, relative to its terms
 STIFFEST = 1e16  #: largest damping of a step
+TRIES = 60  #: of an implicit step, each with a quarter of the time
+CORRECTIONS = 5  #: of an implicit step, at most
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
 
@@ -64,7 +66,7 @@ class Solver:
 
         numbers: scaled size of what the position is made of.
         """
-        rounding = ROUNDED * numbers
+        rounding = BALANCED * numbers
         left = residual / self.sizes + self.J @ change
         uncertain = rounding * float(np.linalg.norm(np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T)), np.inf))
         limit = max(SMALL, min(CLOSE, uncertain))
@@ -76,9 +78,12 @@ def largest(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def newton(search: Search, point: Point, plain: bool = False) -> tuple[Point, int, bool]:
-    """The last iterate, the number of steps, and whether it is balanced; plain: whole steps, whatever they lead to."""
-    part, before = 1.0, None
+def newton(search: Search, point: Point, plain: bool = False, reach: float = np.inf) -> tuple[Point, int, bool]:
+    """The last iterate, the number of steps, and whether it is balanced.
+
+    plain: whole steps, whatever they lead to; reach: largest scaled distance from the start.
+    """
+    part, before, start, last = 1.0, None, point.q, np.inf
     for step in range(STEPS):
         solver = Solver(search.linearise(point))
         residual = search.residual(point.here, point.here)
@@ -87,9 +92,10 @@ def newton(search: Search, point: Point, plain: bool = False) -> tuple[Point, in
         size, longest = float(np.linalg.norm(shown)), largest(solver.linear.moved @ change)
         if not np.isfinite(size):
             return point, step, False
-        if not residual.any() or solver.arrived(residual, change, search.rounded(point)):
+        arrived = solver.arrived(residual, change, search.rounded(point))
+        if arrived and (size <= SMALL or size > CONTRACTS * last):
             return _polished(search, point, solver, change), step, True
-        if size <= SMALL:
+        if size <= SMALL or largest(search.layout.place_scales.distance(point.q, start)) > reach:
             return point, step, False
         most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
         if before is not None:
@@ -108,8 +114,8 @@ def newton(search: Search, point: Point, plain: bool = False) -> tuple[Point, in
             off = float(np.linalg.norm(left - (1.0 - part) * shown))
             wanted = 0.5 * size * part**2 / max(off, 1e-300)
             if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
-                if size <= CLOSE and part == 1.0:  # rounding: no nearer iterate exists
-                    return point, step, solver.arrived(residual, 0.0 * change, search.rounded(point))
+                if arrived:  # rounding: no nearer iterate exists
+                    return point, step, True
                 there, part, retried = None, min(wanted, 0.5 * part), True
             elif min(wanted, most) >= 4.0 * part and not retried:
                 there, part, retried = None, min(wanted, most), True
@@ -117,8 +123,8 @@ def newton(search: Search, point: Point, plain: bool = False) -> tuple[Point, in
                 grown = left, part
                 break
         if there is None:
-            return point, step, False
-        point = there
+            return point, step, arrived
+        point, last = there, size
         before = None if grown is None or plain else (shown, grown[0], grown[1])
     return point, STEPS, False
 
@@ -135,66 +141,83 @@ def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Po
 def creep(search: Search, point: Point) -> tuple[Point, int, bool]:
     """Where a mechanism without inertia in a very viscous fluid comes to rest, nearly; found is always False.
 
-    Implicit Euler steps of q' = v'(q) (Pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35
+    Implicit Euler steps of q' = v'(q) (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35
     (1998), 508-523), along the forces in the metric of the masses and so down the potential where there is one.  Each is
-    solved by corrections with one matrix, and is as long as these contract: a stiff direction that curves is followed.
+    solved by Newton's iteration and is as long as that contracts: stiff directions that curve are followed.
     """
     rate = None
     for step in range(STEPS):
-        linear = search.linearise(point)
-        if linear.flow is None:
+        here = _Flow.at(search, point)
+        if here is None:
             return point, step, False
-        basis = linear.moved
-        A, M = basis.T @ linear.flow, search.metric(point, basis)
-        drive = basis.T @ search.drive(point.here)
-        size = float(np.linalg.norm(drive))
+        size = float(np.linalg.norm(here.drive))
         if size == 0.0 or not np.isfinite(size):
             return point, step, False
-        slope = float(np.linalg.norm(A, 2))
         rate = size / LONGEST if rate is None else rate
-        there, change = None, np.zeros(len(drive))
-        for _ in range(60):
-            shifted = rate * np.eye(len(A)) - A
-            if not _definite(M @ shifted):
-                rate = max(4.0 * rate, 1e-6 * slope)
-                continue
-            change = np.linalg.solve(shifted, drive)
-            if largest(basis @ change) > LONGEST:
-                rate *= 2.0
-                continue
-            there, contraction = _corrected(search, point, (basis, shifted, rate), change)
-            if there is not None:
-                break
-            rate = max(4.0 * rate, 1e-9 * slope)
+        there, contraction = None, 1.0
+        for _ in range(TRIES):
+            change = here.implicit(rate, here.drive)
+            longest = np.inf if change is None else largest(here.basis @ change)
+            if change is not None and longest <= LONGEST:
+                there, contraction = _corrected(search, point, rate, here.basis @ change)
+                if there is not None:
+                    break
+            rate = 4.0 * max(rate, EPS * here.slope)
         if there is None:
             return point, step, False
         point = there
-        if largest(basis @ change) <= CLOSE or (rate <= 1e-9 * slope and contraction < 0.1):
+        if longest <= CLOSE or (rate <= CLOSE**2 * here.slope and contraction < 0.1):
             return point, step + 1, False
         rate *= 0.1 if contraction < 0.1 else 0.3 if contraction < 0.25 else 1.0
     return point, STEPS, False
 
 
-def _corrected(
-    search: Search, point: Point, step: tuple[Array, Array, float], change: Array
-) -> tuple[Point | None, float]:
-    """The iterate an implicit step away, None where its corrections do not contract, and how much the first one is."""
-    basis, shifted, rate = step
-    total, before, first = np.array(change), float(np.linalg.norm(change)), 0.0
-    there = None
-    for k in range(3):
-        there = search.step(point, basis @ total, np.zeros(0))
+class _Flow(NamedTuple):
+    """What drives the tree at an iterate, along directions of the constraints."""
+
+    basis: Array  #: (n_v, n)
+    drive: Array  #: (n,)
+    A: Array  #: (n, n) its derivative
+    M: Array  #: (n, n) metric
+    slope: float  #: size of A
+
+    @classmethod
+    def at(cls, search: Search, point: Point) -> _Flow | None:
+        """None where there is none."""
+        linear = search.linearise(point)
+        if linear.flow is None:
+            return None
+        basis = linear.moved
+        A = basis.T @ linear.flow
+        drive = basis.T @ search.drive(point.here)
+        return cls(basis, drive, A, search.metric(point, basis), float(np.linalg.norm(A)))
+
+    def implicit(self, rate: float, drive: Array) -> Array | None:
+        """(rate - A)^-1 drive; None where that does not lead down a potential."""
+        shifted = rate * np.eye(len(self.A)) - self.A
+        return np.asarray(np.linalg.solve(shifted, drive)) if _definite(self.M @ shifted) else None
+
+
+def _corrected(search: Search, start: Point, rate: float, displacement: Array) -> tuple[Point | None, float]:
+    """The iterate an implicit step away, None where Newton's iteration does not contract; its first contraction."""
+    before, first, point = float(np.linalg.norm(displacement)), 1.0, start
+    for k in range(CORRECTIONS):
+        there = search.step(point, displacement, np.zeros(0))
         if there is None:
             return None, 1.0
-        correction = np.linalg.solve(shifted, basis.T @ search.drive(there.here) - rate * total)
-        size = float(np.linalg.norm(correction))
+        if k and np.linalg.norm(displacement) <= 0.1 * before:  # what is left is for the next step
+            return there, first
+        point, before = there, float(np.linalg.norm(displacement))
+        here = _Flow.at(search, point)
+        assert here is not None
+        moved = here.basis.T @ search.layout.scales.distance(point.q, start.q)
+        change = np.linalg.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)[0]
+        displacement = here.basis @ change
+        size = float(np.linalg.norm(displacement))
         if not size <= CONTRACTS * before:
             return None, 1.0
         first = size / before if k == 0 else first
-        if size <= 1e-3 * float(np.linalg.norm(total)):
-            break
-        total, before = total + correction, size
-    return there, first
+    return None, 1.0
 
 
 def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:

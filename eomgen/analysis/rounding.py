@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 ROUNDING = 10.0 * float(
     np.finfo(float).eps
 )  #: relative error of the entries of a matrix that is exact but for rounding
+BALANCED = 100.0 * float(
+    np.finfo(float).eps
+)  #: what rounding leaves of a balance, relative to what a unit displacement does to it
 ROUNDS = 30  #: of balancing, at most
 WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
 SWEEPS = 12  #: of Jacobi's method, at most

@@ -19,6 +19,7 @@ from .tangent import displacement_names
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
+REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
 MOVING = 1e-9  #: scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it
 
 
@@ -192,18 +193,23 @@ class Search:
     def run(self, q: Array) -> tuple[Point, int]:
         """From a position: each way in turn until one leads to balance.
 
-        Newton's iteration finds what is near; where it stalls, the motion of a very damped mechanism leads to a stable
-        equilibrium; the last two find what plain Newton and Levenberg and Marquardt find elsewhere.
+        Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
+        leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
+        Marquardt find.
 
         Raises
         ------
         EquilibriumError
         """
         start = self.at(q, self.initial_unknowns())
-        first, steps, found = newton(self, start)
+        first, steps, found = newton(self, start, reach=REACH)
         if found:
             return first, steps
-        ways = [lambda: newton(self, start, plain=True), lambda: marquardt(self, start)]
+        ways = [
+            lambda: newton(self, start),
+            lambda: newton(self, start, plain=True),
+            lambda: marquardt(self, start),
+        ]
         if not self.names:
             ways.insert(0, lambda: creep(self, start))
         for way in ways:
