@@ -114,8 +114,8 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
             off = float(np.linalg.norm(left - (1.0 - part) * shown))
             wanted = 0.5 * size * part**2 / max(off, 1e-300)
             if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
-                if arrived:  # rounding: no nearer iterate exists
-                    return point, step, True
+                if arrived:  # rounding: no correction gets smaller
+                    return _polished(search, point, solver, change), step, True
                 there, part, retried = None, min(wanted, 0.5 * part), True
             elif min(wanted, most) >= 4.0 * part and not retried:
                 there, part, retried = None, min(wanted, most), True
