@@ -18,6 +18,7 @@ TITLE = "equilibria"
 EACH = 40  #: of every family
 PEERS = ("newton", "hybr", "lm")
 BALANCED = 1e-9  #: what may be left of a balance, relative to the terms of its row
+SINGULAR = 1e12  #: condition of the mass matrix above which coordinates are singular
 
 Array = Any
 
@@ -64,8 +65,13 @@ class Balance:
         return np.array(columns).T
 
     def holds(self, z: Array) -> bool:
-        """Whether z solves the equations, relative to what a change of the unknowns by themselves does to each."""
+        """Whether z solves the equations, relative to what a change of the unknowns by themselves does to each.
+
+        Where Euler angles are singular forces do no work along them, and nothing is known of balance.
+        """
         if not np.isfinite(z).all() or np.abs(z[: self.n_q]).max() > 1e6:
+            return False
+        if np.linalg.cond(self.module.mass_matrix(z[: self.n_q])) > SINGULAR:
             return False
         residual = self(z)
         terms = np.abs(self.slopes(z)) @ np.maximum(1.0, np.abs(z))
@@ -82,8 +88,8 @@ class Balance:
 
     def by_scipy(self, z: Array, method: str) -> Array:
         """``scipy.optimize.root`` with its own scaling."""
-        found = scipy.optimize.root(self, z, jac=self.slopes, method=method, tol=1e-12, options={"maxiter" if method == "lm" else "maxfev": 2000})  # fmt: skip
-        return found.x
+        most = {"maxiter" if method == "lm" else "maxfev": 2000}
+        return scipy.optimize.root(self, z, jac=self.slopes, method=method, tol=1e-12, options=most).x
 
 
 class Case(NamedTuple):

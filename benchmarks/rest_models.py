@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import sympy
 
 import eomgen as eg
 
@@ -63,7 +65,8 @@ def chain(rng: Random) -> eg.Model:
     count = int(rng.integers(2, 7))
     for k in range(count):
         length = rng.uniform(0.2, 1.0)
-        link = m.body(f"l{k}", mass=rng.uniform(0.1, 2.0), com=(length / 2, 0, 0), inertia={"zz": rng.uniform(1e-3, 0.1)})
+        inertia = {"zz": rng.uniform(1e-3, 0.1)}
+        link = m.body(f"l{k}", mass=rng.uniform(0.1, 2.0), com=(length / 2, 0, 0), inertia=inertia)
         m.revolute(f"R{k}", before, link, coordinate=f"q{k}")
         if rng.random() < 0.6:
             m.torsional_spring(f"t{k}", joint=f"R{k}", stiffness=stiffness(rng), angle=rng.uniform(-1.0, 1.0))
@@ -77,9 +80,14 @@ def chain(rng: Random) -> eg.Model:
 def four_bar(rng: Random) -> eg.Model:
     """A four-bar with springs at a hinge and across."""
     m = eg.Model("four_bar", gravity=(0, -GRAVITY, 0))
-    points = [np.zeros(2), rng.normal(size=2), rng.normal(size=2) + (1.5, 0.5), np.array([2.0, rng.uniform(-0.5, 0.5)])]
+    points = [
+        np.zeros(2),
+        rng.normal(size=2),
+        np.array([1.5, 0.5]) + rng.normal(size=2),
+        np.array([2.0, rng.uniform(-0.5, 0.5)]),
+    ]
     angles, lengths = [], []
-    for a, b in zip(points, points[1:], strict=False):
+    for a, b in pairwise(points):
         angles.append(np.arctan2(*(b - a)[::-1]))
         lengths.append(float(np.linalg.norm(b - a)))
     bars = [
@@ -155,9 +163,56 @@ def laws(rng: Random) -> eg.Model:
         body = m.body(f"b{k}", mass=rng.uniform(0.2, 3.0))
         m.prismatic(f"P{k}", before, body, axis="y" if k % 2 else "x", coordinate=f"s{k}")
         soft, hard = stiffness(rng), stiffness(rng)
-        m.actuator(f"f{k}", f"P{k}", f"-{soft}*s{k} - {hard}*s{k}**3 + {rng.normal() * 5.0}*cos({rng.uniform(0.5, 3)}*s{k})")
+        wave = f"{rng.normal() * 5.0}*cos({rng.uniform(0.5, 3)}*s{k})"
+        m.actuator(f"f{k}", f"P{k}", f"-{soft}*s{k} - {hard}*s{k}**3 + {wave}")
         m.initial(**{f"s{k}": float(rng.normal())})
         before = body
+    return m
+
+
+def bushings(rng: Random) -> eg.Model:
+    """Plates in a plane and bodies in space on bushings, described in Euler angles."""
+    m = eg.Model("bushings", gravity=(0, -GRAVITY, 0))
+    before: Any = m.ground
+    for k in range(int(rng.integers(1, 4))):
+        body = m.body(f"b{k}", mass=rng.uniform(0.2, 3.0), com=rng.normal(size=3) * 0.05, inertia=(0.05, 0.06, 0.07))
+        where = f"J{k}", m.ground, body
+        if rng.random() < 0.5:
+            names = [f"J{k}_{c}" for c in "xy"] + [f"J{k}_a"]
+            m.planar(*where, coordinates=names)
+        else:
+            names = [f"J{k}_{c}" for c in "xyz123"]
+            m.free(*where)
+        m.bushing(f"u{k}", before, body, stiffness=[stiffness(rng) for _ in range(6)])
+        m.initial(**{name: float(rng.normal() * 0.4) for name in names})
+        before = body.at(*rng.normal(size=2) * 0.3, 0)
+    return m
+
+
+def contacts(rng: Random) -> eg.Model:
+    """A ball between planes that push only while they touch it, on soft springs."""
+    m = eg.Model("contacts", gravity=(0, -GRAVITY, 0))
+    slide, ball = m.body("slide", mass=0), m.body("ball", mass=rng.uniform(0.1, 10.0))
+    m.prismatic("X", m.ground, slide, axis="x", coordinate="x")
+    m.prismatic("Y", slide, ball, axis="y", coordinate="y")
+    for k, turn in enumerate((-0.4, 0.7)):
+        tilt = m.ground.at(*rng.normal(size=2) * 0.2, 0, rpy=(-np.pi / 2, 0, 0))
+        m.sphere_plane(f"p{k}", m.ground.at(0, 0, 0, rpy=(-np.pi / 2, turn, 0)), ball, radius=0.1,
+                       stiffness=10.0 ** rng.uniform(3, 8))  # fmt: skip
+        m.spring(f"s{k}", tilt, ball, stiffness=10.0 ** rng.uniform(-1, 2), length=rng.uniform(0.1, 1.0))
+    m.initial(x=float(rng.normal()), y=float(rng.uniform(0.0, 2.0)))
+    return m
+
+
+def lagrangian(rng: Random) -> eg.Model:
+    """A bare Lagrangian: a curved valley of a potential with walls of all heights."""
+    t = sympy.Symbol("t")
+    x, y, z = (sympy.Function(name)(t) for name in ("x", "y", "z"))
+    a, b, c = (rng.normal() for _ in range(3))
+    V = stiffness(rng) * (y - a * x**2) ** 2 + stiffness(rng) * (z - b * sympy.sin(x + y)) ** 2 + (x - c) ** 4 + x**2
+    T = sum(rng.uniform(0.1, 10.0) * q.diff(t) ** 2 for q in (x, y, z)) / 2
+    m = eg.Model.from_lagrangian("valley", T - V, [x, y, z])
+    m.initial(**{name: float(rng.normal() * 2.0) for name in "xyz"})
     return m
 
 
@@ -170,4 +225,7 @@ FAMILIES: dict[str, Callable[[Random], eg.Model]] = {
     "hung bodies, Euler parameters": hung_body,
     "ball joints, Euler parameters": ball_joint,
     "nonlinear laws": laws,
+    "bushings, Euler angles": bushings,
+    "contacts": contacts,
+    "curved valleys": lagrangian,
 }

@@ -178,7 +178,8 @@ class Linearisation:
             return None
         left = np.abs(M @ self.drift[n:])  # what is not in balance turns with the axes
         C_error = MARGIN * np.abs(M) @ np.abs(A[n:, n:])
-        return SecondOrder(M, self.damping, self.stiffness, C_error, self.stiffness_error + np.maximum(left, left[:, None]))
+        K_error = self.stiffness_error + np.maximum(left, left[:, None])
+        return SecondOrder(M, self.damping, self.stiffness, C_error, K_error)
 
     def second_order(self, *names: str) -> tuple[Array, Array, Array]:
         """M, C, K of ``M z'' + C z' + K z = 0``, square.

@@ -1,8 +1,8 @@
 """Analysis: equations near iterates -> an iterate at which they hold, by Newton's iteration and what helps it.
 
-Steps are judged by the corrections that they leave, not by residuals (the natural monotonicity test: P. Deuflhard, Newton
-Methods for Nonlinear Problems, 2004, algorithm NLEQ-ERR, section 3.3.2).  Neither the scale nor the mixture of the
-equations matters then: a stiff spring that is stretched by the curvature of a step is one small correction away.
+Steps are judged by the corrections that they leave, not by residuals (the natural monotonicity test: P. Deuflhard,
+Newton Methods for Nonlinear Problems, 2004, algorithm NLEQ-ERR, section 3.3.2).  Neither the scale nor the mixture of
+the equations matters then: a stiff spring stretched by the curvature of a step is one small correction away.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..numeric.scales import Array
-from .rounding import BALANCED
+from .rounding import BALANCED, EPS
 
 if TYPE_CHECKING:
     from .search import Point, Search
@@ -22,12 +22,9 @@ LONGEST = 0.5  #: largest scaled step of a coordinate
 SHORTEST = 1e-5  #: part of Newton's step below which it leads nowhere
 SMALL = 1e-12  #: scaled step at which Newton's iteration has arrived
 CLOSE = 1e-6  #: the same where rounding of the forces leaves no more
-EPS = float(np.finfo(float).eps)
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 DIFFERENCES = 1e-8  #: the same of central differences
 STIFFEST = 1e16  #: largest damping of a step
-TRIES = 60  #: of an implicit step, each with a quarter of the time
-CORRECTIONS = 5  #: of an implicit step, at most
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
 
@@ -68,8 +65,8 @@ class Solver:
         """
         rounding = BALANCED * numbers
         left = residual / self.sizes + self.J @ change
-        uncertain = rounding * float(np.linalg.norm(np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T)), np.inf))
-        limit = max(SMALL, min(CLOSE, uncertain))
+        answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
+        limit = max(SMALL, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
         return largest(self.shown(change)) <= limit and largest(left) <= rounding
 
 
@@ -100,8 +97,8 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
         most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
         if before is not None:
             apart = float(np.linalg.norm(before[1] - shown))
-            part = np.linalg.norm(before[0]) * np.linalg.norm(before[1]) * before[2] / max(apart * size, 1e-300)
-        part, retried = most if plain else min(most, float(part)), False
+            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, 1e-300)
+        part, retried = most if plain else min(most, part), False
         there, grown = None, None
         while part >= SHORTEST * most:
             there = search.step(point, solver.linear.moved @ (part * change), solver.linear.changed @ (part * change))
@@ -136,88 +133,6 @@ def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Po
         return point
     here, after = (search.residual(one.here, point.here) / solver.sizes for one in (point, there))
     return there if np.linalg.norm(after) < np.linalg.norm(here) else point
-
-
-def creep(search: Search, point: Point) -> tuple[Point, int, bool]:
-    """Where a mechanism without inertia in a very viscous fluid comes to rest, nearly; found is always False.
-
-    Implicit Euler steps of q' = v'(q) (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35
-    (1998), 508-523), along the forces in the metric of the masses and so down the potential where there is one.  Each is
-    solved by Newton's iteration and is as long as that contracts: stiff directions that curve are followed.
-    """
-    rate = None
-    for step in range(STEPS):
-        here = _Flow.at(search, point)
-        if here is None:
-            return point, step, False
-        size = float(np.linalg.norm(here.drive))
-        if size == 0.0 or not np.isfinite(size):
-            return point, step, False
-        rate = size / LONGEST if rate is None else rate
-        there, contraction = None, 1.0
-        for _ in range(TRIES):
-            change = here.implicit(rate, here.drive)
-            longest = np.inf if change is None else largest(here.basis @ change)
-            if change is not None and longest <= LONGEST:
-                there, contraction = _corrected(search, point, rate, here.basis @ change)
-                if there is not None:
-                    break
-            rate = 4.0 * max(rate, EPS * here.slope)
-        if there is None:
-            return point, step, False
-        point = there
-        if longest <= CLOSE or (rate <= CLOSE**2 * here.slope and contraction < 0.1):
-            return point, step + 1, False
-        rate *= 0.1 if contraction < 0.1 else 0.3 if contraction < 0.25 else 1.0
-    return point, STEPS, False
-
-
-class _Flow(NamedTuple):
-    """What drives the tree at an iterate, along directions of the constraints."""
-
-    basis: Array  #: (n_v, n)
-    drive: Array  #: (n,)
-    A: Array  #: (n, n) its derivative
-    M: Array  #: (n, n) metric
-    slope: float  #: size of A
-
-    @classmethod
-    def at(cls, search: Search, point: Point) -> _Flow | None:
-        """None where there is none."""
-        linear = search.linearise(point)
-        if linear.flow is None:
-            return None
-        basis = linear.moved
-        A = basis.T @ linear.flow
-        drive = basis.T @ search.drive(point.here)
-        return cls(basis, drive, A, search.metric(point, basis), float(np.linalg.norm(A)))
-
-    def implicit(self, rate: float, drive: Array) -> Array | None:
-        """(rate - A)^-1 drive; None where that does not lead down a potential."""
-        shifted = rate * np.eye(len(self.A)) - self.A
-        return np.asarray(np.linalg.solve(shifted, drive)) if _definite(self.M @ shifted) else None
-
-
-def _corrected(search: Search, start: Point, rate: float, displacement: Array) -> tuple[Point | None, float]:
-    """The iterate an implicit step away, None where Newton's iteration does not contract; its first contraction."""
-    before, first, point = float(np.linalg.norm(displacement)), 1.0, start
-    for k in range(CORRECTIONS):
-        there = search.step(point, displacement, np.zeros(0))
-        if there is None:
-            return None, 1.0
-        if k and np.linalg.norm(displacement) <= 0.1 * before:  # what is left is for the next step
-            return there, first
-        point, before = there, float(np.linalg.norm(displacement))
-        here = _Flow.at(search, point)
-        assert here is not None
-        moved = here.basis.T @ search.layout.scales.distance(point.q, start.q)
-        change = np.linalg.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)[0]
-        displacement = here.basis @ change
-        size = float(np.linalg.norm(displacement))
-        if not size <= CONTRACTS * before:
-            return None, 1.0
-        first = size / before if k == 0 else first
-    return None, 1.0
 
 
 def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
@@ -257,12 +172,3 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
             return point, step, False
         point = there
     return point, STEPS, False
-
-
-def _definite(A: Array) -> bool:
-    """Whether the symmetric part is positive definite."""
-    try:
-        np.linalg.cholesky(0.5 * (A + A.T))
-    except np.linalg.LinAlgError:
-        return False
-    return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,7 +12,8 @@ from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
-from .newton import DIFFERENCES, RANK, Linear, creep, marquardt, newton
+from .creeping import creep
+from .newton import DIFFERENCES, RANK, Linear, marquardt, newton
 from .rounding import own_accelerations
 from .tangent import displacement_names
 
@@ -112,7 +113,7 @@ class Search:
             J = np.vstack([s[here.velocities, None] * K, (rates / s[:, None])[here.surplus]]) @ inverse
             sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.bias(self.t, here.x))
             sizes = np.concatenate([sizes, np.zeros(len(here.surplus))])
-            flow = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
+            flow: Array | None = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
             return Linear(J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow)
         held = self.gradients(point.module, point.q)
         held_by = self._held_by_parameters(point.module, here.x)
@@ -137,7 +138,7 @@ class Search:
         """Sizes of the terms in each row: a unit displacement, and the forces of the model, each without the others."""
         here, n = point.here, len(point.here.velocities)
         if not n:
-            return np.abs(J).sum(axis=1)
+            return np.asarray(np.abs(J).sum(axis=1))
         mass = self.mass(point)
         spread = np.abs(np.linalg.inv(mass)) @ np.abs(mass)
         s = self.layout.scales.q[here.velocities]
@@ -205,7 +206,7 @@ class Search:
         first, steps, found = newton(self, start, reach=REACH)
         if found:
             return first, steps
-        ways = [
+        ways: list[Callable[[], tuple[Point, int, bool]]] = [
             lambda: newton(self, start),
             lambda: newton(self, start, plain=True),
             lambda: marquardt(self, start),

@@ -72,7 +72,7 @@ def uncertainty(squares: Array, shapes: Array, K_error: Array) -> Array:
     return np.asarray(np.maximum(bound, ROUNDING * EPS * np.abs(squares).max(initial=0.0)))
 
 
-def verdict(second: SecondOrder | None, A: Array, own: Array | None = None) -> str:
+def verdict(second: SecondOrder | None, A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
     """The stability of s' = A s.
 
     Parameters
@@ -80,19 +80,19 @@ def verdict(second: SecondOrder | None, A: Array, own: Array | None = None) -> s
     second : SecondOrder or None
         The same equations of second order, where they have that form: displacements z, then velocities z'.
     A : (n, n) array
-    own : (n_dof,) array, optional
+    own, error
         As for :func:`~.rounding.judge`, which decides where the signs of K and C do not.
     """
     if second is None or not A.size or not _is_dissipative(second):
-        return judge(A, own)
+        return judge(A, own, error)
     squares, shapes = symmetric_modes(second.M, 0.5 * (second.K + second.K.T))
     bound = uncertainty(squares, shapes, second.K_error)
     if (squares < -bound).any():
         gyroscopic = np.abs(second.C - second.C.T) > second.C_error + second.C_error.T
-        return judge(A, own) if gyroscopic.any() else "unstable"
+        return judge(A, own, error) if gyroscopic.any() else "unstable"
     if (squares <= bound).any():
         return "marginal"
-    found = judge(A, own)
+    found = judge(A, own, error)
     return found if found == "asymptotically stable" else "marginal"
 
 
