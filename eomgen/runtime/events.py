@@ -173,7 +173,7 @@ class Events:
                 for (event, place), value in zip(self.layout.metadata["resets"], values, strict=True):
                     if event == i:
                         after[place] = value
-                after = np.asarray(module.project(after, t=t))
+                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             from ..analysis.impact import strike_events

@@ -62,6 +62,35 @@ class Formula:
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
         self._evaluate = compile_evaluator([self.expression], known)
 
+    def derivative(self, name: str, rate: str) -> Formula:
+        """The derivative by time along the motion, of an input that is called ``name``.
+
+        Raises
+        ------
+        UsageError
+            It would need accelerations.
+        """
+        from ..graph.differentiate import jvp
+        from ..graph.evaluate import compile_evaluator
+        from ..graph.substitute import symbols_of
+
+        layout, graph = self.layout, self.expression.graph
+        moving = dict(zip(layout.freedoms, layout.v, strict=True))
+        states = sorted(symbols_of([self.expression]) & set(layout.x))
+        for state in states:
+            if state not in layout.q or state not in moving:
+                raise UsageError(
+                    f"input {name}: the equations need its rate {rate}, and that of {self.text!r} depends on the rate "
+                    f"of {state}, which is an acceleration; write {name} in t and parameters, or give {rate} beside it"
+                )
+        along = {graph.symbol(q): graph.symbol(moving[q]) for q in states}
+        other = object.__new__(type(self))
+        other.layout, other.text = layout, f"d/dt ({self.text})"
+        other.expression = jvp([self.expression], {graph.symbol("t"): graph.one, **along})[0]
+        other.depends_on_state = not symbols_of([other.expression]).isdisjoint(layout.x)
+        other._evaluate = compile_evaluator([other.expression], ("t", *layout.x, *layout.p))
+        return other
+
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
         evaluate, values = self._evaluate, p.tolist()

@@ -1,0 +1,127 @@
+"""Stage runtime: an input as it is given for a run -> its rates, which the equations may need as inputs of their own.
+
+A number has rate 0, a table the slope of its pieces, a text the derivative of its expression along the motion, and an
+object with a method ``derivative()`` says it itself.  Of any other function no rate is known, and it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .layout import Layout
+
+SAME = 1e-9  #: part of the largest value or slope of a table by which it may jump at a time and count as continuous
+
+
+class TableRate:
+    """A derivative of a table by time: cubic pieces that may jump where they meet, 0 before and after.
+
+    At the first and the last time it is that of the piece inside, so that a run over just the table sees no jump.
+
+    Parameters
+    ----------
+    times : (k,) array
+    pieces : (k - 1, 4) array
+        Coefficients of each piece in powers of the time since its beginning.
+    corners : bool
+        Whether integrators step on the times where pieces meet.
+    """
+
+    order = 4  #: as the compiled loop knows it
+
+    def __init__(self, times: Array, pieces: Array, corners: bool) -> None:
+        self.times, self.pieces, self.corners = times, pieces, corners
+
+    def __call__(self, t: Any, x: Any = None) -> Any:
+        """The value at time t, a number or an array of them."""
+        return self.beside(t, t)
+
+    def beside(self, t: Any, at: Any) -> Any:
+        """The value at t of the piece that holds at time ``at``."""
+        if not len(self.pieces):
+            return np.zeros(np.shape(t))[()]
+        k = np.clip(np.searchsorted(self.times, at, side="right") - 1, 0, len(self.pieces) - 1)
+        s, c = np.asarray(t) - self.times[k], self.pieces[k]
+        value = c[..., 0] + s * (c[..., 1] + s * (c[..., 2] + s * c[..., 3]))
+        return np.where((np.asarray(at) < self.times[0]) | (np.asarray(at) > self.times[-1]), 0.0, value)[()]
+
+    def derivative(self) -> TableRate:
+        """The derivative of this one."""
+        return TableRate(self.times, self.pieces[:, [1, 2, 3, 3]] * (1.0, 2.0, 3.0, 0.0), self.corners)
+
+    def kinks(self) -> Array:
+        """Times where integrators start anew."""
+        return self.times if self.corners else np.empty(0)
+
+    def encode(self) -> tuple[int, Array, Array]:
+        """Order, times and values as the compiled loop reads them: 0 from a time before the first to it, and after."""
+        nothing = np.zeros((1, 4))
+        times = np.concatenate([[self.times[0] - 1.0], self.times])
+        return self.order if self.corners else 3, times, np.concatenate([nothing, self.pieces, nothing])
+
+
+def pieces_of(times: Array, values: Array, coefficients: Array | None, order: int) -> Array:
+    """Rows (k - 1, 4) of a table: value, slope, half the curvature and a sixth of the third derivative of each piece."""
+    if coefficients is not None:
+        return coefficients[:-1]
+    pieces = np.zeros((len(times) - 1, 4))
+    pieces[:, 0] = values[:-1]
+    if order == 1:
+        pieces[:, 1] = np.diff(values) / np.diff(times)
+    return pieces
+
+
+def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
+    """Times at which the derivative of an order (0: the value) of a table jumps; its end values hold outside."""
+    here, ends = TableRate(times, pieces, True), (values[:1], values[-1:])
+    for _ in range(order):
+        here, ends = here.derivative(), (np.zeros(1), np.zeros(1))
+    left = np.concatenate([ends[0], here.beside(times[1:], times[:-1])]) if len(pieces) else ends[0]
+    right = np.concatenate([here.beside(times[:-1], times[:-1]), ends[1]]) if len(pieces) else ends[1]
+    size = max(np.abs(left).max(), np.abs(right).max())
+    return np.asarray(times[np.abs(right - left) > SAME * size])
+
+
+def fill_rates(
+    layout: Layout, given: Mapping[str, Any], derive: Callable[[str, str, Any], Any]
+) -> dict[str, tuple[str, int, Any]]:
+    """Rates that follow from what is given: name -> (the input they are of, how many times it is derived, value).
+
+    Parameters
+    ----------
+    layout : Layout
+    given : mapping
+        Inputs of a run, by name.
+    derive : callable
+        (name of the input, name of the rate, its value) -> its first derivative.
+    """
+    found: dict[str, tuple[str, int, Any]] = {}
+    for first, rates in layout.input_rates.items():
+        last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
+        for rate, times in rates:
+            if rate in given:
+                last, order, value, at = rate, times, given[rate], times
+            elif last:
+                for _ in range(times - at):
+                    value = derive(last, rate, value)
+                at = times
+                found[rate] = last, times - order, value
+    return found
+
+
+def rate_of_function(name: str, rate: str, value: Any) -> Any:
+    """The derivative that a function knows of itself; a UsageError where it knows none."""
+    derivative = getattr(value, "derivative", None)
+    if callable(derivative):
+        return derivative()
+    raise UsageError(
+        f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
+        f"or {name} as text, table or Signal, or as an object with a method derivative()"
+    )
