@@ -178,7 +178,7 @@ class Events:
         if gaps:
             from ..analysis.impact import strike_events
 
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after))
+            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:

@@ -17,6 +17,7 @@ from ..numeric.scales import Array
 if TYPE_CHECKING:
     from .layout import Layout
 
+MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
 SAME = 1e-9  #: part of the largest value or slope of a table by which it may jump at a time and count as continuous
 
 
@@ -87,6 +88,25 @@ def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
     right = np.concatenate([here.beside(times[:-1], times[:-1]), ends[1]]) if len(pieces) else ends[1]
     size = max(np.abs(left).max(), np.abs(right).max())
     return np.asarray(times[np.abs(right - left) > SAME * size])
+
+
+def drift(values: Callable[[float], Array], t: float) -> Array:
+    """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
+    h = (t + MOMENT * max(1.0, abs(t))) - t
+    near, far = values(t + h) - values(t - h), values(t + 2.0 * h) - values(t - 2.0 * h)
+    return np.asarray((8.0 * near - far) / (12.0 * h))
+
+
+def moving_inputs(layout: Layout, u: Array) -> Array:
+    """Rates (n_u,) of inputs whose rates are among the inputs u (n_u,); 0 of the others."""
+    rates = np.zeros(layout.n_u)
+    for name, of in layout.input_rates.items():
+        chain = [name, *(rate for rate, _ in of)]
+        orders = [0, *(times for _, times in of)]
+        for k in range(len(of)):
+            if orders[k + 1] == orders[k] + 1:
+                rates[layout.u.index(chain[k])] = u[layout.u.index(chain[k + 1])]
+    return rates
 
 
 def fill_rates(

@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, require_time_and_state, unknown
-from .signal_rates import TableRate, fill_rates, jumps, pieces_of, rate_of_function
+from .signal_rates import TableRate, drift, fill_rates, jumps, pieces_of, rate_of_function
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -187,7 +187,7 @@ class Forcing:
         self.constrained = not {*self.varying, *self.formulas}.isdisjoint(layout.constraint_inputs)
         self.within: tuple[float, float] | None = None  #: first and last number in the part between two corners
         self.span: tuple[float, float] | None = None
-        self.base = np.zeros(layout.n_u)
+        self.base, self.parameters = np.zeros(layout.n_u), np.zeros(layout.n_p)
         self.names = layout.u
         self.lapse: Lapse | None = None
 
@@ -243,9 +243,37 @@ class Forcing:
 
     def attach(self, module: Any) -> None:
         """Take the values that a module binds: its inputs where none are given, its parameters in expressions."""
-        self.base = module.u
+        self.base, self.parameters = module.u, module.p
         for index, formula in self.formulas.items():
             self.varying[index] = formula.function(module.p)
+
+    @property
+    def state_dependent(self) -> list[int]:
+        """Places in u of the inputs whose rates are inputs too and that depend on the state."""
+        bases = {self.layout.u.index(name) for name, _, _ in self.derived.values()}
+        return [i for i, formula in self.formulas.items() if i in bases and formula.depends_on_state]
+
+    def rate(self, index: int, t: float, x: Array) -> float:
+        """The rate of an input by its place in u, whether the equations need it or not.
+
+        Raises
+        ------
+        UsageError
+            It depends on the state.
+        """
+        name, value = self.names[index], self.formulas.get(index, self.varying.get(index))
+        if value is None:
+            return 0.0
+        if getattr(value, "depends_on_state", False):
+            raise UsageError(f"input {name} depends on the state, and so does its rate, which an impact changes")
+        if isinstance(value, Formula):
+            return value.derivative(name, f"{name}_dot").function(self.parameters)(t, x)
+        if hasattr(value, "derivative"):
+            return float(value.derivative()(t, x))
+        f = value.function(self.parameters) if isinstance(value, DeclaredSignal) else value
+        if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
+            raise UsageError(f"input {name} depends on the state, and so does its rate, which an impact changes")
+        return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 
     @property
     def stepwise(self) -> bool:
