@@ -134,7 +134,7 @@ def strike_events(
     Raises
     ------
     UsageError
-        A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws of restitution.
+        A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws.
     """
     layout = module.layout
     module = module.bind(None, u)

@@ -309,9 +309,7 @@ def project(module: Module, cases: Cases, block: Block, plan: Plan) -> None:
         _project_columns(module, cases, block, plan, block.notes[2:], block.notes[1])
 
 
-def _project_columns(
-    module: Module, cases: Cases, block: Block, plan: Plan, states: Array, times: Array
-) -> None:
+def _project_columns(module: Module, cases: Cases, block: Block, plan: Plan, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
     led = find_forcing(module, plan).constrained
     if cases.alike and not led:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..describe.input_rates import chains, split_rate
+from ..describe.input_names import chains, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate

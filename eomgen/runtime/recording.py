@@ -142,8 +142,7 @@ def record(
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
     header["units"] = _units(module.layout)
     events = [
-        project(module, t, found, forcing)[1]
-        for t, found in zip(solution.t_events, solution.x_events, strict=True)
+        project(module, t, found, forcing)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)
     ]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None

@@ -69,7 +69,7 @@ class TableRate:
 
 
 def pieces_of(times: Array, values: Array, coefficients: Array | None, order: int) -> Array:
-    """Rows (k - 1, 4) of a table: value, slope, half the curvature and a sixth of the third derivative of each piece."""
+    """Rows (k - 1, 4) of a table: value, slope, half the curvature, a sixth of the third derivative of each piece."""
     if coefficients is not None:
         return coefficients[:-1]
     pieces = np.zeros((len(times) - 1, 4))
