@@ -36,8 +36,9 @@ WORDS = {
 
 
 class Fail:
-    """Raises the exception for a failed kernel; what cores call as ``fail(name, status, t, x)``, with p and u of the call
-    where it was given any.
+    """Raises the exception for a failed kernel; what cores call as ``fail(name, status, t, x)``.
+
+    p and u follow where the call was given any.
 
     Parameters
     ----------
