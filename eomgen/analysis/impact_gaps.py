@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
-from ..runtime.signal_rates import drift, moving_inputs
+from ..runtime.signal_rates import derive, drift, moving_inputs
+from ..runtime.tapes import Formula
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -122,8 +123,29 @@ class Gaps:
         rates = moving_inputs(layout, self.module.u if u is None else u)
         for index in np.flatnonzero(slopes):
             if self.forcing is not None and index in self.forcing.varying:
-                rates[index] = self.forcing.rate(int(index), t, x)
+                rates[index] = _rate_of_input(self.forcing, int(index), t, x)
         return float(slopes @ rates)
+
+
+def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
+    """The rate of an input that varies, by its place in u.
+
+    Raises
+    ------
+    UsageError
+        It depends on the state.
+    """
+    name, value = forcing.names[index], forcing.formulas.get(index, forcing.varying[index])
+    words = f"input {name} depends on the state, and so does its rate, which an impact changes"
+    if getattr(value, "depends_on_state", False):
+        raise UsageError(words)
+    if isinstance(value, Formula) or hasattr(value, "derivative"):
+        rate = derive(name, f"{name}_dot", value)
+        return float((rate.function(forcing.parameters) if isinstance(rate, Formula) else rate)(t, x))
+    f = forcing.varying[index]
+    if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
+        raise UsageError(words)
+    return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 
 
 def by_velocity(layout: Layout, q: Array, slope: Array) -> Array:

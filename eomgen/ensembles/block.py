@@ -149,6 +149,7 @@ def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
 def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
     core: Any = eager(module.core)
     forcing = find_forcing(module, plan)
+    forcing.attach(module)
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
     settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
     ensemble = core.ensemble(

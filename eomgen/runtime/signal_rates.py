@@ -7,17 +7,21 @@ object with a method ``derivative()`` says it itself.  Of any other function no 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
     from .layout import Layout
+    from .signals import Forcing
 
 MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
+CELLS = 256  #: intervals of a run in which jumps of a text are looked for
 SAME = 1e-9  #: part of the largest value or slope of a table by which it may jump at a time and count as continuous
 
 
@@ -90,6 +94,70 @@ def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
     return np.asarray(times[np.abs(right - left) > SAME * size])
 
 
+def require_smooth(forcing: Forcing, start: float, end: float) -> None:
+    """Refuse tables that jump where their rates are needed, and texts that do not change as their rates say.
+
+    Raises
+    ------
+    UsageError
+    """
+    layout = forcing.layout
+    for rate, (name, times, _) in forcing.derived.items():
+        table: Any = forcing.varying.get(layout.u.index(name))
+        if not hasattr(table, "jumps"):
+            continue
+        found = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
+        if found:
+            what = "its value" if times == 1 else "its slope" if times == 2 else f"its derivative {times - 1}"
+            raise UsageError(
+                f"input {name}: the equations need {rate}, and {what} jumps in the {table.interpolation} table at "
+                f't = {found[0]:.6g} s, which is an impact; give Signal(times, values, "cubic") over all of the run, '
+                f"a text, or {rate} beside it"
+            )
+    zero = np.zeros(layout.n_x)
+    for first, of in layout.input_rates.items():
+        for name, rate in pairwise([first, *(rate for rate, _ in of)]):
+            f, g = (forcing.formulas.get(layout.u.index(n)) for n in (name, rate))
+            follows = rate in forcing.derived or (isinstance(f, DeclaredSignal) and isinstance(g, DeclaredSignal))
+            if f is None or g is None or not follows or not f.branches or start == end:
+                continue  # conditions have slope 0: only they can hide a jump
+            what = f"input {name}: the equations need its rate {rate}"
+            if f.depends_on_state:
+                raise UsageError(f"{what}, and conditions on the state may make it jump; write it without, or in t")
+            jump = find_jump(f.function(forcing.parameters), g.function(forcing.parameters), zero, start, end)
+            if jump is not None:
+                raise UsageError(f"{what}, and it jumps at t = {jump:.6g} s, which is an impact; write it smoother")
+
+
+def find_jump(
+    value: Callable[[float, Array], float], rate: Callable[[float, Array], float], x: Array, start: float, end: float
+) -> float | None:
+    """A time at which a function jumps that has this rate elsewhere; None if it does not.
+
+    Over an interval the function changes by the integral of its rate, whose error goes with the interval where the rate
+    has kinks; a jump stays.
+    """
+    low, high = min(start, end), max(start, end)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+
+    def gap(a: float, b: float) -> float:
+        times = 0.5 * (a + b) + 0.5 * (b - a) * nodes
+        integral = 0.5 * (b - a) * sum(w * rate(t, x) for w, t in zip(weights, times, strict=True))
+        return float(abs(value(b, x) - value(a, x) - integral))
+
+    edges: list[float] = np.linspace(low, high, CELLS + 1).tolist()
+    values = [value(t, x) for t in edges]
+    allowed = 1e-9 * max(1e-300, *map(abs, values))
+    for a, b in pairwise(edges):
+        left, right = a, b
+        while gap(left, right) > allowed:
+            middle = 0.5 * (left + right)
+            if right - left <= 1e-12 * (high - low) or not left < middle < right:
+                return middle
+            left, right = (left, middle) if gap(left, middle) > gap(middle, right) else (middle, right)
+    return None
+
+
 def drift(values: Callable[[float], Array], t: float) -> Array:
     """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
     h = (t + MOMENT * max(1.0, abs(t))) - t
@@ -120,7 +188,7 @@ def fill_rates(
     given : mapping
         Inputs of a run, by name.
     derive : callable
-        (name of the input, name of the rate, its value) -> its first derivative.
+        As :func:`derive`.
     """
     found: dict[str, tuple[str, int, Any]] = {}
     for first, rates in layout.input_rates.items():
@@ -136,8 +204,18 @@ def fill_rates(
     return found
 
 
-def rate_of_function(name: str, rate: str, value: Any) -> Any:
-    """The derivative that a function knows of itself; a UsageError where it knows none."""
+def derive(name: str, rate: str, value: Any) -> Any:
+    """The rate of an input given as a number, Formula, Signal or function.
+
+    Raises
+    ------
+    UsageError
+        It is a function that knows none, or would need accelerations.
+    """
+    if isinstance(value, float):
+        return 0.0
+    if isinstance(value, Formula):
+        return value.derivative(name, rate)
     derivative = getattr(value, "derivative", None)
     if callable(derivative):
         return derivative()

@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, require_time_and_state, unknown
-from .signal_rates import TableRate, drift, fill_rates, jumps, pieces_of, rate_of_function
+from .signal_rates import TableRate, derive, fill_rates, jumps, pieces_of, require_smooth
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -166,7 +166,7 @@ class Forcing:
         self.feedback = self.foreign = False
         self.formulas: dict[int, Formula | DeclaredSignal] = {}
         values = {name: self._read(name, value) for name, value in given.items()}
-        self.derived = fill_rates(layout, values, _derive)
+        self.derived = fill_rates(layout, values, derive)
         for name, (_, _, value) in self.derived.items():
             values[name] = value
         for name, tape in layout.metadata.get("signals", {}).items():
@@ -222,20 +222,7 @@ class Forcing:
         """
         self.span = (start, end)
         self.enter(start, end)
-        for rate, (name, times, _) in self.derived.items():
-            table = self.varying.get(self.layout.u.index(name))
-            if not isinstance(table, Signal):
-                continue
-            found = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
-            if found:
-                what = "its value jumps" if times == 1 else f"its derivative {times - 1} jumps" if times > 2 else (
-                    "its slope jumps"
-                )  # fmt: skip
-                raise UsageError(
-                    f"input {name}: the equations need {rate}, and {what} in the {table.interpolation} table at "
-                    f't = {found[0]:.6g} s, which is an impact; give Signal(times, values, "cubic") over all of the '
-                    f"run, a text, or {rate} beside it"
-                )
+        require_smooth(self, start, end)
 
     def enter(self, start: float, end: float) -> None:
         """Go on with the part of a run between two corners: at its ends tables have the piece inside it."""
@@ -252,28 +239,6 @@ class Forcing:
         """Places in u of the inputs whose rates are inputs too and that depend on the state."""
         bases = {self.layout.u.index(name) for name, _, _ in self.derived.values()}
         return [i for i, formula in self.formulas.items() if i in bases and formula.depends_on_state]
-
-    def rate(self, index: int, t: float, x: Array) -> float:
-        """The rate of an input by its place in u, whether the equations need it or not.
-
-        Raises
-        ------
-        UsageError
-            It depends on the state.
-        """
-        name, value = self.names[index], self.formulas.get(index, self.varying.get(index))
-        if value is None:
-            return 0.0
-        if getattr(value, "depends_on_state", False):
-            raise UsageError(f"input {name} depends on the state, and so does its rate, which an impact changes")
-        if isinstance(value, Formula):
-            return value.derivative(name, f"{name}_dot").function(self.parameters)(t, x)
-        if hasattr(value, "derivative"):
-            return float(value.derivative()(t, x))
-        f = value.function(self.parameters) if isinstance(value, DeclaredSignal) else value
-        if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
-            raise UsageError(f"input {name} depends on the state, and so does its rate, which an impact changes")
-        return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 
     @property
     def stepwise(self) -> bool:
@@ -386,13 +351,6 @@ class Forcing:
             pushed[k] += h
             result += np.outer((rhs(t, x, u=pushed) - f) / h, du[k])
         return result
-
-
-def _derive(name: str, rate: str, value: Any) -> Any:
-    """The rate of an input."""
-    if isinstance(value, float):
-        return 0.0
-    return value.derivative(name, rate) if isinstance(value, Formula) else rate_of_function(name, rate, value)
 
 
 def _inside(start: float, end: float) -> tuple[float, float] | None:
