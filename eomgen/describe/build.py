@@ -87,7 +87,7 @@ def build(description: Description) -> Mechanism:
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
     events = build_events(reader, sections["events"])
-    inputs = add_rates(reader, inputs, lagrangian, given, events, outputs)
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from ..constraints import Driver, Equation
+from ..constraints.base import POSITION, Constraint
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import gradient, jvp
 from ..graph.substitute import symbols_of
@@ -29,6 +31,7 @@ def add_rates(
     inputs: tuple[Input, ...],
     lagrangian: Lagrangian | None,
     given: GivenEquations | None,
+    constraints: Sequence[Constraint],
     events: Sequence[Event],
     outputs: Sequence[Output],
 ) -> tuple[Input, ...]:
@@ -38,7 +41,7 @@ def add_rates(
     would need accelerations.
     """
     needed: dict[str, str] = {}
-    for expressions, times, why in _differentiated(reader, lagrangian, given, events, outputs):
+    for expressions, times, why in _differentiated(reader, lagrangian, given, constraints, events, outputs):
         for name in sorted(symbols_of(expressions) & {u.name for u in inputs}):
             for k in range(1, times + 1):
                 needed.setdefault(rate_of(name, k), f"input {name!r}, whose rate {why} needs")
@@ -64,6 +67,7 @@ def _differentiated(
     reader: Reader,
     lagrangian: Lagrangian | None,
     given: GivenEquations | None,
+    constraints: Sequence[Constraint],
     events: Sequence[Event],
     outputs: Sequence[Output],
 ) -> list[tuple[list[Expr], int, str]]:
@@ -86,6 +90,11 @@ def _differentiated(
         shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
         if positions or shown:
             found.append((list(given.rates), 1, "q'' of the given rates"))
+    for c in constraints:
+        if isinstance(c, Driver):
+            found.append(([c.value], 2, f"the driver {c.name!r}"))
+        elif isinstance(c, Equation):
+            found.append(([c.expression], 2 if c.level == POSITION else 1, f"the constraint {c.name!r}"))
     found += [([e.expression], 1, f"the gap {e.name!r}") for e in events if e.restitution is not None]
     return found
 
