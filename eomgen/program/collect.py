@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from ..describe.input_names import chains, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -13,7 +14,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
-from ..graph.substitute import substitute
+from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
@@ -244,6 +245,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             else {}
         ),
         **({"signals": signals} if (signals := _signals(kinematics, equations)) else {}),
+        **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
+        **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,
@@ -261,6 +264,24 @@ def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]
     given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
     found = zip(given, resolved(list(given.values()), kinematics, equations), strict=True)
     return {name: list(record_tape([x], places.__getitem__)) for name, x in found}
+
+
+def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
+    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order."""
+    found = chains(kinematics.input_names)
+    rates = {rate for of in found.values() for rate in of}
+    return {
+        name: [(rate, split_rate(rate)[1] - split_rate(name)[1]) for rate in of]
+        for name, of in found.items()
+        if name not in rates
+    }
+
+
+def _constraint_inputs(kinematics: Kinematics) -> list[str]:
+    """Inputs on which the constraints depend."""
+    c = kinematics.constraints
+    used = symbols_of([*c.values, *c.velocity])
+    return [name for name in kinematics.input_names if name in used]
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:

@@ -41,7 +41,8 @@ def integrate_dae(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     form, n_x = bound.dae, bound.n_x
-    x0 = find_state(bound, initial, start)
+    forcing.begin(start, end)
+    x0 = find_state(bound, initial, start, forcing)
     y, yp = form.initial(x0, start, forcing(start, x0))
 
     def residual(t: float, y: Array, yp: Array, res: Array) -> None:
