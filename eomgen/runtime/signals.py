@@ -149,7 +149,8 @@ class Forcing:
         self.formulas: dict[int, Formula | DeclaredSignal] = {}
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in given:
-                self.formulas[layout.u.index(name)] = declared = DeclaredSignal(tape)
+                slopes = layout.metadata.get("signal_slopes", {})
+                self.formulas[layout.u.index(name)] = declared = DeclaredSignal(tape, slopes[name])
                 self.feedback = self.feedback or declared.depends_on_state
         for name, value in given.items():
             index = layout.u.index(name)
