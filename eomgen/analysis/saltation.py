@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import NoDerivativeError, UsageError
 from ..numeric.scales import Array
-from ..runtime.events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events
+from ..runtime.events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
 from .impact import TOUCHING
 from .sensitivity_result import EventSlopes
 from .start import keep_consistent
@@ -67,7 +67,8 @@ class Saltation:
 
     def _of_both(self, event: Event, name: str) -> Event:
         """The same event of z = [x; S], at which the integrator stops whatever it does: rates may jump there."""
-        return Event(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, RESET)
+        action = STOP if event.action == GO_ON else event.action
+        return Event(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
 
     def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
         """z = [x; S] right after events that happened at time t."""

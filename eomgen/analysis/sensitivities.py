@@ -97,10 +97,12 @@ def differentiate_run(
         _note_end(salts, solution)
     n, k = layout.n_x, len(columns.names)
     kept = _distinct(solution)
-    x_events = [found[:n] for found in solution.x_events]
-    states = solution._replace(t=solution.t[kept], x=solution.x[:n, kept], x_events=x_events)
+    t_events, x_events = [np.empty(0)] * len(watched), [np.empty((n, 0))] * len(watched)
+    for (i, _), event_times, found in zip(salts.listed, solution.t_events, solution.x_events, strict=True):
+        t_events[i], x_events[i] = event_times, found[:n]
+    states = solution._replace(t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events)
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
-    trajectory = record(bound, forcing, states, title, settings, salts.names)
+    trajectory = record(bound, forcing, states, title, settings, watched.names)
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
         t, x = float(time), trajectory.x[:, j]
