@@ -61,7 +61,6 @@ class Formula:
             raise UsageError(f"{what}: {error}") from None
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
         self._evaluate = compile_evaluator([self.expression], known)
-        self._known = known
 
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
@@ -73,7 +72,7 @@ class Formula:
         from ..graph.differentiate import gradient
         from ..graph.evaluate import compile_evaluator
 
-        graph, known = self.expression.graph, self._known
+        graph, known = self.expression.graph, ("t", *self.layout.x, *self.layout.p)
         evaluate = compile_evaluator(gradient(self.expression, [graph.symbol(name) for name in known]), known)
         values = p.tolist()
         return lambda t, x: np.array(evaluate([t, *np.asarray(x).tolist(), *values]), dtype=float)
