@@ -161,7 +161,8 @@ class Saltation:
             if needed:
                 raise NoDerivativeError(
                     f"event {name} at t = {t:.6g} s only grazes its surface (its rate is {rate:.3g}): "
-                    "the run has no derivative there; end it before, or take tighter tolerances if it does cross"
+                    "the run has no derivative there, nor where impacts die away; end it before, or take tighter "
+                    "tolerances if it does cross"
                 )
             return np.full(S.shape[1], np.nan)
         along = self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u)

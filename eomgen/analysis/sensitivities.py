@@ -30,6 +30,7 @@ from .variations import Variational
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
+    from ..runtime.trajectory import Trajectory
 
 
 def differentiate_run(
@@ -69,12 +70,15 @@ def differentiate_run(
     columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
+    options = {"rtol": rtol, "atol": atol, **options}
+    alone = None
+    if watched:
+        alone = bound.simulate((start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(bound.bind(u=forcing(start, x0)), start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
     times = None if t_eval is None else ordered_times(t_eval, start, stop)
     z0 = run.joined(x0, S0)
-    settings = {"rtol": rtol, "atol": atol, **options}
     corners = forcing.corners(start, stop)
     salts = Saltation(run, watched, (start, stop), (rtol, atol), corners)
     fail, title = bound.kernels.fail, solver.__name__
@@ -83,7 +87,7 @@ def differentiate_run(
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, [start, *corners, stop], z0, solver, times, salts.watched, False, settings, pace, salts.reset
+                run, [start, *corners, stop], z0, solver, times, salts.watched, False, options, pace, salts.reset
             )
     except Crawling as crawl:
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())
@@ -102,7 +106,9 @@ def differentiate_run(
         t_events[i], x_events[i] = event_times, found[:n]
     states = solution._replace(t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events)
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
-    trajectory = record(bound, forcing, states, title, settings, watched.names)
+    trajectory = record(bound, forcing, states, title, options, watched.names)
+    if alone is not None:
+        _require_same(trajectory, alone)
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
         t, x = float(time), trajectory.x[:, j]
@@ -111,6 +117,21 @@ def differentiate_run(
         if layout.n_y:
             dy[..., j] = run.outputs(t, x, dx[..., j])
     return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
+
+
+def _require_same(found: Trajectory, alone: Trajectory) -> None:
+    """Refuse a run that passes over events which the run by itself finds.
+
+    Raises
+    ------
+    SimulationError
+    """
+    for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
+        if len(ours) != len(theirs):
+            raise SimulationError(
+                f"event {name} is found {len(theirs)} times by simulate and {len(ours)} times together with the "
+                "derivatives: it comes and goes within one step of the solver; give max_step"
+            )
 
 
 def _inputs(run: Variational, t: float, x: Array) -> Slopes | None:

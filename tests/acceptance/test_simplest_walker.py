@@ -46,7 +46,7 @@ def walker(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return eg.load(file).compile(target="numpy")
 
 
-# -- the same without eomgen ----------------------------------------------------------------------------------------------
+# -- the same without eomgen -------------------------------------------------------------------------------------------
 def rates(t: float, x: np.ndarray, gamma: float) -> list[float]:
     theta, phi, w, s = x
     return [w, s, np.sin(theta - gamma), np.sin(theta - gamma) + (w * w - np.cos(theta - gamma)) * np.sin(phi)]
