@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
@@ -79,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         turned=equations.turned,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
         canonical=equations.canonical,
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
@@ -244,7 +246,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             if m.events
             else {}
         ),
-        **({"signals": signals} if (signals := _signals(kinematics, equations)) else {}),
+        **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
         "simulation": {
@@ -258,12 +260,23 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
 
 
 def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
-    """Inputs over time as tapes, by name."""
-    places = {name: ("x", k) for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
-    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    """Inputs over time as tapes, by name, and their derivatives by t, x and p that do not vanish."""
     given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
-    found = zip(given, resolved(list(given.values()), kinematics, equations), strict=True)
-    return {name: list(record_tape([x], places.__getitem__)) for name, x in found}
+    if not given:
+        return {}
+    states = (*kinematics.names, *kinematics.velocity_names)
+    places = {name: ("x", k) for k, name in enumerate(states)}
+    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    known = [kinematics.graph.symbol(name) for name in ("t", *states, *kinematics.parameter_names)]
+    found = dict(zip(given, resolved(list(given.values()), kinematics, equations), strict=True))
+    slopes: dict[str, Any] = {}
+    for name, x in found.items():
+        kept = {k: slope for k, slope in enumerate(gradient(x, known)) if not slope.is_zero}
+        slopes[name] = [list(kept), list(record_tape(list(kept.values()), places.__getitem__))]
+    return {
+        "signals": {name: list(record_tape([x], places.__getitem__)) for name, x in found.items()},
+        "signal_slopes": slopes,
+    }
 
 
 def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:

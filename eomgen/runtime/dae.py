@@ -123,6 +123,7 @@ class Dae:
         inputs: Mapping[str, Any] | None = None,
         *,
         t_eval: Sequence[float] | Array | None = None,
+        events: Any = None,
         rtol: float = 1e-8,
         atol: float = 1e-10,
         **options: Any,
@@ -135,6 +136,9 @@ class Dae:
             As for ``Module.simulate``; an input is a number, a table or a function of t and x.
         t_eval : times in order, optional
             IDA's own steps by default.
+        events : optional
+            As for ``Module.simulate``; IDA's root finding locates them, a reset or an impact starts it anew with
+            consistent values, a terminal event ends the run.
         rtol, atol : float, optional
             Tolerances of coordinates and velocities; multipliers and corrections are not controlled.
         **options
@@ -151,8 +155,10 @@ class Dae:
             scikit-sundae is not installed.
         SimulationError
             IDA gave up.
+        ZenoError
+            Events that reset the state follow each other ever faster.
         """
         from .dae_solution import integrate_dae
 
         tolerances = {"rtol": rtol, "atol": atol}
-        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, tolerances, options)
+        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, events, tolerances, options)

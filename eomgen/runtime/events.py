@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
+STOP = 3  #: an integrator stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, are Zeno's: as in loop.c
 
@@ -61,8 +62,8 @@ class Event:
         The run ends when it has happened so often; 0: never.
     direction : {1, -1, 0}
         Rising, falling, both; or UNWATCHED.
-    action : {GO_ON, RESET, WAIT}
-        Whether the model's kernel gives a new state, or an impact does.
+    action : {GO_ON, RESET, WAIT, STOP}
+        Whether the model's kernel gives a new state, or an impact does; STOP in Python's own loops.
     """
 
     def __init__(
@@ -157,7 +158,7 @@ class Events:
         kernel = module.kernels.timed("events", nan=True) if self.model else None
         found: list[Event] = []
         for i, event in enumerate(self.model):
-            function = _value_of(kernel, forcing, i)
+            function = _unwatched if event.direction == UNWATCHED else _value_of(kernel, forcing, i)
             found.append(Event(function, self.names[i], event.terminal, event.direction, event.action))
         p = module.p
         for event, formula in self.formulas:
@@ -228,6 +229,11 @@ def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
 def _only_in_c(t: float, x: Array) -> float:
     """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
     raise UsageError("an event by its name or text has a value in a run only; give a function f(t, x) instead")
+
+
+def _unwatched(t: float, x: Array) -> float:
+    """In place of the value of an event that is not watched: SciPy's methods find no zero in it."""
+    return float("nan")
 
 
 def _times(name: str, given: Any) -> int:

@@ -343,6 +343,11 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         -------
         (n_x,) array
             The state at t + h; loops drift at the order of the step, see :meth:`project`.
+
+        Raises
+        ------
+        UsageError
+            Events of the model reset its state, which a step does not watch.
         """
         from .steppers import march
 

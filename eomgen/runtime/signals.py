@@ -171,7 +171,7 @@ class Forcing:
             values[name] = value
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in values:
-                values[name] = DeclaredSignal(tape)
+                values[name] = DeclaredSignal(tape, layout.metadata.get("signal_slopes", {})[name])
         for name, value in values.items():
             index = layout.u.index(name)
             if isinstance(value, Formula | DeclaredSignal):
