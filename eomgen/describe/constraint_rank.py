@@ -8,13 +8,14 @@ from ..errors import ExpressionError, ModelError, Problem
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
-from ..graph.rounding import ROUNDED, with_bounds
+from ..graph.rounding import with_bounds
 from ..graph.substitute import substitute, symbols_of
+from ..limits.constraints import GIVEN as SMALL
+from ..limits.rounding import ROUNDED
 from .input_names import rate_of
 from .sympy_face import lower_sympy, name_of
 from .sympy_forms import Forms
 
-SMALL = 1e-9  #: part of a row's length that others may leave of it while it still counts as dependent
 TRIES = 5
 
 

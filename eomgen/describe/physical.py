@@ -11,7 +11,8 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
-from ..numeric.inertia import COMPUTED, SWITCH, fault_of_inertia, inertia_scales
+from ..limits.inertia import COMPUTED
+from ..numeric.inertia import SWITCH, fault_of_inertia, inertia_scales
 from .description import Faults
 from .mechanism import Body, JointSpec
 

@@ -9,6 +9,8 @@ from ..errors import EvaluationError, ModelError, PartitionError, Problem
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.mobility import ConstraintFunctions, Mobility
+from ..limits.inertia import LEAST
+from ..limits.rounding import TINY
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
 from .equations import TreeEquations
@@ -16,7 +18,6 @@ from .idle import IdleMotion
 
 REMEDY = "give the body it moves a mass or an inertia; for kinematics alone, check_inertia: note"
 SHOWN = 8  #: bodies that a message names
-LEAST = 1e-12  #: smallest eigenvalue of the mass matrix with its diagonal scaled to 1
 
 
 def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> str:
@@ -106,8 +107,8 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
         if sizes[0] > LEAST:
             return []
         if worst is None:  # the reference is what the message speaks of
-            unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), 1e-300))
-            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=1e-300))
+            unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), TINY))
+            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=TINY))
             motion = B @ (modes[:, 0] * unit / unit.max())
             idle = None
             if not alone.size:

@@ -9,8 +9,9 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
-from ..graph.rounding import ROUNDED, vanishing
+from ..graph.rounding import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .state import State
 from .tree import Poses

@@ -12,15 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-#: A moment may exceed the sum of the other two by this part of it before it counts as wrong: published inertias of real
-#: machines, measured or rounded, exceed it by up to a tenth (PUMA 560, link 3).
-TRIANGLE = 0.1
-#: A moment may be negative by this part of the largest one, from the digits that files keep.
-ROUNDING = 1e-6
-#: Rounding of a moment that a program in double precision computed, as part of m l^2: a tensor that is turned and
-#: shifted to the centre of mass is a sum of some 30 products of at most about m l^2, each rounded to 2^-53, so that 64
-#: epsilons are a bound with room.  Below it a moment says nothing, whatever its sign.
-COMPUTED = 64 * np.finfo(float).eps
+from ..limits.inertia import COMPUTED, DIGITS, TRIANGLE
+
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
 
@@ -95,12 +88,12 @@ def fault_of_inertia(
     if plane is not None:
         n = np.asarray(plane, dtype=float)
         moment, size = float(n @ full @ n), float(np.abs(full).max())
-        if moment < -max(ROUNDING * size, computed):
+        if moment < -max(DIGITS * size, computed):
             return f"the moment about the centre of mass is {moment:.6g}", SHIFTED
         return None
     a, b, c = np.linalg.eigvalsh(full)
     size = max(abs(a), abs(c))
-    if a < -max(ROUNDING * size, computed):
+    if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a:.6g}", NEGATIVE
     if b > max(1e-9 * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
         return f"principal moments {a:.6g}, {b:.6g}, {c:.6g}: one exceeds the sum of the others", EXCESS

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..numeric.rank_limits import PASSED as SINGULAR
+from ..limits.constraints import PASSED as SINGULAR
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 import numpy as np
 
 from ..errors import UsageError, ZenoError
+from ..limits.rounding import TINY
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from .layout import Layout
 from .names import check_names, require_time_and_state, unknown
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
 STOP = 3  #: an integrator stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
-CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, are Zeno's: as in loop.c
 
 
 class Named(list[Array]):
@@ -89,8 +90,8 @@ class Event:
         """The value at time t and state x; right after a reset, one on the side to which it led."""
         value = float(self.function(t, x))
         self.known = self.known or value == value
-        if self.left is not None and abs(t - self.left[0]) <= 1e-14 * max(abs(t), 1e-3):
-            return self.left[1] * max(abs(value), 1e-300)
+        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
+            return self.left[1] * max(abs(value), TINY)
         return value
 
 

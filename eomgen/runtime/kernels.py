@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..numeric.definite import SINGULAR, correlated
+from ..limits.inertia import SINGULAR
+from ..numeric.definite import correlated
 from ..numeric.scales import Array, Scales
 from .failure import Fail
 from .layout import Layout

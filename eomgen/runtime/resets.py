@@ -7,10 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import ZenoError
+from ..limits.runs import AHEAD, CROWD, CROWDED, TOUCHING
 from ..numeric.scales import Array
-from .events import CROWD, CROWDED, RESET, WAIT, Event, Events
-
-AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken
+from .events import RESET, WAIT, Event, Events
 
 
 class Resets:
@@ -44,7 +43,7 @@ class Resets:
         for e in fired:
             event = self.events[e]
             came, goes = (self.rate(event, t, state) for state in (before, after))
-            stuck = not abs(goes) > 1e-9 * abs(came) or (event.action == WAIT and goes < 0.0)
+            stuck = not abs(goes) > TOUCHING * abs(came) or (event.action == WAIT and goes < 0.0)
             again = event.direction * came < 0.0  # the zero it just left
             if event.action in (RESET, WAIT) and (stuck or again):
                 self.crowded = self.most

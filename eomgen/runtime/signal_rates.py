@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.rounding import TINY
+from ..limits.runs import CONTINUOUS, MOMENT
 from ..numeric.scales import Array
 from .tapes import DeclaredSignal, Formula
 
@@ -20,9 +22,7 @@ if TYPE_CHECKING:
     from .layout import Layout
     from .signals import Forcing
 
-MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
-SAME = 1e-9  #: part of the largest value or slope of a table by which it may jump at a time and count as continuous
 
 
 class TableRate:
@@ -91,7 +91,7 @@ def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
     left = np.concatenate([ends[0], here.beside(times[1:], times[:-1])]) if len(pieces) else ends[0]
     right = np.concatenate([here.beside(times[:-1], times[:-1]), ends[1]]) if len(pieces) else ends[1]
     size = max(np.abs(left).max(), np.abs(right).max())
-    return np.asarray(times[np.abs(right - left) > SAME * size])
+    return np.asarray(times[np.abs(right - left) > CONTINUOUS * size])
 
 
 def require_smooth(forcing: Forcing, start: float, end: float) -> None:
@@ -147,7 +147,7 @@ def find_jump(
 
     edges: list[float] = np.linspace(low, high, CELLS + 1).tolist()
     values = [value(t, x) for t in edges]
-    allowed = 1e-9 * max(1e-300, *map(abs, values))
+    allowed = CONTINUOUS * max(TINY, *map(abs, values))
     for a, b in pairwise(edges):
         left, right = a, b
         while gap(left, right) > allowed:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
@@ -111,7 +112,7 @@ class Signal:
             return np.asarray(self.times[1:][np.diff(self.values) != 0.0])
         rates = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
         size = np.abs(rates).max()
-        return np.asarray(self.times[np.abs(np.diff(rates)) > 1e-9 * size])
+        return np.asarray(self.times[np.abs(np.diff(rates)) > CONTINUOUS * size])
 
     def encode(self) -> tuple[int, Array, Array]:
         """Order, times and values as the compiled loop reads them."""
@@ -337,7 +338,7 @@ class Forcing:
         u, n = self(t, x), len(x)
         du = np.zeros((len(u), n))
         for j in range(n):
-            h = 1e-6 * max(1.0, abs(x[j]))
+            h = DIFFERENCE * max(1.0, abs(x[j]))
             moved = np.array(x, dtype=float)
             moved[j] += h
             du[:, j] = (self(t, moved) - u) / h
@@ -346,7 +347,7 @@ class Forcing:
         f = rhs(t, x, u=u)
         result = np.zeros((n, n))
         for k in np.flatnonzero(du.any(axis=1)):
-            h = 1e-6 * max(1.0, abs(u[k]))
+            h = DIFFERENCE * max(1.0, abs(u[k]))
             pushed = u.copy()
             pushed[k] += h
             result += np.outer((rhs(t, x, u=pushed) - f) / h, du[k])

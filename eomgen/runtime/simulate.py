@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 MOST_STEPS = 10**8
 #: Assemblies in turn with inputs that depend on the state.
 ROUNDS = 50
-DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
+DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
 
 
