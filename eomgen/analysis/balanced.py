@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..limits.statics import DIFFERENCES
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, force_slopes, weigh
 from .linear import linearise
 from .linearisation import Linearisation
-from .newton import DIFFERENCES
 from .rounding import judge
 from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number

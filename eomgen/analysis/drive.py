@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
+from ..limits.statics import AFFINE, REACHED
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
@@ -26,9 +27,6 @@ from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-REACHED = 1e-8  #: largest share of the needed forces that may be left over
-AFFINE = 1e-9  #: relative deviation from a straight line at which forces count as linear in an input
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
+from ..limits.constraints import ACCEPTED, AT_ONCE, SETTLED
 from ..numeric.projection import largest, within
 from ..numeric.scales import Array
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 STEPS = 25  #: Newton steps
 LONGEST = 0.3  #: largest scaled Newton step
-EXACT, SETTLED, ACCEPTED = 1e-14, 1e-12, 1e-10  #: scaled residuals: stop at once, stop when it falls no longer, closed
 
 
 class Tangent(NamedTuple):
@@ -135,8 +135,8 @@ class Follower:
             C = self._C(q, t=t)
             e = np.concatenate([self.scales.residual(C), self._gap(q, y, t)])
             size = largest(e)
-            if size <= EXACT or not np.isfinite(size):
-                return q if size <= EXACT else None
+            if size <= AT_ONCE or not np.isfinite(size):
+                return q if size <= AT_ONCE else None
             K = self.matrix(q, t)
             K = np.concatenate([K[: len(C)], K[self.layout.n_c :]])
             rounded = self.scales.rounding(q, K)

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import MEASURED
+from ..limits.impacts import HELD, TOUCHING
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
 from ..runtime.signal_rates import drift, moving_inputs
@@ -25,9 +27,6 @@ from .tables import as_text
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-TOUCHING = 1e-8  #: gaps of a run at most this open, in lengths of the model or rad, take part in an impact
-CLOSED = 1e-6  #: the same of gaps that a user says are closed
-HELD = 1e-9  #: part of a normal, along which nothing is free to move, that is rounding
 ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
@@ -176,7 +175,7 @@ def _one_state(module: Module, t: float, x: ArrayLike) -> States:
 
 def _require_closed(gaps: Gaps, states: States) -> None:
     values = gaps.values(float(states.t[0]), states.x[:, 0])
-    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, CLOSED), strict=True):
+    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, MEASURED), strict=True):
         if abs(value) > limit:
             how = "open" if value > 0.0 else "closed too far"
             unit = gaps.layout.unit(name)

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.impacts import ENDLESS, STILL
 from ..numeric.scales import Array
 
 ROUNDS = 1000  #: impacts that may follow each other at one instant
 FARTHEST = 1e5  #: change of the velocities, relative to the fastest approach, beyond which gaps cannot open together
-STILL = 1e-12  #: relative: rates that count as 0
-ENDLESS = 1e-3  #: part of the first approach that is left if the impacts of an instant do not die away
 
 
 def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[object]) -> tuple[Array, Array]:

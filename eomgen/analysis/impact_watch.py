@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits.impacts import STARTED
 from ..numeric.scales import Array
 from .impact_gaps import Gaps
 from .roots import find_root
@@ -15,7 +16,6 @@ from .roots import find_root
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
-STARTED = 1e-5  #: of the size of a gap that counts as closed: what is added to one that begins at 0 and opens
 RESTING = 0.1  #: the same for one that does not open
 SAMPLES = 8  #: places in each step of the solver at which gaps are looked at afterwards
 CHUNK = 4096  #: steps at a time

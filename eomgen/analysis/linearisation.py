@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.statics import COUPLED, STILL
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from .rounding import BALANCED
@@ -17,9 +18,6 @@ from .tables import as_html, as_text, number
 if TYPE_CHECKING:
     from ..runtime.layout import Layout
     from .tangent import Tangent
-
-STILL = 1e-7  #: scaled rates below which a state counts as an equilibrium
-COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
 
 
 class Linearisation:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.statics import SYMMETRIC
 from ..numeric.scales import Array
 from .linearisation import Linearisation
-from .stability import SYMMETRIC, symmetric_modes, uncertainty
+from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 CHUNK = 4_000_000  #: numbers held at once
-SEEN = 1e-7  #: smallest component of a unit self-stress that counts
 GROUND = -1
 
 

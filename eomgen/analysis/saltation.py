@@ -18,18 +18,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import NoDerivativeError, UsageError
+from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
 from ..runtime.events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
-from .impact import TOUCHING
 from .sensitivity_result import EventSlopes
 from .start import keep_consistent
 from .strike_slopes import after_impact, after_reset
 from .variations import Move, Variational
 
-ASIDE = 1e-7  #: part of the span by which the rates on one side of an event are looked at
-SMOOTH = 1e-9  #: part of the rates by which they may differ on both sides of an event and count as continuous
 GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
-INSTANT = 1e-12  #: part of the span within which events are simultaneous
 
 
 class Saltation:
@@ -200,7 +197,7 @@ class Saltation:
 
     # -- what has no derivative -----------------------------------------------------------------------------------
     def _refuse_ends(self, t: float, own: int) -> None:
-        near = INSTANT * abs(self.span[1] - self.span[0])
+        near = SIMULTANEOUS * abs(self.span[1] - self.span[0])
         for end, what in ((self.span[0], "start"), (self.span[1], "end")):
             if abs(t - end) <= near:
                 raise NoDerivativeError(
@@ -222,7 +219,7 @@ class Saltation:
             rate = self._rate(t, x, index, f, self.names[other])
             if (event.action == WAIT and rate > 0.0) or event.direction * rate < 0.0:
                 continue  # it has just happened, and leaves
-            near = max(self._error(x, gradient), abs(rate) * INSTANT * abs(self.span[1] - self.span[0]))
+            near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
                 raise self._at_once(t, [self.names[own], self.names[other]])
 

@@ -16,7 +16,6 @@ import numpy as np
 from ..numeric.scales import Array
 from .rounding import EPS, ROUNDING, graded_modes, judge
 
-SYMMETRIC = 1e-9  #: relative difference up to which K counts as symmetric where its modes are asked for
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
 
 

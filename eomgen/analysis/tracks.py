@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limits.motions import POOR, SAME
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .bridging import Bridge
@@ -11,9 +12,7 @@ from .following import Follower
 from .singular import Singular, find_stop, judge_walk, name_singular
 from .walking import Path, Point, Walk
 
-POOR = 1e-3  #: quality below which a bridge gives more digits than the equations
 ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean another branch
-SAME = 1e-10  #: parameters relative to the path that count as one
 
 
 class Track:

@@ -12,15 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.motions import DEGENERATE, NEGLIGIBLE, SINGULAR
 from ..numeric.scales import Array
 from .roots import find_root
-from .singular import NEAR, SHARE, Singular
+from .singular import SHARE, Singular
 from .workspace_grid import Index
 from .workspace_walk import OUT, Flood, Stage
-
-ROUNDING = 1e-9  #: smallest over largest singular value of J, from which on it counts as singular
-
-NEGLIGIBLE = 1e-10  #: of det J at the neighbours, that counts as 0 between them
 
 
 class WorkspaceSingular(NamedTuple):
@@ -162,12 +159,12 @@ def judge(stage: Stage, reader: Reader, filled: Flood) -> Conditions:
         for k in np.flatnonzero(reader.wraps):
             y[index][k] += 2 * np.pi * np.round((y[parent][k] - y[index][k]) / (2 * np.pi))
         V, quality[index] = reader.motion(q, t)
-        if quality[index] < NEAR:
+        if quality[index] < SINGULAR:
             singular[index] = lost[index] = True
             continue
         A = J[index] = reader.jacobian(q, t, V)
         U, S, _ = np.linalg.svd(A)
-        if not S[-1] > ROUNDING * S[0]:
+        if not S[-1] > DEGENERATE * S[0]:
             singular[index] = lost[index] = True
             found.append(_lost(stage, index, stage.at(index), q, U[:, len(S) - 1]))
     if n_y == n_x:

@@ -7,11 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import STATUS, EvaluationError
+from ..limits.motions import FLAT, LOCKED
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
-LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
-FLAT = 1e-3  #: sine of the angle between a disc's axle and its plane's normal below which it counts as flat
 LARGE = 1e150  #: a number whose square is beyond double precision
 SHOWN = 8  #: coordinates listed in a message
 
