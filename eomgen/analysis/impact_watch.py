@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..limits.impacts import STARTED
+from ..limits.impacts import FOUND, STARTED
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from .impact_gaps import Gaps
 from .roots import find_root
@@ -97,7 +98,7 @@ def first_missed(watch: Watch, piece: Trajectory) -> tuple[float, NDArray[np.boo
             first = min(at for at, _ in found)
             fired = np.zeros(len(values), dtype=bool)
             for at, i in found:
-                fired[i] = at <= first + 1e-14 * max(abs(first), 1.0)
+                fired[i] = at <= first + INSTANT * max(abs(first), 1.0)
             return first, fired
     return None
 
@@ -124,7 +125,7 @@ def _first_zero(watch: Watch, piece: Trajectory, i: int, times: Array, values: A
 def _lowest(value: Callable[[float], float], left: float, at: float, right: float, best: float) -> tuple[float, float]:
     """The least value about, or any below 0, and where: golden section."""
     whole = right - left
-    while best >= 0.0 and right - left > 1e-7 * whole:
+    while best >= 0.0 and right - left > FOUND * whole:
         low = at - left > right - at
         t = at + GOLDEN * ((left if low else right) - at)
         f = value(t)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, PartitionError, UsageError
-from ..limits.constraints import UNMOVED
+from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
@@ -304,7 +304,7 @@ def _pieces(follower: Follower, asked: Range) -> list[tuple[int, int]]:
         here = steps[:, k] / sizes[k]
         if (
             direction is not None
-            and np.abs(here - direction).max() > ALIGNED + 1e-15 * np.abs(scaled[:, k]).max() / sizes[k]
+            and np.abs(here - direction).max() > ALIGNED + EXACT * np.abs(scaled[:, k]).max() / sizes[k]
         ):
             pieces.append((first, k))
             first = k

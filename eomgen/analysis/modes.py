@@ -73,7 +73,7 @@ class Modes:
     def damped(self) -> list[Damped]:
         """The modes with damping and gyroscopic terms, slow ones first."""
         values = self.linear.eigenvalues
-        tiny = 1e-9 * max(1.0, float(np.abs(values).max(initial=0.0)))
+        tiny = SYMMETRIC * max(1.0, float(np.abs(values).max(initial=0.0)))
         found = []
         for value in values:
             if value.imag < -tiny:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..limits.rounding import TINY
 from ..limits.statics import ARRIVED, CLOSE, SHORTEST
 from ..numeric.scales import Array
 from .rounding import BALANCED, EPS
@@ -94,7 +95,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
         most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
         if before is not None:
             apart = float(np.linalg.norm(before[1] - shown))
-            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, 1e-300)
+            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, TINY)
         part, retried = most if plain else min(most, part), False
         there, grown = None, None
         while part >= SHORTEST * most:
@@ -106,7 +107,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
             if plain:
                 break
             off = float(np.linalg.norm(left - (1.0 - part) * shown))
-            wanted = 0.5 * size * part**2 / max(off, 1e-300)
+            wanted = 0.5 * size * part**2 / max(off, TINY)
             if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
                 if arrived:  # rounding: no correction gets smaller
                     return _polished(search, point, solver, change), step, True
@@ -160,7 +161,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
             gain = -1.0
             if there is not None:
                 lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
-                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), 1e-300)
+                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
             if gain > 1e-4:
                 damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
                 break

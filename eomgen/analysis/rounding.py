@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..limits.rounding import TINY
 from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def _balance(A: Array, own: Array | None) -> Array:
         n = len(own)
         rows = np.arange(len(A) - n, len(A))
         sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], own)
-        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], 1e-300)
+        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], TINY)
     np.fill_diagonal(sizes, 0.0)
     d = np.ones(len(A))
     for _ in range(ROUNDS):
@@ -121,7 +122,7 @@ def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
         turned = False
         for i in range(len(T)):
             for j in range(i):
-                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + 1e-300:
+                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + TINY:
                     continue
                 angle = 0.5 * np.arctan2(2.0 * T[i, j], T[i, i] - T[j, j])
                 if T[i, i] < T[j, j]:  # the smaller of both turns

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.motions import LEAPS, SINGULAR
+from ..limits.motions import BLOCKED, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .bridging import Bridge, build_bridge
@@ -150,10 +150,10 @@ def find_stop(walk: Walk, last: Point) -> tuple[float, Point]:
             if found is None:
                 return last.s, last
             q = found
-            if abs(step) < 1e-13:
+            if abs(step) < BLOCKED:
                 break
         s = float((follower.led_values(q, t)[k] - walk.path.y[k]) / y1[k])
-        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < 1e-6:
+        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < UNJUDGED:
             return s, Point(s, q, follower.tangent(t, q, 0.0, y1))
     return last.s, last
 

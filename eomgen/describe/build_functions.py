@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..graph.functions import Function
-from ..limits.descriptions import PERIODIC
+from ..limits.descriptions import APART, PERIODIC
 from ..numeric.functions import Curve, Surface, Twin
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
 from .build_native import build_native
@@ -121,7 +121,7 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
         k = int(np.argmax(~(steps > 0.0)))
         reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table increase")
         return None
-    if not np.isfinite(x[-1] - x[0]) or (steps < 1e-12 * np.max(np.abs(x))).any():
+    if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
         reader.faults.add(path, "has points too near to each other, or too far apart, to be told apart in doubles")
         return None
     return x

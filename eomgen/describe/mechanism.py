@@ -16,6 +16,7 @@ from ..errors import ModelError, Problem
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
 
@@ -184,8 +185,8 @@ class Simulation:
 
     end: float = 10.0
     method: str = "DOP853"
-    rtol: float = 1e-8
-    atol: float = 1e-10
+    rtol: float = RTOL
+    atol: float = ATOL
     step: float | None = None
 
 

@@ -11,6 +11,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
+from ..limits.descriptions import TENSOR, TENSOR_TERMS
 from ..limits.inertia import COMPUTED
 from ..numeric.inertia import SWITCH, fault_of_inertia, inertia_scales
 from .description import Faults
@@ -86,14 +87,14 @@ def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed:
         return True
     if tensor is not None:
         full = np.reshape(tensor, (3, 3))
-        atol = max(1e-12 * float(np.max(np.abs(full), initial=0.0)), computed)
-        return bool(np.allclose(full, full.T, rtol=1e-9, atol=atol))
+        atol = max(TENSOR_TERMS * float(np.max(np.abs(full), initial=0.0)), computed)
+        return bool(np.allclose(full, full.T, rtol=TENSOR, atol=atol))
     # written differently above and below the diagonal: equal if they agree wherever one looks
     flat = [x for pair in pairs for x in pair]
     names = sorted(symbols_of(flat))
     for seed in (1, 2, 3):
         draws = np.random.default_rng(seed).uniform(0.5, 1.5, len(names))
         result = np.asarray(evaluate(flat, dict(zip(names, draws.tolist(), strict=True))), dtype=float)
-        if not np.allclose(result[::2], result[1::2], rtol=1e-9, atol=1e-12):
+        if not np.allclose(result[::2], result[1::2], rtol=TENSOR, atol=TENSOR_TERMS):
             return False
     return True

@@ -17,6 +17,7 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from ..joints.rods import Distance, RevoluteSpherical
+from ..limits.descriptions import NO_LENGTH
 from ..records import dataclass
 from .couplings import couple
 from .flaws import find_flaws
@@ -346,4 +347,4 @@ def _length_scale(mechanism: Mechanism) -> Expr:
     for square in squares:
         total = total + square
     size = graph.apply("sqrt", total / float(len(squares)))
-    return graph.apply("select", graph.apply("lt", size, 1e-9), 1.0, size)  # parameters may make all of them 0
+    return graph.apply("select", graph.apply("lt", size, NO_LENGTH), 1.0, size)  # parameters may make all of them 0

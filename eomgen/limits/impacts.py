@@ -5,7 +5,7 @@ from __future__ import annotations
 #: Scaled distance from the constraints up to which coordinates of a reset count as on them
 OFF = 1e-9
 #: Gaps of a run at most this open, in lengths of the model or rad, take part in an impact: event times keep
-#: Eight digits
+#: eight digits
 TOUCHING = 1e-8
 #: Part of a normal, along which nothing is free to move, that is rounding
 HELD = 1e-9
@@ -27,3 +27,11 @@ ASIDE = 1e-7
 SMOOTH = 1e-9
 #: Part of the span within which events are simultaneous
 SIMULTANEOUS = 1e-12
+#: Part of the rates that may be left against the constraints after an impact.
+LEFT = 1e-8
+#: Length of a normal, in the metric of the mass matrix, above which something is free to move along it.
+FREE = 1e-10
+#: Inverse mass along a normal below which an impulse moves nothing.
+PUSHES = 1e-14
+#: Part of a step to which the least of a gap is found by bisection: its value there is known to the square.
+FOUND = 1e-7

@@ -23,3 +23,5 @@ DIGITS = 1e-6
 #: Rounding of a moment that a program in double precision computed, as part of m l^2: a tensor that is turned and
 #: Shifted to the centre of mass is a sum of some 30 products of at most about m l^2.
 COMPUTED = ROUNDED
+#: Part of the largest principal moment below which the second says nothing of the triangle of three.
+MOMENT = 1e-9

@@ -7,7 +7,7 @@ NEAREST = 1e-12
 #: Relative difference of two directions that count as one
 ALIGNED = 1e-12
 #: Quality, the smallest singular value over the largest, below which a position counts as singular: rates there
-#: Keep ten digits at most, and a minimum is found to the root of what positions are closed to, 1e-5 at worst
+#: keep ten digits at most, and a minimum is found to the root of what positions are closed to, 1e-5 at worst
 SINGULAR = 1e-6
 #: Quality below which an interpolant across a singular position gives more digits than the equations, which keep
 #: EXACT / s^2 of velocities
@@ -30,3 +30,10 @@ SLACK = 1e-9
 LOCKED = 1e-4
 #: Sine of the angle between a disc's axle and its plane's normal below which it counts as flat
 FLAT = 1e-3
+#: Part of the largest singular value below which one is none: C_q is known to so much in large mechanisms.
+NULL = 1e-13
+#: Scaled distance by which an interpolant across a singular position may miss a position on it: seven times the error
+#: of its rates there.
+ASTRAY = 1e-5
+#: Volume of a cell, in units of its edges, below which it is flat.
+FLAT_CELL = 1e-12

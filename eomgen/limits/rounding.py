@@ -17,3 +17,6 @@ TINY_ROOT = 1e-150
 LARGE_ROOT = 1e150  #: a number whose square is beyond double precision
 #: Width of a bracket relative to its place at which nothing lies between: two numbers
 NEXT = 4e-16
+#: By which an angle may miss a multiple of a quarter turn, relative to it, and an entry of a rotation a whole number: 4
+#: to 5 eps, what pi / 2 written in sixteen digits leaves.
+QUARTER = 1e-15

@@ -24,3 +24,5 @@ MOVING = 1e-9
 SYMMETRIC = 1e-9
 #: Smallest component of a unit self-stress that counts
 SEEN = 1e-7
+#: Part of a force, or of 1 N, that a model affine in its inputs may leave when they are solved for.
+REMAINDER = 1e-6

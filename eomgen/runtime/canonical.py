@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SingularMassMatrixError, UsageError
+from ..limits.constraints import STATE
 from ..numeric.projection import correct_position
 from ..numeric.scales import Array
 
@@ -81,7 +82,7 @@ class Canonical:
             rest = np.concatenate([q, np.zeros(layout.n_v)])
             rate = layout.scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
             N = np.linalg.svd(J)[2][layout.rank :].T
-            least = -np.linalg.lstsq(J, rate, rcond=1e-10)[0]
+            least = -np.linalg.lstsq(J, rate, rcond=STATE)[0]
         else:
             least = np.zeros(layout.n_v)
         still = self.momenta(np.concatenate([q, np.zeros(layout.n_v)]), t)  # what p is at v = 0

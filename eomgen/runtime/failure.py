@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import STATUS, EvaluationError
 from ..limits.motions import FLAT, LOCKED
+from ..limits.rounding import TINY_ROOT
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
@@ -110,7 +111,7 @@ class Fail:
 def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     """Euler parameters whose squares are all zero at a state, and the remedy; None if there are none."""
     for i, _ in layout.balls:
-        if not np.abs(x[i : i + 4]).max() > 1e-150:
+        if not np.abs(x[i : i + 4]).max() > TINY_ROOT:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
             return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
     return None

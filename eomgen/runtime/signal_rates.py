@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.rounding import TINY
-from ..limits.runs import CONTINUOUS, MOMENT
+from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
 from .tapes import DeclaredSignal, Formula
 
@@ -152,7 +152,7 @@ def find_jump(
         left, right = a, b
         while gap(left, right) > allowed:
             middle = 0.5 * (left + right)
-            if right - left <= 1e-12 * (high - low) or not left < middle < right:
+            if right - left <= LOCATED * (high - low) or not left < middle < right:
                 return middle
             left, right = (left, middle) if gap(left, middle) > gap(middle, right) else (middle, right)
     return None

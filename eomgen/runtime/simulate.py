@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
@@ -329,7 +330,7 @@ def find_state(
             u = forcing(t, x)
             forcing.require_finite()
             x = find_state(module.bind(None, u), initial, t)
-            if np.allclose(forcing(t, x)[places], u[places], rtol=1e-13, atol=1e-13):
+            if np.allclose(forcing(t, x)[places], u[places], rtol=ALIKE, atol=ALIKE):
                 return x
         names = ", ".join(layout.u[i] for i in places)
         raise AssemblyError(f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s", [])
