@@ -55,7 +55,7 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING, errors: A
         scale = _balance(np.maximum(np.abs(A), errors), own)  # so that what is but an error is not blown up
         balanced, scaled = A * scale / scale[:, None], errors * scale / scale[:, None]
         for k in np.flatnonzero(~zero & (values.real > 0.0)):
-            zero[k] = _reaches_axis_in_cluster(balanced, scaled, values, complex(values[k]))
+            zero[k] = _reaches_axis_in_cluster(balanced, scaled, np.abs(values), complex(values[k]))
     if (values.real[~zero] > 0.0).any():
         return "unstable"
     return "marginal" if zero.any() else "asymptotically stable"
@@ -69,13 +69,13 @@ def _reaches_axis(A: Array, value: complex, far: float) -> bool:
     )
 
 
-def _reaches_axis_in_cluster(A: Array, errors: Array, values: Array, value: complex) -> bool:
+def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: complex) -> bool:
     """The same within the invariant subspace of an eigenvalue and all smaller ones, with the errors that it sees.
 
     The subspace is that of the spectral projector, a contour integral of the resolvent (T. Kato, Perturbation Theory
     for Linear Operators, 1980, section I.5.3), which no defective eigenvalue spoils.
     """
-    sizes = np.sort(np.abs(values))
+    sizes = np.sort(sizes)
     wider = sizes[sizes > GAP * abs(value)]
     if not wider.size:
         return False

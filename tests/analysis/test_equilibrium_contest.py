@@ -43,6 +43,14 @@ def test_an_elastic_pendulum_of_any_stiffness_from_any_angle() -> None:
             assert np.abs(list(found.forces.values())).max() < 4e-16 * k + 1e-12
 
 
+def test_a_run_from_a_stiff_equilibrium_stays_there() -> None:
+    mod = elastic_pendulum()
+    found = mod.equilibrium({"x": np.sin(0.05), "y": -np.cos(0.05)})
+    run = mod.simulate(0.5, initial=found.x)
+    np.testing.assert_allclose(run["y"], found["y"], atol=1e-10)
+    np.testing.assert_allclose(run["x"], 0.0, atol=1e-10)
+
+
 def test_the_governor_from_its_default_guess() -> None:
     """At rest the arms hang down and the two springs carry the slider of 3 kg: s = -m g / (2 k)."""
     found = eg.load(example_files()["flyball_governor"]).compile(target="numpy").equilibrium()
@@ -101,7 +109,7 @@ def test_follower_forces_are_judged_by_eigenvalues() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_equilibrium_that_others_find_is_found(family: str) -> None:
-    cases = [judge(family, number) for number in range(7000, 7004)]
+    cases = [judge(family, number) for number in range(7000, 7003)]
     assert [case for case in cases if not case.ours and any(case.peers.values())] == []
     assert [case for case in cases if not case.agrees] == []
     assert any(any(case.peers[name] for name in PEERS) for case in cases)
