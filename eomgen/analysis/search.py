@@ -213,15 +213,17 @@ class Search:
         ]
         if not self.names:
             ways.insert(0, lambda: creep(self, start))
+        ends = [start, first]
         for way in ways:
             point, more, found = way()
+            ends.append(point)
             steps += more
             if not found:
                 point, more, found = newton(self, point)
                 steps += more
             if found:
                 return point, steps
-        raise self._failure(first)
+        raise self._failure(min(ends, key=lambda end: float(np.abs(self.residual(end.here, end.here)).max())))
 
     def _failure(self, point: Point) -> EquilibriumError:
         here, layout = point.here, self.layout
