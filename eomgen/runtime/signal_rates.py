@@ -14,10 +14,10 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .layout import Layout, number
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .layout import Layout
     from .signals import Forcing
 
 MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
@@ -217,8 +217,9 @@ def derive(name: str, rate: str, value: Any) -> Any:
     if isinstance(value, Formula):
         return value.derivative(name, rate)
     derivative = getattr(value, "derivative", None)
-    if callable(derivative):
-        return derivative()
+    found = derivative() if callable(derivative) else None
+    if found is not None:
+        return found if callable(found) else number(f"derivative of input {name}", found)
     raise UsageError(
         f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"
