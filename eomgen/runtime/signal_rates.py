@@ -189,12 +189,22 @@ def fill_rates(
         Inputs of a run, by name.
     derive : callable
         As :func:`derive`.
+
+    Raises
+    ------
+    UsageError
+        A rate is given of an input that is held.
     """
     found: dict[str, tuple[str, int, Any]] = {}
     for first, rates in layout.input_rates.items():
         last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
+        led = first in given or first in layout.metadata.get("signals", {})
         for rate, times in rates:
+            led = led or rate in layout.metadata.get("signals", {})
             if rate in given:
+                if not led and not (isinstance(given[rate], int | float) and given[rate] == 0):
+                    raise UsageError(f"input {rate} is the rate of {first}, which is held; give {first} as well")
+                led = True
                 last, order, value, at = rate, times, given[rate], times
             elif last:
                 for _ in range(times - at):

@@ -145,6 +145,14 @@ def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[
     assert all(word in str(caught.value) for word in words[words[0] == "L" :])
 
 
+def test_a_rate_without_its_input_is_refused(ring: Any) -> None:
+    for given in (0.5, "t", ([0.0, 1.0], [0.0, 1.0])):
+        with pytest.raises(eg.UsageError, match="input l_dot is the rate of l, which is held; give l as well"):
+            ring.simulate(1.0, START, inputs={"l_dot": given})
+    run = ring.simulate(1.0, {"x": 0.6, "x_dot": -0.4}, inputs={"l_dot": 0.0}, **TIGHT)
+    assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
+
+
 def test_a_text_may_bend_where_one_rate_is_enough(winch: Any) -> None:
     run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + max(0, t - 0.25)"}, **TIGHT)
     assert abs(run["th_dot"][-1] - 1.0 / 1.75**2) < 1e-8
