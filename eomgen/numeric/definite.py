@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import SingularMassMatrixError
 from .scales import Array
 
 SINGULAR = 1e-13  #: smallest pivot, relative to its own diagonal entry
 NOTHING = 1e-22  #: smallest pivot, relative to the largest diagonal entry: the square of what rounding leaves of a zero
+#: Smallest pivot of an indefinite matrix, relative to the terms it is the sum of: where it is small nothing bounds the
+#: entries that follow (those of a definite matrix never grow), so that half of the digits must be left.
+FAINT = 1e-8
 #: Least inertia of the only freedom, relative to that of all it moves: 1e-13 squared, the rounding of a dead centre.
 STILL = 1e-26
 
@@ -35,6 +39,27 @@ def moves_inertia(pivot: float, B: Array, sizes: Array) -> bool:
         Diagonal of the scaled mass matrix of the tree.
     """
     return bool(pivot > STILL * sizes[B[:, 0] != 0.0].sum())
+
+
+def indefinite_factor(matrix: Array, sizes: Array) -> tuple[Array, Array]:
+    """L (n, n), 1 on its diagonal, and d (n,) with matrix = L diag(d) L^T, of a matrix that need not be definite.
+
+    Without pivoting, as in C (templates/c/drivers/ldl.c): what a pivot loses is told by the terms it is the sum of.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        A pivot is less than 1e-8 of the terms that it is the sum of.
+    """
+    n = len(matrix)
+    L, d = np.eye(n), np.zeros(n)
+    for j in range(n):
+        terms = L[j, :j] ** 2 * d[:j]
+        d[j] = matrix[j, j] - terms.sum()
+        if not abs(d[j]) > FAINT * (sizes[j] + np.abs(terms).sum()):
+            raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
+        L[j + 1 :, j] = (matrix[j + 1 :, j] - L[j + 1 :, :j] @ (L[j, :j] * d[:j])) / d[j]
+    return L, d
 
 
 def correlated(M: Array) -> Array:

@@ -98,6 +98,8 @@ class Kernels:
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            if layout.metadata.get("indefinite"):
+                return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
             if values[0] > SINGULAR:
                 return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])
@@ -116,7 +118,6 @@ class Kernels:
             return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
         return ""
 
-
     def _not_finite(self, t: float, x: Array) -> str:
         """Names what makes a result that is no number: bound inputs, loads of elements, the mass matrix."""
         layout = self.layout
@@ -127,7 +128,8 @@ class Kernels:
             finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
             loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
             if loads:
-                return f"the loads of {loads} are not (ends that meet or lie inside the cylinder, or a law outside its domain)"
+                why = "ends that meet or lie inside the cylinder, or a law outside its domain"
+                return f"the loads of {loads} are not ({why})"
         if "mass_matrix" in self.core.names and x.size >= layout.n_q:
             M = self.state("mass_matrix", nan=True)(x[: layout.n_q], t=t)
             if not np.isfinite(M).all():

@@ -15,9 +15,7 @@ def four_bar() -> eg.Model:
     for name, value in (("w", 4.0), ("k", 1.0)):
         m.parameter(name, value)
     m.input("tau")
-    a, b, c = (
-        m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker")
-    )
+    a, b, c = (m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker"))
     m.revolute("A", m.ground, a, coordinate="theta")
     m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
     m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
