@@ -181,7 +181,7 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     idle = require_inertia(kinematics, mobility, tree)
     strange = bool(idle or kinematics.mechanism.negative)
     if strange and tree.accelerations is not None:
-        tree = METHODS["embedding"](kinematics)  # which does not divide by pivots before they are looked at
+        tree = tree.without_accelerations()  # which divide by pivots before they are looked at
     metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
     limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
     if idle:

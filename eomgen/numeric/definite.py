@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import SingularMassMatrixError
+from ..errors import NonFiniteError, SingularMassMatrixError
 from .scales import Array
 
 SINGULAR = 1e-13  #: smallest pivot, relative to its own diagonal entry
@@ -39,6 +39,29 @@ def moves_inertia(pivot: float, B: Array, sizes: Array) -> bool:
         Diagonal of the scaled mass matrix of the tree.
     """
     return bool(pivot > STILL * sizes[B[:, 0] != 0.0].sum())
+
+
+def definite_factor(M: Array, what: str) -> Array:
+    """Cholesky's L (n, n) of a mass matrix M, for an analysis that holds for positive definite ones only.
+
+    Raises
+    ------
+    NonFiniteError
+        M is not finite.
+    SingularMassMatrixError
+        M is not positive definite; ``what`` names the analysis.
+    """
+    if not np.isfinite(M).all():
+        raise NonFiniteError(f"{what}: the mass matrix is not finite")
+    try:
+        return np.asarray(np.linalg.cholesky(M))
+    except np.linalg.LinAlgError:
+        least = float(np.linalg.eigvalsh(correlated(M))[0])
+        size = "negative inertia" if least < -SINGULAR else "no inertia"
+        raise SingularMassMatrixError(
+            f"{what}: some motion has {size} behind it (smallest eigenvalue {least:.2g}), and the mass matrix must be "
+            "positive definite"
+        ) from None
 
 
 def indefinite_factor(matrix: Array, sizes: Array) -> tuple[Array, Array]:

@@ -160,3 +160,24 @@ def test_possible_bodies_keep_their_straight_line_code() -> None:
     m.revolute("A", m.ground, m.body("b", mass=1, com=(0.5, 0, 0), inertia=(1, 1, 2.5)))
     assert m.mechanism().negative == ()
     assert "indefinite" not in m.compile(target="numpy").metadata
+
+
+def test_other_calls_work_or_say_what_they_need() -> None:
+    """A run, the canonical form and its momenta; modes, which need a positive definite matrix, refuse."""
+    model = undamped(-0.2)
+    module = model.compile(target="numpy")
+    run = module.simulate(0.3, initial={"a": 0.4, "b": -0.7}, rtol=1e-10)
+    from scipy.integrate import solve_ivp
+
+    def rhs(t: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[2:], by_hand(-0.2, x)])
+
+    truth = solve_ivp(rhs, (0, 0.3), [0.4, -0.7, 0, 0], method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(run.x[:, -1], truth, rtol=1e-7, atol=1e-9)
+    with pytest.raises(eg.SingularMassMatrixError, match="modes: some motion has negative inertia behind it"):
+        module.modes([-np.pi / 2, 0, 0, 0])
+    canonical = model.compile(method="hamilton", target="numpy").canonical
+    x = np.array([0.4, -0.7, 1.0, 0.5])
+    z = canonical.of(x)
+    np.testing.assert_allclose(canonical.expand(z), x, atol=1e-12)
+    np.testing.assert_allclose(canonical.rhs(0.0, z)[:2], x[2:], atol=1e-12)

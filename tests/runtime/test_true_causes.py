@@ -67,3 +67,12 @@ def test_a_tree_without_mass_is_told_by_its_parameter() -> None:
         module = m.compile(target=target)
         with pytest.raises(eg.EomgenError, match="m_b is the mass of body 'b'|moving A meets no inertia"):
             module.bind(p={"m_b": 0.0}).rhs(0.0, [0.0, 0.0])
+
+
+def test_momenta_at_a_singularity_of_angles_name_the_angles() -> None:
+    m = eg.Model("ball", gravity=(0, 0, -9.81))
+    m.spherical("s", m.ground, m.body("b", mass=1, com=(0, 0, 1), inertia=(0.1, 0.1, 0.1)))
+    canonical = m.compile(method="hamilton", target="numpy").canonical
+    z = np.array([0.1, np.pi / 2, 0.2, 0, 0, 0])
+    with pytest.raises(eg.EvaluationError, match="the Euler angles of joint 's' are singular here"):
+        canonical.expand(z)
