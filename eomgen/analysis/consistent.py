@@ -87,7 +87,8 @@ def _metric(
             return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
-                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass"
+                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass, or "
+                "with negative inertia"
             ) from None
     factors = np.ones(layout.n_v)
     if isinstance(weights, Mapping):

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
 from ..limits.impacts import HELD, TOUCHING
+from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
 from ..runtime.signal_rates import drift, moving_inputs
@@ -221,7 +222,7 @@ def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[
                 f"{what} at the rate {rates[i]:.6g}, which drivers or constraints impose: no impulse changes it"
             )
     if B.shape[1]:
-        factor = np.linalg.cholesky(B.T @ M @ B)
+        factor = definite_factor(B.T @ M @ B, "an impact")
         H = np.where(fixed, 0.0, np.linalg.solve(factor, B.T @ rows.T))
         impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
         change = B @ np.linalg.solve(factor.T, z)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.statics import SYMMETRIC
+from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from .linearisation import Linearisation
 from .stability import symmetric_modes, uncertainty
@@ -117,7 +118,7 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     """Squares of the frequencies and mode shapes."""
     if not M.size:
         return np.zeros(0), np.zeros((0, 0))
-    factor = np.linalg.cholesky(M)
+    factor = definite_factor(M, "modes")
     inverse = np.linalg.inv(factor)
     reduced = inverse @ K @ inverse.T
     if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):

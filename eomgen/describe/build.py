@@ -97,7 +97,7 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    inertia_notes = check_bodies(bodies, joints, numbers, faults)
+    negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
@@ -127,6 +127,7 @@ def build(description: Description) -> Mechanism:
         lines=dict(description.lines),
         doc=doc,
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        negative=negative,
         notes=inertia_notes,
     )
 

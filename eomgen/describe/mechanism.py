@@ -215,6 +215,7 @@ class Mechanism:
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
     notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
 
     @property

@@ -9,6 +9,9 @@ from .rounding import ROUNDED
 SINGULAR = 1e-13
 #: The same relative to the largest diagonal entry: the square of SINGULAR and some, what rounding leaves of a zero.
 NOTHING = 1e-22
+#: Smallest pivot of an indefinite matrix relative to the terms it is the sum of: where it is small nothing bounds the
+#: entries that follow (those of a definite matrix never grow), so that half of the digits must be left.
+FAINT = 1e-8
 #: Least inertia of the only freedom relative to that of all it moves: the square of SINGULAR, since what should stand
 #: Still at a dead centre moves by rounding, and inertia has the square of that.
 STILL = 1e-26

@@ -108,6 +108,8 @@ class Kernels:
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            if layout.metadata.get("indefinite"):
+                return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
             if values[0] > SINGULAR:
                 return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])
