@@ -73,7 +73,9 @@ def plain() -> Any:
     return loop().equilibrium(GUESS)
 
 
-@pytest.mark.parametrize("clothes", CLOTHES)
+@pytest.mark.parametrize(
+    "clothes", [pytest.param(name, marks=pytest.mark.slow if name == "cython" else ()) for name in CLOTHES]
+)
 def test_a_loop_with_soft_and_stiff_springs(clothes: str, plain: Any) -> None:
     mod, first = loop(**CLOTHES[clothes]), plain
     other = mod.equilibrium(GUESS)
