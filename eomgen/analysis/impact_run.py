@@ -56,8 +56,9 @@ def run_with_impacts(
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
+    forcing.begin(start, end)
     run = _Run(bound, found, forcing, inputs, end, most, options)
-    return run.finish(run.travel(start, find_state(bound, initial, start)))
+    return run.finish(run.travel(start, find_state(bound, initial, start, forcing)))
 
 
 def _ending(module: Module) -> list[str]:

@@ -27,6 +27,7 @@ from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
+from .input_rates import add_rates
 from .joint_data import check_display
 from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
@@ -86,6 +87,7 @@ def build(description: Description) -> Mechanism:
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
     events = build_events(reader, sections["events"])
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))

@@ -9,6 +9,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
+from .input_names import rate_of
 from .sympy_face import lower_sympy, name_of
 from .sympy_forms import Forms
 
@@ -48,7 +49,8 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     except ExpressionError:  # the check of the model tells what is wrong
         return list(range(len(forms.motion))), False
     along = {names[name_of(x)]: rate for x, rate in zip(forms.q, slopes, strict=True)}
-    rows = [*jvp(configuration, along | {graph.symbol("t"): graph.one}), *motion]
+    along |= {graph.symbol(f): graph.symbol(rate_of(f)) for f in functions} | {graph.symbol("t"): graph.one}
+    rows = [*jvp(configuration, along), *motion]
     v = [names[name_of(x)] for x in forms.v]
     entries = jacobian(rows, v)
     constant = substitute(rows, dict.fromkeys(v, graph.zero))

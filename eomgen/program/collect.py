@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from ..describe.input_names import chains, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -14,7 +15,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
-from ..graph.substitute import substitute
+from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
@@ -79,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         turned=equations.turned,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        input_rates=tuple(_rate_pairs(kinematics)),
         impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
         canonical=equations.canonical,
@@ -247,6 +249,8 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             else {}
         ),
         **_signals(kinematics, equations),
+        **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
+        **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,
@@ -275,6 +279,30 @@ def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]
         "signals": {name: list(record_tape([x], places.__getitem__)) for name, x in found.items()},
         "signal_slopes": slopes,
     }
+
+
+def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
+    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order."""
+    found = chains(kinematics.input_names)
+    rates = {rate for of in found.values() for rate in of}
+    return {
+        name: [(rate, split_rate(rate)[1] - split_rate(name)[1]) for rate in of]
+        for name, of in found.items()
+        if name not in rates
+    }
+
+
+def _rate_pairs(kinematics: Kinematics) -> list[tuple[str, str]]:
+    """Inputs with the input that is their rate."""
+    found = chains(kinematics.input_names)
+    return [(name, of[0]) for name, of in found.items() if split_rate(of[0])[1] == split_rate(name)[1] + 1]
+
+
+def _constraint_inputs(kinematics: Kinematics) -> list[str]:
+    """Inputs on which the constraints depend."""
+    c = kinematics.constraints
+    used = symbols_of([*c.values, *c.velocity])
+    return [name for name in kinematics.input_names if name in used]
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:

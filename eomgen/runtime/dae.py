@@ -103,13 +103,13 @@ class Dae:
         Rates of multipliers and corrections, which F does not hold, are 0.
         """
         module, layout = self._module, self._layout
-        x = module.x0(t=t) if x is None else module.project(x, t=t)
+        x = module.x0(t=t, u=u) if x is None else module.project(x, t=t, u=u)
         rates = module.rhs(t, x, u=u)
         y, yp = np.zeros(self.n_y), np.zeros(self.n_y)
         y[: layout.n_x], yp[: layout.n_x] = x, rates
         if len(layout.rows):
             q, v, a = x[: layout.n_q], x[layout.n_q :], rates[layout.n_q :]
-            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))[layout.rows]
+            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, u=u, rows="all"))[layout.rows]
             force = layout.scales.q * module.inverse_dynamics(q, v, a, t=t, u=u)
             l = np.linalg.lstsq(J.T, -force, rcond=None)[0]
             y[layout.n_x : layout.n_x + len(l)] = l / layout.scales.c[layout.rows]

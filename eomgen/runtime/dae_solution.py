@@ -54,7 +54,8 @@ def integrate_dae(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     watched = Events(module.layout, events)
-    x0 = find_state(bound, initial, start)
+    forcing.begin(start, end)
+    x0 = find_state(bound, initial, start, forcing)
     times = None if t_eval is None else ordered_times(t_eval, start, end)
     run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
@@ -129,6 +130,7 @@ class _Run:
     def _part(self, t: float, x: Array, end: float, jumped: bool) -> tuple[float, Array, list[int]]:
         """Integrate to an event, or to the end of this part; the time and state there, and what happened."""
         form, forcing, n_x = self.module.dae, self.forcing, self.module.n_x
+        forcing.enter(t, end)
         y, yp = form.initial(x, t, forcing(t, x))
         nodes = np.array([t, end])
         asked = np.empty(0)

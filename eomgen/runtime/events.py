@@ -174,12 +174,12 @@ class Events:
                 for (event, place), value in zip(self.layout.metadata["resets"], values, strict=True):
                     if event == i:
                         after[place] = value
-                after = np.asarray(module.project(after, t=t))
+                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             from ..analysis.impact import strike_events
 
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after))
+            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:

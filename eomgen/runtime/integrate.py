@@ -122,6 +122,7 @@ def integrate(
     options: dict[str, Any],
     pace: Pace,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
+    enter: Callable[[float, float], None] | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
 
@@ -145,6 +146,8 @@ def integrate(
     resets = Resets(events, rhs, nodes[0], nodes[-1])
     while True:
         span, last = (start, nodes[k + 1]), k == len(nodes) - 2
+        if enter is not None:
+            enter(nodes[k], nodes[k + 1])
         asked = None if t_eval is None else _between(t_eval, span, last)
         if asked is not None and resets.count and asked.size and asked[0] == start:  # stored before the reset
             asked = asked[1:]

@@ -85,14 +85,14 @@ class Kernels:
             return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
-    def _poses(self, q: Array, t: float) -> Array:
-        return self.state("poses", nan=True)(q, t=t)
+    def _poses(self, q: Array, t: float, p: Array | None = None) -> Array:
+        return self.state("poses", nan=True)(q, t=t, p=p)
 
-    def _culprit(self, status: int, t: float, x: Array) -> str:
-        """Names what a failure at a state is due to, as far as it can be told."""
+    def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
+        """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
         layout, q = self.layout, x[: self.layout.n_q]
         if status == 1 and layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
-            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
+            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
             bad = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
             return (
                 f"the loads of {bad} are not (ends that meet or lie inside the cylinder, or a law outside its domain)"
@@ -100,7 +100,7 @@ class Kernels:
                 else ""
             )
         if status == 2:
-            M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
+            M = self.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
@@ -112,7 +112,7 @@ class Kernels:
             moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
             return f"moving {moving} meets no inertia (smallest eigenvalue {values[0]:.2g})"
         if status == 3:
-            e = self.state("constraints", nan=True)(q, t=t)
+            e = self.state("constraints", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(e).all() or not e.size:
                 return ""
             worst = int(np.abs(layout.scales.residual(e)).argmax())

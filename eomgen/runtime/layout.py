@@ -73,6 +73,13 @@ class Layout:
         self.n_resets: int = data.get("n_resets", 0)
         self.n_strike: int = data.get("n_strike", 0)
         self.n_e = len(self.fragile_forces)
+        #: inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order
+        self.input_rates: dict[str, list[tuple[str, int]]] = {
+            name: [(str(rate), int(times)) for rate, times in rates]
+            for name, rates in data.get("input_rates", {}).items()
+        }
+        #: places in u of the inputs on which constraints depend
+        self.constraint_inputs = [self.u.index(name) for name in data.get("constraint_inputs", ())]
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof

@@ -143,7 +143,9 @@ def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array 
         context = module.kernels.context
         status, result = core.march(context, t, h, x, u, out)
         if status != 0:
-            module.kernels.fail("rhs", status, t, np.array(x, dtype=float))
+            module.kernels.fail(
+                "rhs", status, t, np.array(x, dtype=float), None, None if u is None else np.array(u, dtype=float)
+            )
         return np.asarray(result)
     start = np.array(x, dtype=float)
     k = [module.rhs(t, start, u=u)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,6 +63,43 @@ class Formula:
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
         self._evaluate = compile_evaluator([self.expression], known)
 
+    @cached_property
+    def branches(self) -> bool:
+        """Whether it has conditions, at which it may jump or bend."""
+        from ..graph.traverse import reachable
+
+        graph = self.expression.graph
+        return any(graph.nodes[i][0] in BRANCHING for i in reachable(graph, [self.expression.id]))
+
+    def derivative(self, name: str, rate: str) -> Formula:
+        """The derivative by time along the motion, of an input that is called ``name``.
+
+        Raises
+        ------
+        UsageError
+            It would need accelerations.
+        """
+        from ..graph.differentiate import jvp
+        from ..graph.evaluate import compile_evaluator
+        from ..graph.substitute import symbols_of
+
+        layout, graph = self.layout, self.expression.graph
+        moving = dict(zip(layout.freedoms, layout.v, strict=True))
+        states = sorted(symbols_of([self.expression]) & set(layout.x))
+        for state in states:
+            if state not in layout.q or state not in moving:
+                raise UsageError(
+                    f"input {name}: the equations need its rate {rate}, and that of {self.text!r} depends on the rate "
+                    f"of {state}, which is an acceleration; write {name} in t and parameters, or give {rate} beside it"
+                )
+        along = {graph.symbol(q): graph.symbol(moving[q]) for q in states}
+        other = object.__new__(type(self))
+        other.layout, other.text = layout, f"d/dt ({self.text})"
+        other.expression = jvp([self.expression], {graph.symbol("t"): graph.one, **along})[0]
+        other.depends_on_state = not symbols_of([other.expression]).isdisjoint(layout.x)
+        other._evaluate = compile_evaluator([other.expression], ("t", *layout.x, *layout.p))
+        return other
+
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
         evaluate, values = self._evaluate, p.tolist()
@@ -108,6 +146,7 @@ class DeclaredSignal:
         self.tape = _tape(tape)
         self.places, self.derived = [int(k) for k in slopes[0]], _tape(slopes[1])
         self.depends_on_state = any(op == "x" for op, *_ in self.tape[0])
+        self.branches = not {op for op, *_ in self.tape[0]}.isdisjoint(BRANCHING)
 
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
@@ -199,6 +238,10 @@ BEYOND: dict[str, Callable[[float, float, float], float]] = {
     name: _one(getattr(np, name.replace("asin", "arcsin").replace("acos", "arccos")))
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "sinh", "cosh")
 }
+
+
+#: Operations at which an expression may jump or bend.
+BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
 
 
 def is_formula(value: Any) -> bool:
