@@ -220,7 +220,8 @@ class Saltation:
                 continue
             value, gradient = float(event.function(t, x)), self._gradient(t, x, index)
             rate = self._rate(t, x, index, f, self.names[other])
-            if (event.action == WAIT and rate > 0.0) or event.direction * rate < 0.0:
+            onward = rate if self.span[1] >= self.span[0] else -rate
+            if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:
                 continue  # it has just happened, and leaves
             near = max(self._error(x, gradient), abs(rate) * INSTANT * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
