@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..describe.input_names import chains, split_rate
+from ..describe.input_names import split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -282,14 +282,23 @@ def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]
 
 
 def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
-    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order."""
-    found = chains(kinematics.input_names)
-    rates = {rate for of in found.values() for rate in of}
-    return {
-        name: [(rate, split_rate(rate)[1] - split_rate(name)[1]) for rate in of]
-        for name, of in found.items()
-        if name not in rates
-    }
+    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order.
+
+    Also of what stands in the equations by its rates only, such as the lift of a pivot by its acceleration.
+    """
+    known = {*kinematics.names, *kinematics.velocity_names, *kinematics.parameter_names}
+    known |= {output.name for output in kinematics.mechanism.outputs}
+    orders: dict[str, list[tuple[str, int]]] = {}
+    for name in kinematics.input_names:
+        stem, order = split_rate(name)
+        orders.setdefault(stem, []).append((name, order))
+    found: dict[str, list[tuple[str, int]]] = {}
+    for stem, of in orders.items():
+        of.sort(key=lambda pair: pair[1])
+        (first, lowest), rest = (of[0], of[1:]) if of[0][1] == 0 or stem in known else ((stem, 0), of)
+        if rest:
+            found[first] = [(name, order - lowest) for name, order in rest]
+    return found
 
 
 def _rate_pairs(kinematics: Kinematics) -> list[tuple[str, str]]:

@@ -73,7 +73,8 @@ class Layout:
         self.n_resets: int = data.get("n_resets", 0)
         self.n_strike: int = data.get("n_strike", 0)
         self.n_e = len(self.fragile_forces)
-        #: inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order
+        #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
+        #: itself, or stands in the equations by its rates only.
         self.input_rates: dict[str, list[tuple[str, int]]] = {
             name: [(str(rate), int(times)) for rate, times in rates]
             for name, rates in data.get("input_rates", {}).items()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ import sympy as sp
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 
 import eomgen as eg
+from eomgen.pipeline import generate
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 th, th_dot, l, x, y, x_dot, y_dot = sp.symbols("th th_dot l x y x_dot y_dot")
@@ -141,6 +145,14 @@ def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[
     assert all(word in str(caught.value) for word in words[words[0] == "L" :])
 
 
+def test_a_rate_without_its_input_is_refused(ring: Any) -> None:
+    for given in (0.5, "t", ([0.0, 1.0], [0.0, 1.0])):
+        with pytest.raises(eg.UsageError, match="input l_dot is the rate of l, which is held; give l as well"):
+            ring.simulate(1.0, START, inputs={"l_dot": given})
+    run = ring.simulate(1.0, {"x": 0.6, "x_dot": -0.4}, inputs={"l_dot": 0.0}, **TIGHT)
+    assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
+
+
 def test_a_text_may_bend_where_one_rate_is_enough(winch: Any) -> None:
     run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + max(0, t - 0.25)"}, **TIGHT)
     assert abs(run["th_dot"][-1] - 1.0 / 1.75**2) < 1e-8
@@ -237,3 +249,11 @@ def test_inputs_that_move_everything_are_integrated() -> None:
     assert np.abs(run["x_ddot"] - 6.0 * run.t).max() < 1e-9
     with pytest.raises(eg.UsageError, match="leave method= out"):
         mod.simulate(1.0, inputs={"l": "t**3"}, method="kinematic")
+
+
+def test_an_exported_package_takes_the_rates_of_tables(tmp_path: Path) -> None:
+    m = eg.Model.from_lagrangian("reel", l**2 * th_dot**2 / 2, [th], inputs={l: 1.0})
+    generate(m, tmp_path, target="numpy")
+    code = "import reel; print(reel.simulate(1.0, {'th_dot': 1.0}, inputs={'l': ([0, 1], [1, 2])})['th_dot'][-1])"
+    found = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert abs(float(found.stdout) - 0.25) < 1e-8
