@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..describe.input_names import split_rate
+from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -303,8 +303,8 @@ def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
 
 def _rate_pairs(kinematics: Kinematics) -> list[tuple[str, str]]:
     """Inputs with the input that is their rate."""
-    found = chains(kinematics.input_names)
-    return [(name, of[0]) for name, of in found.items() if split_rate(of[0])[1] == split_rate(name)[1] + 1]
+    names = kinematics.input_names
+    return [(name, rate_of(name)) for name in names if rate_of(name) in names]
 
 
 def _constraint_inputs(kinematics: Kinematics) -> list[str]:

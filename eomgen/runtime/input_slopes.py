@@ -40,7 +40,7 @@ class InputSlopes:
         self.layout = layout
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
         self.forcing = forcing
-        chains = ((layout.u.index(name), of[0]) for name, of in layout.input_rates.items())
+        chains = ((layout.u.index(name), of[0]) for name, of in layout.input_rates.items() if name in layout.u)
         self.rates = {i: layout.u.index(rate) for i, (rate, times) in chains if times == 1}
         self.tables: dict[int, TableRate] = {}
         self.functions: set[int] = set()
