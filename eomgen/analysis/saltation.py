@@ -121,7 +121,7 @@ class Saltation:
         layout = self.module.layout
         by_u = self._gradient(t, x, index)[0, self.n + 1 : self.n + 1 + layout.n_u]
         for j in np.flatnonzero(by_u):
-            if j in self.run.forcing.varying:
+            if j in self.run.forcing.varying and layout.u[j] not in layout.input_rates:
                 raise NoDerivativeError(
                     f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
                     "derivative of such an impact is not derived; write the motion into the gap's expression"
@@ -191,7 +191,7 @@ class Saltation:
     def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
         """A state and its derivatives, brought onto the constraints."""
         module, forcing = self.module, self.run.forcing
-        x = np.asarray(module.project(x, t=t))
+        x = np.asarray(module.project(x, t=t, u=forcing(t, x)))
         slopes = self.run.inputs(t, x) if forcing else None
         return x, keep_consistent(module.bind(u=forcing(t, x)), t, x, S, self.run.columns, slopes)
 
@@ -217,7 +217,8 @@ class Saltation:
                 continue
             value, gradient = float(event.function(t, x)), self._gradient(t, x, index)
             rate = self._rate(t, x, index, f, self.names[other])
-            if (event.action == WAIT and rate > 0.0) or event.direction * rate < 0.0:
+            onward = rate if self.span[1] >= self.span[0] else -rate
+            if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:
                 continue  # it has just happened, and leaves
             near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:

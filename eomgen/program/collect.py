@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..describe.input_names import split_rate
+from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -80,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         turned=equations.turned,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        input_rates=tuple(_rate_pairs(kinematics)),
         impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
         canonical=equations.canonical,
@@ -297,6 +298,12 @@ def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
         if rest:
             found[first] = [(name, order - lowest) for name, order in rest]
     return found
+
+
+def _rate_pairs(kinematics: Kinematics) -> list[tuple[str, str]]:
+    """Inputs with the input that is their rate."""
+    names = kinematics.input_names
+    return [(name, rate_of(name)) for name in names if rate_of(name) in names]
 
 
 def _constraint_inputs(kinematics: Kinematics) -> list[str]:

@@ -172,7 +172,7 @@ class Forcing:
             values[name] = value
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in values:
-                values[name] = DeclaredSignal(tape, layout.metadata.get("signal_slopes", {})[name])
+                values[name] = DeclaredSignal(tape, layout.metadata["signal_slopes"][name])
         for name, value in values.items():
             if name not in layout.u:
                 continue  # only its rates stand in the equations
