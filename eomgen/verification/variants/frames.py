@@ -1,0 +1,249 @@
+"""Stage verification, frames: every body's own frame, and ground, turned and shifted at random.
+
+The old frame of a body stays as a marker of it, so that references keep their meaning; what is given in body axes
+(centre of mass, inertia, solids, points, markers) is written in the new axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...describe.description import GROUND_NAME, Description, Entry, items
+from ...describe.fields import INERTIA
+from .texts import is_zero, markers_of, names_of, negative, number_of, product, rewritten, scaled, total
+from .variant import Variant
+from .visit import Slot, Visitor, bodies_of, copied, visit
+
+WAS = "old_frame"  #: the marker that a body's former frame becomes
+_PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+_KINDS = (("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az"))
+_KINDS += (("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot"))
+
+
+def random_turn(random: Any) -> Any:
+    """A turn of any angle about any axis."""
+    quaternion = random.normal(size=4)
+    return matrix_of(quaternion / np.linalg.norm(quaternion))
+
+
+def matrix_of(e: Any) -> Any:
+    """The rotation of Euler parameters, e0 first."""
+    a, b, c, d = e
+    return np.array(
+        [
+            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
+            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
+            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
+        ]
+    )
+
+
+def rpy_of(turn: Any) -> list[float]:
+    """Roll, pitch, yaw of a rotation."""
+    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
+    if np.hypot(turn[0, 0], turn[1, 0]) < 1e-9:  # only the difference of roll and yaw is known: yaw is 0
+        return [float(np.arctan2(-turn[1, 2], turn[1, 1])), float(pitch), 0.0]
+    return [float(np.arctan2(turn[2, 1], turn[2, 2])), float(pitch), float(np.arctan2(turn[1, 0], turn[0, 0]))]
+
+
+def turn_of(rpy: Sequence[float]) -> Any:
+    """The rotation of roll, pitch, yaw, right angles exact."""
+    (cr, sr), (cp, sp), (cy, sy) = (_circle(angle) for angle in rpy)
+    x, y, z = ([[1, 0, 0], [0, cr, -sr], [0, sr, cr]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
+               [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])  # fmt: skip
+    return np.array(z, dtype=float) @ np.array(y, dtype=float) @ np.array(x, dtype=float)
+
+
+def _circle(angle: float) -> tuple[float, float]:
+    quarter = round(angle / (np.pi / 2))
+    if abs(angle - quarter * np.pi / 2) <= 1e-15 * max(1, abs(quarter)):
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
+    return float(np.cos(angle)), float(np.sin(angle))
+
+
+def values_of(description: Description) -> dict[str, float]:
+    """Declared values of parameters, texts such as ``pi/10`` evaluated."""
+    return {
+        entry.name: number_of(entry.values["value"], {})
+        for entry in description.sections["parameters"]
+        if entry.values.get("value") is not None
+    }
+
+
+class Placement:
+    """The new frame of one body: new coordinates = turn old + shift."""
+
+    def __init__(self, turn: Any, shift: Any, parameters: Mapping[str, float]) -> None:
+        self.turn, self.shift, self.parameters = np.asarray(turn, dtype=float), np.asarray(shift, dtype=float), parameters
+
+    def point(self, at: Sequence[Any]) -> list[Any]:
+        """A point, entries numbers or texts."""
+        return [total([*row, 1.0], [*at, float(d)]) for row, d in zip(self.turn.tolist(), self.shift, strict=True)]
+
+    def vector(self, value: Sequence[Any]) -> list[Any]:
+        """A direction or a vector."""
+        return [total(row, value) for row in self.turn.tolist()]
+
+    def angles(self, rpy: Sequence[Any]) -> list[float]:
+        """Roll, pitch, yaw; parameters in them are taken at their declared values."""
+        return rpy_of(self.turn @ turn_of([number_of(x, self.parameters) for x in rpy]))
+
+    def tensor(self, rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+        """A symmetric tensor, R I R^T; the lower triangle is the mirror image of the upper."""
+        flat = [x for row in rows for x in row]
+        made = [[total([*np.outer(a, b).ravel().tolist()], flat) for b in self.turn] for a in self.turn]
+        return [[made[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
+
+
+class _Moved(Visitor):
+    """References and placements of bodies whose frames have moved."""
+
+    def __init__(self, places: Mapping[str, Placement]) -> None:
+        self.places = places
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        def locate(quantity: str, marker: str) -> str:
+            return f"{quantity}({marker}.{WAS})" if marker in self.places else f"{quantity}({marker})"
+
+        return rewritten(value, lambda name: name, locate)
+
+    def marker(self, reference: Any, slot: Slot) -> Any:
+        if isinstance(reference, str):
+            return f"{reference}.{WAS}" if reference in self.places else reference
+        return super().marker(reference, slot)
+
+    def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
+        place = self.places.get(body)
+        if place is None:
+            return dict(placed)
+        at, rpy = placed.get("at", [0, 0, 0]), placed.get("rpy", [0, 0, 0])
+        moved = {"at": place.point(at), "rpy": place.angles(rpy)}
+        return moved if "rpy" in placed else {"at": moved["at"]}
+
+
+def turn_bodies(description: Description, random: Any) -> Variant:
+    """Every body's frame turned and shifted."""
+    parameters, size = values_of(description), length_of(description)
+    places = {
+        entry.name: Placement(random_turn(random), size * random.uniform(-0.5, 0.5, 3), parameters)
+        for entry in bodies_of(description)
+    }
+    made = visit(description, _Moved(places))
+    for entry in bodies_of(made):
+        _turn_body(entry, places[entry.name])
+    return Variant(made)
+
+
+def _turn_body(entry: Entry, place: Placement) -> None:
+    values = entry.values
+    values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
+    solids = "solids" in values or ("points" in values and "mass" not in values)
+    if "first_moment" in values:
+        moved = [product(values["mass"], float(d)) for d in place.shift]
+        values["first_moment"] = [total([1.0, 1.0], pair) for pair in zip(place.vector(values["first_moment"]), moved, strict=True)]
+    elif not solids:
+        values["com"] = place.point(values.get("com", [0, 0, 0]))
+    about = values.get("about", "com")
+    if isinstance(about, str) and about not in ("com", "origin"):
+        return  # a marker, whose axes count
+    if not isinstance(about, str):
+        values["about"] = place.point(about)
+    elif about == "origin":
+        values["about"] = place.point([0, 0, 0])
+    if "principal" in values or "axes" in values or _one_moment(values.get("inertia")):
+        if "principal" in values or "inertia" in values:
+            values["axes"] = place.angles(values.get("axes", [0, 0, 0]))
+    elif "inertia" in values:
+        values["inertia"] = place.tensor(tensor_of(values["inertia"]))
+
+
+def _one_moment(inertia: Any) -> bool:
+    """Whether a moment about one axis alone is given, as of a planar body: no tensor of a body has but one."""
+    return inertia is not None and sum(not is_zero(x) for row in tensor_of(inertia) for x in row) == 1
+
+
+def tensor_of(given: Any) -> list[list[Any]]:
+    """An inertia as a full tensor."""
+    if isinstance(given, Mapping):
+        full = [[0.0] * 3 for _ in range(3)]
+        for name in INERTIA:
+            i, j = _PAIRS[name]
+            full[i][j] = full[j][i] = given.get(name, 0.0)
+        return full
+    if any(items(row) is not None for row in given):
+        return [list(row) for row in given]
+    return [[given[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+
+
+def turn_ground(description: Description, random: Any) -> Variant:
+    """Ground turned and shifted: gravity, markers of ground, and whatever is written in ground axes follow.
+
+    Where an angle about the vertical z of ground is measured, the turn keeps z, and a constant comes off the angle.
+    """
+    texts: set[tuple[str, str]] = set()
+
+    class Seen(Visitor):
+        def scalar(self, value: Any, slot: Slot) -> Any:
+            if isinstance(value, str):
+                texts.update(markers_of(value))
+            return value
+
+    visit(description, Seen())
+    level = any(quantity == "angle" for quantity, _ in texts)
+    yaw = 0.0 if level else None
+    turn = turn_of([0.0, 0.0, yaw]) if yaw is not None else random_turn(random)
+    place = Placement(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
+    made = visit(copied(description), _Ground(place))
+    ground = next((entry for entry in made.sections["bodies"] if entry.name == GROUND_NAME), None)
+    if ground is not None:
+        ground.values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
+    return Variant(made, turn=place.turn)
+
+
+class _Ground(_Moved):
+    """What refers to ground, or is written in its axes."""
+
+    def __init__(self, place: Placement) -> None:
+        super().__init__({GROUND_NAME: place})
+        self.place = place
+
+    def vector(self, value: Any, slot: Slot) -> Any:
+        result = super().vector(value, slot)
+        if not isinstance(value, list):
+            return result
+        load = slot.section == "forces" and slot.key == "value" and slot.entry is not None
+        if load and slot.entry is not None and slot.entry.values.get("axes", "ground") == "ground":
+            return self.place.vector(result)
+        return self.place.vector(result) if slot.key == "gravity" else result
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        def locate(quantity: str, marker: str) -> str:
+            marker = f"{marker}.{WAS}" if marker == GROUND_NAME else marker
+            for names in _KINDS:
+                if quantity in names:
+                    column = self.place.turn[:, names.index(quantity)]
+                    shift = self.place.shift if quantity in _KINDS[0] else np.zeros(3)
+                    parts = [scaled(f"{q}({marker})", float(c)) for q, c in zip(names, column, strict=True)]
+                    return "(" + " + ".join([*parts, repr(-float(column @ shift))]) + ")"
+            return f"{quantity}({marker})"
+
+        return rewritten(value, lambda name: name, locate)
+
+
+def length_of(description: Description) -> float:
+    """A length of the order of the mechanism's: the largest distance of a marker from its body's origin."""
+    parameters, found = values_of(description), [0.0]
+
+    class Note(Visitor):
+        def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
+            found.append(float(np.linalg.norm([number_of(x, parameters) for x in placed.get("at", (0, 0, 0))])))
+            return dict(placed)
+
+    visit(description, Note())
+    return max(found) or 1.0
+
+
+__all__ = ["negative", "names_of", "turn_bodies", "turn_ground"]

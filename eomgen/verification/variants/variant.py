@@ -1,0 +1,207 @@
+"""Stage verification, variants: a description in other clothes, and how its states and results are read as the original's.
+
+Every change keeps the meaning of all outputs, so results are compared by outputs alone: the probes on every body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from typing import Any
+
+import numpy as np
+
+from ...describe.build_cam_points import needs_point
+from ...describe.build_joints import coordinate_names
+from ...describe.description import GROUND_NAME, Description
+from ...joints import JOINTS
+from ...records import dataclass
+from .texts import names_of
+from .visit import Visitor, bodies_of, copied, visit
+
+#: Coordinates and velocities by name -> those of the variant by name.
+States = Callable[[Mapping[str, float]], dict[str, float]]
+
+
+class NotApplicable(Exception):
+    """The change has no meaning for this model; the text says why."""
+
+
+def unchanged(values: Mapping[str, float]) -> dict[str, float]:
+    """The same coordinates."""
+    return dict(values)
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units of a variant: how many of its units one SI unit is."""
+
+    length: float = 1.0
+    mass: float = 1.0
+    time: float = 1.0
+
+    @property
+    def force(self) -> float:
+        """Units of force in one newton."""
+        return self.mass * self.length / self.time**2
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The same physics in other clothes.
+
+    Attributes
+    ----------
+    description : Description
+    state : callable
+        Named coordinates and velocities of the original -> those of the variant.
+    outputs, parameters, inputs, joints : mapping
+        Name in the original -> name here, where they differ; joints that are no longer there are mapped to "".
+    turn : (3, 3) array
+        Takes ground axes of the original to those here.
+    scales : Scales
+        Units here.
+    """
+
+    description: Description
+    state: States = unchanged
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    joints: Mapping[str, str] = field(default_factory=dict)
+    turn: Any = None
+    scales: Scales = Scales()
+
+    def then(self, change: Callable[[Description, Any], Variant], random: Any) -> Variant:
+        """This variant, changed once more."""
+        next_one = change(self.description, random)
+        own, a, b = self.state, self.scales, next_one.scales
+
+        def state(values: Mapping[str, float]) -> dict[str, float]:
+            return next_one.state(own(values))
+
+        first, second = (np.eye(3) if t is None else t for t in (self.turn, next_one.turn))
+        return Variant(
+            next_one.description,
+            state,
+            *(
+                _chained(getattr(self, key), getattr(next_one, key))
+                for key in ("outputs", "parameters", "inputs", "joints")
+            ),
+            turn=second @ first,
+            scales=Scales(a.length * b.length, a.mass * b.mass, a.time * b.time),
+        )
+
+
+def _chained(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, str]:
+    result = {name: second.get(new, new) for name, new in first.items()}
+    taken = set(first.values())
+    return result | {name: new for name, new in second.items() if name not in first and name not in taken}
+
+
+def coordinates_of(description: Description) -> dict[str, tuple[str, ...]]:
+    """Names of the coordinates of every joint."""
+    return {
+        entry.name: tuple(map(str, coordinate_names(entry.values["type"], entry.name, entry.values, sketch_of(entry.values))[0]))
+        for entry in description.sections["joints"]
+    }
+
+
+def kinds_of(description: Description) -> dict[str, str]:
+    """Coordinate -> 'angle', 'length' or 'parameter'; those of contact points of cams among them."""
+    result: dict[str, str] = {}
+    names = coordinates_of(description)
+    for entry in description.sections["joints"]:
+        joint = sketch_of(entry.values)
+        result |= {name: c.kind for name, c in zip(names[entry.name], joint.coordinates, strict=True)}
+    for entry in description.sections["constraints"]:
+        if needs_point(entry.values):
+            result[str(entry.values.get("coordinate") or f"{entry.name}_contact")] = "angle"
+    return result
+
+
+def velocities_of(description: Description) -> dict[str, str]:
+    """Velocity -> 'angle' or 'length'."""
+    result: dict[str, str] = {}
+    names = coordinates_of(description)
+    for entry in description.sections["joints"]:
+        for v in sketch_of(entry.values).velocities:
+            name = entry.name + v.suffix if v.of is None else names[entry.name][v.of] + "_dot"
+            result[name] = v.kind
+    for name, kind in kinds_of(description).items():
+        if name + "_dot" not in result and kind == "angle":
+            result[name + "_dot"] = kind
+    return result
+
+
+def sketch_of(values: Mapping[str, Any]) -> Any:
+    """The joint of an entry, without its expressions."""
+    kind = JOINTS[values["type"]]
+    own = {key: values[key] for key in kind.options if key in ("sequence", "rotation") and key in values}
+    rest = {key: None for key in kind.options if key not in ("sequence", "rotation")}
+    return kind(**own, **rest)
+
+
+#: Motion of a probe: outputs of the group, by suffix.
+LINEAR = ("ax", "ay", "az")
+ANGULAR = ("wx_dot", "wy_dot", "wz_dot")
+SPEED, PLACE, SPIN = ("vx", "vy", "vz"), ("x", "y", "z"), ("wx", "wy", "wz")
+MARK = "probe_of_body"
+
+
+def with_probes(description: Description) -> tuple[Description, dict[str, str]]:
+    """A description with a probe at every body's centre of mass (its origin where that is not given), and its outputs.
+
+    Returns
+    -------
+    description
+    kinds : dict
+        Output -> what it is: the quantity of a probe, an energy, ``coordinate NAME``, ``velocity NAME``, or ``result``
+        for the model's own.
+    """
+    made, kinds = copied(description), dict[str, str]()
+    for entry in made.sections["outputs"]:  # an output that bears a coordinate's name could be that coordinate only
+        kinds[f"result_{entry.name}"] = "result"
+        entry.name = f"result_{entry.name}"
+    for number, entry in enumerate(bodies_of(made)):
+        entry.values["markers"][MARK] = {"at": list(entry.values.get("com", (0, 0, 0))), "rpy": [0, 0, 0]}
+        for quantity in (*LINEAR, *ANGULAR, *SPEED, *PLACE, *SPIN):
+            name = f"probe_{number}_{quantity}"
+            made.add("outputs", name, {"expression": f"{quantity}({entry.name}.{MARK})"})
+            kinds[name] = quantity
+    if bodies_of(made):
+        for energy in ("kinetic_energy", "potential_energy"):
+            made.add("outputs", f"probe_{energy}", {"expression": energy})
+            kinds[f"probe_{energy}"] = energy
+    for what, names in (("coordinate", kinds_of(made)), ("velocity", velocities_of(made))):
+        for number, name in enumerate(names):
+            made.add("outputs", f"probe_{what}_{number}", {"expression": name})
+            kinds[f"probe_{what}_{number}"] = f"{what} {name}"
+    return made, kinds
+
+
+def referred_joints(description: Description) -> set[str]:
+    """Joints and coordinates that forces, constraints or texts refer to by name, initial values aside."""
+    found: set[str] = set()
+
+    class Note(Visitor):
+        def scalar(self, value: Any, slot: Any) -> Any:
+            if slot.section != "outputs" and isinstance(value, str):
+                found.update(names_of(value))
+            return value
+
+        def coordinate(self, name: str) -> str:
+            found.add(name)
+            return name
+
+    bare = Description(values={k: v for k, v in description.values.items() if k not in ("initial", "guess", "independent")})
+    for section in ("forces", "constraints", "events", "inputs"):
+        bare.sections[section] = description.sections[section]
+    visit(bare, Note())
+    return found
+
+
+__all__ = [
+    "ANGULAR", "GROUND_NAME", "LINEAR", "MARK", "PLACE", "SPEED", "SPIN", "NotApplicable", "Scales", "States",
+    "Variant", "coordinates_of", "kinds_of", "referred_joints", "unchanged", "velocities_of", "with_probes",
+]  # fmt: skip
