@@ -5,7 +5,7 @@ Every change keeps the meaning of all outputs, so results are compared by output
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from ...describe.build_cam_points import needs_point
 from ...describe.build_joints import coordinate_names
-from ...describe.description import GROUND_NAME, Description
+from ...describe.description import Description, Entry
 from ...joints import JOINTS
 from ...records import dataclass
 from .texts import names_of
-from .visit import Visitor, bodies_of, copied, visit
+from .visit import Slot, Visitor, bodies_of, copied, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
 States = Callable[[Mapping[str, float]], dict[str, float]]
@@ -180,28 +180,48 @@ def with_probes(description: Description) -> tuple[Description, dict[str, str]]:
     return made, kinds
 
 
-def referred_joints(description: Description) -> set[str]:
-    """Joints and coordinates that forces, constraints or texts refer to by name, initial values aside."""
-    found: set[str] = set()
+class References(Visitor):
+    """Notes which names a description's keys and texts refer to, outputs and initial values aside."""
 
-    class Note(Visitor):
-        def scalar(self, value: Any, slot: Any) -> Any:
-            if slot.section != "outputs" and isinstance(value, str):
-                found.update(names_of(value))
-            return value
+    def __init__(self, description: Description) -> None:
+        self.keys: set[str] = set()
+        self.texts: set[str] = set()
+        bare = Description()
+        for section in ("forces", "constraints", "events", "inputs"):
+            bare.sections[section] = description.sections[section]
+        visit(bare, self)
 
-        def coordinate(self, name: str) -> str:
-            found.add(name)
-            return name
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        self.texts |= names_of(value)
+        return value
 
-    bare = Description(values={k: v for k, v in description.values.items() if k not in ("initial", "guess", "independent")})
-    for section in ("forces", "constraints", "events", "inputs"):
-        bare.sections[section] = description.sections[section]
-    visit(bare, Note())
-    return found
+    def coordinate(self, name: str) -> str:
+        self.keys.add(name)
+        return name
+
+    def to(self, names: Iterable[str]) -> bool:
+        """Whether any of these coordinates, or a rate of one, is referred to."""
+        found = self.keys | self.texts
+        return any(name + suffix in found for name in names for suffix in ("", "_dot", "_ddot"))
+
+
+def drop(description: Description, names: Iterable[str]) -> None:
+    """Take coordinates that are no longer there out of outputs, initial values and the choice of independent ones."""
+    gone = {name + suffix for name in names for suffix in ("", "_dot", "_ddot")}
+    outputs = description.sections["outputs"]
+    description.sections["outputs"] = [e for e in outputs if not names_of(e.values["expression"]) & gone]
+    values = description.values
+    for key in ("initial", "guess"):
+        values[key] = {name: value for name, value in values.get(key, {}).items() if name not in gone}
+    values["independent"] = [name for name in values.get("independent", ()) if name not in gone]
+
+
+def entry_of(description: Description, section: str, name: str) -> Entry:
+    """The entry of a name."""
+    return next(entry for entry in description.sections[section] if entry.name == name)
 
 
 __all__ = [
-    "ANGULAR", "GROUND_NAME", "LINEAR", "MARK", "PLACE", "SPEED", "SPIN", "NotApplicable", "Scales", "States",
-    "Variant", "coordinates_of", "kinds_of", "referred_joints", "unchanged", "velocities_of", "with_probes",
+    "ANGULAR", "LINEAR", "MARK", "PLACE", "SPEED", "SPIN", "NotApplicable", "References", "Scales", "States",
+    "Variant", "coordinates_of", "drop", "entry_of", "kinds_of", "unchanged", "velocities_of", "with_probes",
 ]  # fmt: skip
