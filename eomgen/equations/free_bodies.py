@@ -219,12 +219,7 @@ def cut_joints(bodies: FreeBodies) -> list[CutJoint]:
 def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
     kinematics, graph = bodies.kinematics, bodies.graph
     poses = kinematics.poses
-    base = poses.common(spec.predecessor, spec.successor)
-    outer, inner = (poses.marker(marker, base) for marker in (spec.predecessor, spec.successor))
-    pose = Frame(
-        vec.product(vec.transpose(outer.rotation), inner.rotation),
-        vec.transpose_times(outer.rotation, vec.sub(inner.position, outer.position)),
-    )
+    pose = poses.relative(spec.predecessor, spec.successor)
     links = [poses.link_of[m.body] for m in (spec.predecessor, spec.successor)]
     holder, marker = (poses.marker_in_link(m) for m in (spec.predecessor, spec.successor))
     first, second = (_twist(kinematics, m, k) for m, k in zip((holder, marker), links, strict=True))

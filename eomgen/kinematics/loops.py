@@ -9,6 +9,7 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
+from ..graph.rounding import vanishing
 from ..graph.substitute import substitute, symbols_of
 from ..records import dataclass
 from .state import State
@@ -77,9 +78,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     it is measured between -pi and pi.
     """
     graph = poses.graph
-    base = poses.common(spec.predecessor, spec.successor)
-    outer = poses.marker(spec.predecessor, base)
-    inner = poses.marker(spec.successor, base)
+    outer, inner = poses.pair(spec.predecessor, spec.successor)
     rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
     gap = vec.sub(inner.position, outer.position)
     position = vec.transpose_times(outer.rotation, gap)
@@ -89,11 +88,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
         rows = spec.joint.closure_in_turns(graph, rotation, position, turns[0])
     else:
         rows = spec.joint.closure(graph, rotation, position)
-    if {r.label for r in rows} >= {
-        "r_x",
-        "r_y",
-        "r_z",
-    }:  # all three vanish, so any axes do: those of the base are simplest
+    if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish: any axes do, common ones are simplest
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)
@@ -108,7 +103,8 @@ def differentiate_constraints(
     graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State
 ) -> Constraints:
     """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
-    kept = [r for r in rows if not r.expression.is_zero]
+    identical = dict(zip(rows, vanishing([r.expression for r in rows]), strict=True))
+    kept = [r for r in rows if not identical[r]]
     kept.sort(key=lambda r: r.level != "position")
     values = [r.expression for r in kept if r.level == "position"]
     nonholonomic = [r.expression for r in kept if r.level != "position"]
@@ -134,7 +130,7 @@ def differentiate_constraints(
         slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),
         aligned=tuple(e for _, e in open_conditions),
         aligned_joints=tuple(joint for joint, _ in open_conditions),
-        vanishing=tuple(r.label for r in rows if r.expression.is_zero),
+        vanishing=tuple(r.label for r in rows if identical[r]),
         declared=len(rows),
     )
 

@@ -10,9 +10,10 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from ..graph.rounding import settled_rotation, settled_vector, size_of
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .inertia import SpatialInertia, body_inertia
+from .inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
 
 Twist = tuple[Vec3, Vec3]
@@ -59,9 +60,13 @@ class Link:
 
 
 def place(frame: Frame, marker: Frame) -> Frame:
-    """A marker of the body, in the link frame ``frame`` of the same body."""
+    """A marker of the body, in the link frame ``frame`` of the same body.
+
+    However the body's own axes are turned and shifted, numbers that cancel are exactly 0, so that the equations of a
+    mechanism do not depend on how its bodies are described.
+    """
     turn = vec.transpose(frame.rotation)
-    return Frame(vec.product(turn, marker.rotation), vec.times(turn, vec.sub(marker.position, frame.position)))
+    return Frame(settled_rotation(vec.product(turn, marker.rotation)), place_point(frame, marker.position))
 
 
 def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Expr]) -> tuple[Link, ...]:
@@ -98,8 +103,8 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
                 position=vec.add(holder.position, vec.times(holder.rotation, position)),
                 columns=tuple(columns),
                 mass=body.mass,
-                com=vec.times(back, vec.sub(body.com, frame.position)),
-                inertia=vec.product(back, vec.product(body.inertia, frame.rotation)),
+                com=place_point(frame, body.com),
+                inertia=settled_matrix(vec.product(back, vec.product(body.inertia, frame.rotation)), body.inertia),
                 spatial=body_inertia(body, frame),
                 frame=frame,
             )
@@ -129,6 +134,10 @@ def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> l
     return twists
 
 
+def _turned_point(axes: Mat3, point: Vec3) -> Vec3:
+    return settled_vector(vec.transpose_times(axes, point), size_of(point))
+
+
 class Poses:
     """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
 
@@ -136,7 +145,7 @@ class Poses:
         self.graph = mechanism.graph
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
-        self._known: dict[tuple[int, int], Frame] = {}
+        self._known: dict[tuple[int, int, Mat3 | None], Frame] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
         """Constant placement of a marker in its link frame (in ground for a ground marker)."""
@@ -151,35 +160,67 @@ class Poses:
             chain.append(self.links[chain[-1]].parent)
         return chain
 
-    def link(self, link: int, base: int = GROUND) -> Frame:
-        """Placement of a link in link ``base``, one of its ancestors."""
+    def link(self, link: int, base: int = GROUND, axes: Mat3 | None = None) -> Frame:
+        """Placement of a link in link ``base``, one of its ancestors; in turned ``axes`` of the base, if given."""
         if link == base:
-            return Frame(vec.identity(self.graph), vec.zero(self.graph))
-        key = (link, base)
+            rotation = vec.identity(self.graph) if axes is None else vec.transpose(axes)
+            return Frame(rotation, vec.zero(self.graph))
+        key = (link, base, axes)
         if key not in self._known:
             chain = self.ancestors(link)
             for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
-                if (k, base) not in self._known:
-                    self._known[k, base] = self._step(k, base)
+                if (k, base, axes) not in self._known:
+                    self._known[k, base, axes] = self._step(k, base, axes)
         return self._known[key]
 
-    def _step(self, k: int, base: int) -> Frame:
+    def _step(self, k: int, base: int, axes: Mat3 | None) -> Frame:
         link = self.links[k]
-        local = vec.product(link.turn, link.joint_rotation)
         if link.parent == base:
-            return Frame(local, link.position)
-        parent = self._known[link.parent, base]
+            if axes is None:
+                return Frame(vec.product(link.turn, link.joint_rotation), link.position)
+            turn = settled_rotation(vec.product(vec.transpose(axes), link.turn))
+            return Frame(vec.product(turn, link.joint_rotation), _turned_point(axes, link.position))
+        parent = self._known[link.parent, base, axes]
         rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
         return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
 
-    def marker(self, marker: Marker, base: int = GROUND) -> Frame:
-        """Placement of a marker in link ``base``, an ancestor of its link."""
+    def marker(self, marker: Marker, base: int = GROUND, axes: Mat3 | None = None) -> Frame:
+        """Placement of a marker in link ``base``, an ancestor of its link; in turned ``axes`` of the base, if given."""
         inner = self.marker_in_link(marker)
-        outer = self.link(self.link_of[marker.body], base)
+        link = self.link_of[marker.body]
+        outer = self.link(link, base, axes)
+        rotation = vec.product(outer.rotation, inner.rotation)
         return Frame(
-            vec.product(outer.rotation, inner.rotation),
+            settled_rotation(rotation) if link == base else rotation,
             vec.add(outer.position, vec.times(outer.rotation, inner.position)),
         )
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        outer, inner = self.pair(start, end)
+        back = vec.transpose(outer.rotation)
+        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
+
+    def pair(self, start: Marker, end: Marker) -> tuple[Frame, Frame]:
+        """Placements of two markers in the axes of :meth:`between`."""
+        base, axes = self.between(start, end)
+        return self.marker(start, base, axes), self.marker(end, base, axes)
+
+    def between(self, start: Marker, end: Marker) -> tuple[int, Mat3]:
+        """The nearest link that carries both markers, and axes of it (columns) with which one of their chains begins.
+
+        So the axes of ground and of bodies, which a description may choose as it likes, drop out of what is relative.
+        """
+        base = self.common(start, end)
+        for marker in (end, start):
+            chain = self.ancestors(self.link_of[marker.body])
+            if chain[0] != base:
+                axes = self.links[chain[chain.index(base) - 1]].turn
+                break
+        else:
+            axes = self.marker_in_link(start).rotation
+        along = all(x.value in (0.0, 1.0, -1.0) for row in axes for x in row)  # then the base's own are as simple
+        return base, vec.identity(self.graph) if along else axes
 
     def common(self, a: Marker, b: Marker) -> int:
         """The nearest link that carries both markers."""
