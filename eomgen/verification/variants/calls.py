@@ -14,7 +14,7 @@ import numpy as np
 from ... import pipeline
 from ...describe.model import Model
 from ...equations import METHODS
-from ...errors import EomgenError, ToolchainError
+from ...errors import EomgenError, ToolchainError, UsageError
 from ..finding import Finding
 from .compare import compare_module, refused, states_of
 from .frames import values_of
@@ -104,7 +104,11 @@ def _minimal(check: str, model: Model, original: Original, random: Any) -> Findi
         return Finding.skipped(check, "there is no freedom")
     if len(own.x_names) != own.n_q + own.n_v:
         return Finding.skipped(check, "the model has states of its own")
-    minimal, worst, limit, where = own.minimal, -1.0, 1.0, ""
+    try:
+        minimal = own.minimal
+    except UsageError as why:
+        return Finding.skipped(check, str(why))
+    worst, limit, where = -1.0, 1.0, ""
     for k in range(original.states.shape[1]):
         x = original.states[:, k]
         minimal.reset(x[: own.n_q])
@@ -124,9 +128,6 @@ def _yaml(check: str, model: Model, original: Original, random: Any) -> Finding:
     states = states_of(original, Variant(original.description), module)
     order = [module.x_names.index(name) for name in original.module.x_names]
     a, b = module.rhs(0.0, states), original.module.rhs(0.0, original.states)
-    n = original.module.n_q
-    b_rates, a_rates = (original.module.layout, module.layout)
-    assert b_rates.n_x == a_rates.n_x and n == module.n_q
     errors = np.abs(a[order] - b).max(axis=0) / np.maximum(np.abs(b).max(axis=0), 1.0)
     k = int(np.argmax(errors / original.limits))
     return Finding(check, float(errors[k]), float(original.limits[k]), f"state {k}", len(errors))

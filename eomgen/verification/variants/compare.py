@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,14 @@ from .variant import NotApplicable, Variant
 FREE_CONSTANT = ("potential_energy", "total_energy")
 
 
-def compare(check: str, original: Original, make: Any, random: Any, **options: Any) -> Finding:
+def compare(check: str, original: Original, make: Any, random: Any, reactions: bool = False) -> Finding:
     """Make a variant, compile it and compare it; a change without meaning here is left out, a refusal is a breach."""
     try:
         variant = make(original.description, random)
     except NotApplicable as why:
         return Finding.skipped(check, str(why))
     try:
-        return compare_module(check, original, variant, compiled(variant.description, **options))
+        return compare_module(check, original, variant, compiled(variant.description), reactions)
     except EomgenError as error:
         return refused(check, error)
 
@@ -36,9 +35,9 @@ def refused(check: str, error: Exception) -> Finding:
 
 
 def compare_module(
-    check: str, original: Original, variant: Variant, module: Any, **given: Any
+    check: str, original: Original, variant: Variant, module: Any, reactions: bool = False, **given: Any
 ) -> Finding:
-    """Degrees of freedom, outputs and reactions of a module against the original's; ``given`` is p= and u=."""
+    """Degrees of freedom, outputs and, if asked, reactions of a module against the original's; ``given`` is p=, u=."""
     if module.n_dof != original.module.n_dof:
         note = f"{module.n_dof} degrees of freedom instead of {original.module.n_dof}"
         return Finding(check, np.inf, 0.0, note=note)
@@ -55,7 +54,8 @@ def compare_module(
         if names_of(texts[name]) & set(FREE_CONSTANT):
             a, b = a - a[0], b - b[0]
         worst.take(name, np.abs(a - b) / original.sizes[i], original.limits)
-    _compare_reactions(worst, original, variant, module, states, given)
+    if reactions and not given and "" not in variant.joints.values():
+        _compare_reactions(worst, original, variant, module, states)
     return worst.finding(states.shape[1])
 
 
@@ -88,25 +88,21 @@ class _Worst:
         return Finding(self.check, self.worst, self.limit, self.where, cases)
 
 
-def _compare_reactions(
-    worst: _Worst, original: Original, variant: Variant, module: Any, states: Any, given: Mapping[str, Any]
-) -> None:
-    if original.reactions is None or given or any(new == "" for new in variant.joints.values()):
-        return
+def _compare_reactions(worst: _Worst, original: Original, variant: Variant, module: Any, states: Any) -> None:
+    """Reactions that rigid bodies determine; where ground is turned, of joints all of whose components they do."""
     found = reactions_of(module, states)
-    if found is None:
+    if original.reactions is None or found is None:
         return
     numbers = {name: i for i, name in enumerate(module.joint_names)}
-    force = variant.scales.force
-    turn = np.eye(3) if variant.turn is None else variant.turn
-    size = np.abs(original.reactions[:, :3]).max(axis=(0, 1)) + np.abs(original.reactions[:, 3:]).max(axis=(0, 1)) / original.length
-    size = np.maximum(size, np.finfo(float).tiny)
+    force, turned = variant.scales.force, variant.turn is not None
+    turn = variant.turn if turned else np.eye(3)
     for i, name in enumerate(original.module.joint_names):
         own = numbers.get(variant.joints.get(name, name))
-        if own is None:
+        known = ~original.undetermined[i]
+        if own is None or (turned and not known.all()):
             continue
         forces = np.einsum("ji,jk->ik", turn, found[own, :3]) / force
         moments = np.einsum("ji,jk->ik", turn, found[own, 3:]) / (force * variant.scales.length)
-        errors = np.abs(forces - original.reactions[i, :3]).max(axis=0)
-        errors = np.maximum(errors, np.abs(moments - original.reactions[i, 3:]).max(axis=0) / original.length)
-        worst.take(f"reaction of {name}", errors / size, original.limits)
+        errors = np.concatenate([forces, moments]) - original.reactions[i]
+        errors[3:] /= original.length
+        worst.take(f"reaction of {name}", np.abs(errors[known]).max(axis=0, initial=0.0) / original.force, original.limits)

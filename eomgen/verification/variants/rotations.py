@@ -110,10 +110,8 @@ def _change(made: Description, entry: Entry, names: Sequence[str], place: int, r
         values["rotation"] = "euler_parameters"
         new = [f"{joint}_e{k}" for k in range(4)]
     else:
-        others = [s for s in SEQUENCES if s != before or was != "euler_angles"]
-        after = values["sequence"] = others[int(random.integers(len(others)))]
+        after = values["sequence"] = _sequence(made, entry, own, before if was == "euler_angles" else "", random)
         new = [f"{joint}_new_{k}" for k in (1, 2, 3)]
-    values.pop("coordinates", None)
     values["coordinates"] = [*names[:place], *new]
     start = made.values.get("guess", {})
     known = all(name in start and not isinstance(start[name], str) for name in own)
@@ -137,6 +135,20 @@ def _change(made: Description, entry: Entry, names: Sequence[str], place: int, r
     if fixed:
         made.values["initial"] |= rough
     return follow
+
+
+def _sequence(made: Description, entry: Entry, own: Sequence[str], before: str, random: Any) -> str:
+    """Another sequence, far from its singular position at the initial state."""
+    start = made.values.get("guess", {})
+    if not all(name in start for name in own):
+        raise NotApplicable("the initial state is not known")
+    angles = [float(start[name]) for name in own]
+    turn = of_angles(before, angles)[0] if before else matrix_of(angles)
+    for number in random.permutation(len(SEQUENCES)):
+        found = SEQUENCES[int(number)]
+        if found != before and abs(np.linalg.det(of_angles(found, angles_of(found, turn))[1])) > 0.5:
+            return found
+    raise NotApplicable("no other sequence is far from its singular position")
 
 
 __all__ = ["angles_of", "of_angles", "parameters_of", "redescribe"]

@@ -23,7 +23,7 @@ from .frames import length_of
 from .variant import ANGULAR, LINEAR, PLACE, SPEED, SPIN, kinds_of, velocities_of
 
 #: Roundings of the size of the result that a calculation may collect; the largest ratio seen stands in docs.
-ROUNDINGS = 1000.0
+ROUNDINGS = 200.0
 EPS = float(np.finfo(float).eps)
 STATES = 3
 
@@ -40,9 +40,11 @@ class Original:
         Output -> what it is.
     states : (n_x, k) array
     values : (n_y, k) array of outputs
-    reactions : (n_joints, 6, k) array or None
+    reactions, undetermined : (n_joints, 6, k) and (n_joints, 6) arrays or None
     sizes : (n_y, k) array
         The size of what each output is made of.
+    force : (k,) array
+        The size of forces: the largest reaction, and what accelerates the total mass.
     limits : (k,) array
         Relative error that rounding allows at each state.
     """
@@ -53,7 +55,9 @@ class Original:
     states: Array
     values: Array
     reactions: Array | None
+    undetermined: Any
     sizes: Array
+    force: Array
     limits: Array
     length: float
 
@@ -80,7 +84,18 @@ def observe(description: Description, kinds: Mapping[str, str], random: Any, cou
     values = module.outputs(0.0, states) if len(module.y_names) else np.zeros((0, states.shape[1]))
     sizes = sizes_of(module, kinds, values, states, length)
     limits = np.array([relative_limit(module, states[:, k], description, length) for k in range(states.shape[1])])
-    return Original(description, module, kinds, states, values, reactions_of(module, states), sizes, limits, length)
+    reactions = reactions_of(module, states)
+    open_ = None
+    if reactions is not None:
+        open_ = np.any([module.undetermined_reactions(0.0, x) for x in states.T], axis=0)
+    force = np.full(states.shape[1], np.finfo(float).tiny)
+    if reactions is not None:
+        force += np.abs(reactions[:, :3]).max(axis=(0, 1)) + np.abs(reactions[:, 3:]).max(axis=(0, 1)) / length
+    if "probe_mass" in module.y_names:
+        number = module.y_names.index("probe_mass")
+        linear = [i for i, name in enumerate(module.y_names) if kinds[name] in LINEAR]
+        force += np.abs(values[number]) * sizes[linear].max(axis=0, initial=0.0)
+    return Original(description, module, kinds, states, values, reactions, open_, sizes, force, limits, length)
 
 
 def reactions_of(module: Any, states: Array) -> Array | None:

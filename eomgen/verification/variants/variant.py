@@ -16,7 +16,7 @@ from ...describe.build_joints import coordinate_names
 from ...describe.description import Description, Entry
 from ...joints import JOINTS
 from ...records import dataclass
-from .texts import names_of
+from .texts import is_zero, names_of
 from .visit import Slot, Visitor, bodies_of, copied, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
@@ -173,11 +173,18 @@ def with_probes(description: Description) -> tuple[Description, dict[str, str]]:
         for energy in ("kinetic_energy", "potential_energy"):
             made.add("outputs", f"probe_{energy}", {"expression": energy})
             kinds[f"probe_{energy}"] = energy
+    if any(_has_mass(entry.values) for entry in bodies_of(made)):
+        made.add("outputs", "probe_mass", {"expression": "total_mass"})
+        kinds["probe_mass"] = "total_mass"
     for what, names in (("coordinate", kinds_of(made)), ("velocity", velocities_of(made))):
         for number, name in enumerate(names):
             made.add("outputs", f"probe_{what}_{number}", {"expression": name})
             kinds[f"probe_{what}_{number}"] = f"{what} {name}"
     return made, kinds
+
+
+def _has_mass(values: Mapping[str, Any]) -> bool:
+    return "solids" in values or "points" in values or not is_zero(values.get("mass", 0.0))
 
 
 class References(Visitor):
