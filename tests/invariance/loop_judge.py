@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Joint -> conditions: P points coincide; D directions of the two bodies are perpendicular; L the way between the points
+#: Joint -> conditions: P points coincide; D directions of the two bodies are perpendicular; L the way between points
 #: is perpendicular to a direction of the first body.  Letters name the axes of the markers.
 CONDITIONS: dict[str, tuple[str, ...]] = {
     "revolute": ("P", "Dxz", "Dyz"),
@@ -95,7 +95,10 @@ class _Rows:
         (s_i, p_i, v_i, g_i), (s_j, p_j, v_j, g_j) = (
             self.point(body, at) for body, at in zip(joint.bodies, joint.points, strict=True)
         )
-        axes = [dict(zip("xyz", (self.turns[b] @ f).T, strict=True)) for b, f in zip(joint.bodies, joint.frames, strict=True)]
+        axes = [
+            dict(zip("xyz", (self.turns[b] @ f).T, strict=True))
+            for b, f in zip(joint.bodies, joint.frames, strict=True)
+        ]
         w_i, w_j = self.w[i], self.w[j]
         for condition in CONDITIONS[joint.kind]:
             if condition == "P":
@@ -115,7 +118,9 @@ class _Rows:
                 self.row(blocks, u @ d, gamma)
 
 
-def judge(bodies: list[Body], joints: list[Joint], gravity: Array, poses: Array, v: Array, w: Array, size: float) -> Verdict:
+def judge(
+    bodies: list[Body], joints: list[Joint], gravity: Array, poses: Array, v: Array, w: Array, size: float
+) -> Verdict:
     """What the bodies do.
 
     Parameters

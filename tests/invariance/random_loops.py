@@ -134,7 +134,15 @@ def six_bar(seed: int, size: float) -> Loops:
     far = extra + m.random.uniform(0.4, 1.0, 3) * [1, -1, 0]
     base = far + m.random.uniform(0.4, 1.0, 3) * [-1, -1, 0]
     d, e = m.body(extra, far - extra), m.body(far, base - far)
-    ends = ((-1, a, pins[0]), (a, b, pins[1]), (b, c, pins[2]), (c, -1, pins[3]), (b, d, extra), (d, e, far), (e, -1, base))
+    ends = (
+        (-1, a, pins[0]),
+        (a, b, pins[1]),
+        (b, c, pins[2]),
+        (c, -1, pins[3]),
+        (b, d, extra),
+        (d, e, far),
+        (e, -1, base),
+    )
     for i, j, at in ends:
         m.joint("revolute", i, j, at, Z)
     return m.done(1)

@@ -45,7 +45,7 @@ def try_one(number: int) -> Result:
     first = FIRST[(number // len(FAMILIES)) % len(FIRST)]
     result = Result(list(FAMILIES)[number % len(FAMILIES)], first.__name__ if first else "as it is")
     try:
-        original = original_of(loops.model, number)
+        original = original_of(loops.model, number, motion_only=True)
     except eg.EomgenError as error:
         result.faults.append(f"refused as written: {type(error).__name__}: {str(error)[:160]}")
         return result
@@ -118,6 +118,8 @@ def main() -> int:
         results.append(result)
         for fault in result.faults:
             print(f"{number} {result.family}, {result.change}: {fault}", flush=True)
+        if number % 100 == 99:
+            print(f"# {number + 1 - given.first} done", file=sys.stderr, flush=True)
     families: dict[str, list[Result]] = defaultdict(list)
     for result in results:
         families[result.family].append(result)

@@ -64,7 +64,7 @@ def _independent(check: str, model: Model, original: Original, random: Any) -> F
         return Finding.skipped(check, "there is no choice of independent coordinates")
     rows = np.atleast_2d(own.constraint_jacobian(original.states[: own.n_q, 0], rows="all"))
     basis = np.linalg.svd(rows)[2][-own.n_dof :].T
-    best, chosen = 0.0, ()
+    best, chosen = 0.0, tuple[int, ...]()
     for _ in range(20):
         picked = tuple(sorted(random.permutation(own.n_q)[: own.n_dof].tolist()))
         if picked == tuple(own.layout.independent.tolist()):

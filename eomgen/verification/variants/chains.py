@@ -70,7 +70,9 @@ def split(description: Description, random: Any) -> Variant:
             entry.values[key] = _half(key, value)
         own = {key: value for key, value in entry.values.items() if key != "markers"}
         about = own.get("about")
-        markers = dict(entry.values.get("markers", {})) if isinstance(about, str) and about not in ("com", "origin") else {}
+        markers = (
+            dict(entry.values.get("markers", {})) if isinstance(about, str) and about not in ("com", "origin") else {}
+        )
         other = f"half_of_{entry.name}"
         made.add("bodies", other, {**own, "markers": markers})
         made.add("joints", f"weld_of_{entry.name}", {"type": "weld", "between": [entry.name, other]})

@@ -40,8 +40,7 @@ def _closed(description: Description, random: Any, table: dict[str, tuple[str, .
     candidates = [
         name
         for name in in_loops(description)
-        if entry_of(made, "joints", name).values["type"] in table
-        and not references.to((name, *names[name]))
+        if entry_of(made, "joints", name).values["type"] in table and not references.to((name, *names[name]))
     ]
     rods = [e for e in made.sections["joints"] if e.values["type"] == "distance"] if equations else []
     if not candidates and not rods:
@@ -65,7 +64,9 @@ def _closed(description: Description, random: Any, table: dict[str, tuple[str, .
 
 def _equations(made: Description, entry: Entry, rod: bool) -> None:
     """The equations between two points that become named markers."""
-    labels = [_marker(made, frame, f"{entry.name}_{end}") for frame, end in zip(frames_of(made, entry), "ab", strict=True)]
+    labels = [
+        _marker(made, frame, f"{entry.name}_{end}") for frame, end in zip(frames_of(made, entry), "ab", strict=True)
+    ]
     gaps = [f"({axis}({labels[1]}) - {axis}({labels[0]}))" for axis in "xyz"]
     if rod:
         length = entry.values["length"]

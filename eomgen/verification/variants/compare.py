@@ -105,4 +105,6 @@ def _compare_reactions(worst: _Worst, original: Original, variant: Variant, modu
         moments = np.einsum("ji,jk->ik", turn, found[own, 3:]) / (force * variant.scales.length)
         errors = np.concatenate([forces, moments]) - original.reactions[i]
         errors[3:] /= original.length
-        worst.take(f"reaction of {name}", np.abs(errors[known]).max(axis=0, initial=0.0) / original.force, original.limits)
+        worst.take(
+            f"reaction of {name}", np.abs(errors[known]).max(axis=0, initial=0.0) / original.force, original.limits
+        )

@@ -29,7 +29,7 @@ def in_loops(description: Description) -> list[str]:
         while waiting:
             here = waiting.pop()
             for other, a, b in edges:
-                for near in ((b,) if a == here else (a,) if b == here else ()):
+                for near in (b,) if a == here else (a,) if b == here else ():
                     if other != name and near not in reached:
                         reached.add(near)
                         waiting.append(near)

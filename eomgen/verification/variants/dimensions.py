@@ -134,7 +134,7 @@ def _force(kind: str, key: str, slot: Slot, length: bool) -> Dimension:
         if key in ("dissipation", "viscous_friction"):
             return Dimension(-reach, 0, 1)
     if kind == "bushing":
-        return _bushing(key, slot.index)
+        return _bushing(key, slot.place)
     raise NotApplicable(f"the dimension of {key} of a {kind} is not known")
 
 

@@ -15,16 +15,18 @@ from ..finding import Finding
 from .calls import CALLS
 from .chains import chain, split
 from .closures import as_constraints, as_equations
-from .compare import compare
+from .compare import compare, refused
 from .cuts import cut_another
 from .frames import turn_bodies, turn_ground
 from .names import rename, reorder
 from .plain import plain
+from .probes import with_probes
 from .rotations import redescribe
+from .runs import run_findings
 from .states import Original, observe
 from .swaps import swap
 from .units import in_units
-from .variant import NotApplicable, Variant, with_probes
+from .variant import NotApplicable, Variant
 
 Change = Callable[[Description, Any], Variant]
 
@@ -62,6 +64,9 @@ CHANGES: Mapping[str, Change] = {
 REACTIONS = ("body frames turned", "ground turned", "units mm, t, ms", "another joint cut")
 
 
+RUN = "short runs"  #: of all changes at once, and of another cut
+
+
 def variant_findings(
     model: Model | Description, *, seed: int = 0, seconds: float = 10.0, only: str | None = None
 ) -> list[Finding]:
@@ -80,8 +85,8 @@ def variant_findings(
     Returns
     -------
     list of Finding
-        One for each change: the largest difference from the original, relative to the size of what was compared; infinite
-        where the variant has other degrees of freedom or is refused.
+        One for each change: the largest difference from the original, relative to the size of what was compared;
+        infinite where the variant has other degrees of freedom or is refused.
 
     Raises
     ------
@@ -95,28 +100,37 @@ def variant_findings(
     except NotApplicable as why:
         return [Finding.skipped("variants", str(why))]
     findings = []
-    for number, (name, change) in enumerate((CHANGES | CALLS).items()):
+    for number, name in enumerate((*CHANGES, *CALLS, RUN)):
         if only is not None and name != only:
             continue
         check = f"variants: {name}"
         random = np.random.default_rng([seed, number])
         if perf_counter() > end:
             findings.append(Finding.skipped(check, f"not reached in {seconds:g} s"))
-        elif name in CALLS:
-            findings.append(CALLS[name](check, made, original, random))
         else:
-            findings.append(compare(check, original, change, random, name in REACTIONS))
+            try:
+                findings.append(_found(name, check, made, original, random))
+            except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as error:
+                findings.append(refused(check, error))  # whose fault it is has to be looked for
     return findings
 
 
-def original_of(model: Model, seed: int) -> Original:
+def _found(name: str, check: str, model: Model, original: Original, random: Any) -> Finding:
+    if name == RUN:
+        return run_findings(check, original, {"all at once": all_at_once}, random)
+    if name in CALLS:
+        return CALLS[name](check, model, original, random)
+    return compare(check, original, CHANGES[name], random, name in REACTIONS)
+
+
+def original_of(model: Model, seed: int, motion_only: bool = False) -> Original:
     """The plain form of a model with probes, observed; every change starts from it."""
     try:
         base = plain(model)
     except EomgenError as error:
         raise NotApplicable(f"the model has no plain form: {error}") from None
     description, kinds = with_probes(base)
-    original = observe(description, kinds, np.random.default_rng([seed, 99]))
+    original = observe(description, kinds, np.random.default_rng([seed, 99]), motion_only=motion_only)
     # variants whose coordinates differ are assembled from the same configuration
     start = original.named(0)
     declared = description.values.get("guess", {})

@@ -13,55 +13,17 @@ import numpy as np
 
 from ...describe.description import GROUND_NAME, Description, Entry, items
 from ...describe.fields import INERTIA
-from .texts import is_zero, markers_of, names_of, negative, number_of, product, rewritten, scaled, total
+from .texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
+from .turns import random_turn, rpy_of, turn_of
 from .variant import Variant
 from .visit import Slot, Visitor, bodies_of, copied, visit
 
 WAS = "old_frame"  #: the marker that a body's former frame becomes
 _PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-_KINDS = (("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az"))
-_KINDS += (("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot"))
-
-
-def random_turn(random: Any) -> Any:
-    """A turn of any angle about any axis."""
-    quaternion = random.normal(size=4)
-    return matrix_of(quaternion / np.linalg.norm(quaternion))
-
-
-def matrix_of(e: Any) -> Any:
-    """The rotation of Euler parameters, e0 first."""
-    a, b, c, d = e
-    return np.array(
-        [
-            [a * a + b * b - c * c - d * d, 2 * (b * c - a * d), 2 * (b * d + a * c)],
-            [2 * (b * c + a * d), a * a - b * b + c * c - d * d, 2 * (c * d - a * b)],
-            [2 * (b * d - a * c), 2 * (c * d + a * b), a * a - b * b - c * c + d * d],
-        ]
-    )
-
-
-def rpy_of(turn: Any) -> list[float]:
-    """Roll, pitch, yaw of a rotation."""
-    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
-    if np.hypot(turn[0, 0], turn[1, 0]) < 1e-9:  # only the difference of roll and yaw is known: yaw is 0
-        return [float(np.arctan2(-turn[1, 2], turn[1, 1])), float(pitch), 0.0]
-    return [float(np.arctan2(turn[2, 1], turn[2, 2])), float(pitch), float(np.arctan2(turn[1, 0], turn[0, 0]))]
-
-
-def turn_of(rpy: Sequence[float]) -> Any:
-    """The rotation of roll, pitch, yaw, right angles exact."""
-    (cr, sr), (cp, sp), (cy, sy) = (_circle(angle) for angle in rpy)
-    x, y, z = ([[1, 0, 0], [0, cr, -sr], [0, sr, cr]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
-               [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])  # fmt: skip
-    return np.array(z, dtype=float) @ np.array(y, dtype=float) @ np.array(x, dtype=float)
-
-
-def _circle(angle: float) -> tuple[float, float]:
-    quarter = round(angle / (np.pi / 2))
-    if abs(angle - quarter * np.pi / 2) <= 1e-15 * max(1, abs(quarter)):
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return float(np.cos(angle)), float(np.sin(angle))
+_KINDS = (
+    *(("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az")),
+    *(("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot")),
+)
 
 
 def values_of(description: Description) -> dict[str, float]:
@@ -77,7 +39,11 @@ class Placement:
     """The new frame of one body: new coordinates = turn old + shift."""
 
     def __init__(self, turn: Any, shift: Any, parameters: Mapping[str, float]) -> None:
-        self.turn, self.shift, self.parameters = np.asarray(turn, dtype=float), np.asarray(shift, dtype=float), parameters
+        self.turn, self.shift, self.parameters = (
+            np.asarray(turn, dtype=float),
+            np.asarray(shift, dtype=float),
+            parameters,
+        )
 
     def point(self, at: Sequence[Any]) -> list[Any]:
         """A point, entries numbers or texts."""
@@ -143,7 +109,9 @@ def _turn_body(entry: Entry, place: Placement) -> None:
     solids = "solids" in values or ("points" in values and "mass" not in values)
     if "first_moment" in values:
         moved = [product(values["mass"], float(d)) for d in place.shift]
-        values["first_moment"] = [total([1.0, 1.0], pair) for pair in zip(place.vector(values["first_moment"]), moved, strict=True)]
+        values["first_moment"] = [
+            total([1.0, 1.0], pair) for pair in zip(place.vector(values["first_moment"]), moved, strict=True)
+        ]
     elif not solids:
         values["com"] = place.point(values.get("com", [0, 0, 0]))
     about = values.get("about", "com")
@@ -181,7 +149,7 @@ def tensor_of(given: Any) -> list[list[Any]]:
 def turn_ground(description: Description, random: Any) -> Variant:
     """Ground turned and shifted: gravity, markers of ground, and whatever is written in ground axes follow.
 
-    Where an angle about the vertical z of ground is measured, the turn keeps z, and a constant comes off the angle.
+    Where an angle about z of ground is measured, ground is shifted only.
     """
     texts: set[tuple[str, str]] = set()
 
@@ -192,9 +160,8 @@ def turn_ground(description: Description, random: Any) -> Variant:
             return value
 
     visit(description, Seen())
-    level = any(quantity == "angle" for quantity, _ in texts)
-    yaw = 0.0 if level else None
-    turn = turn_of([0.0, 0.0, yaw]) if yaw is not None else random_turn(random)
+    angles = any(quantity == "angle" for quantity, _ in texts)
+    turn = np.eye(3) if angles else random_turn(random)
     place = Placement(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
     made = visit(copied(description), _Ground(place))
     ground = next((entry for entry in made.sections["bodies"] if entry.name == GROUND_NAME), None)
@@ -244,6 +211,3 @@ def length_of(description: Description) -> float:
 
     visit(description, Note())
     return max(found) or 1.0
-
-
-__all__ = ["negative", "names_of", "turn_bodies", "turn_ground"]

@@ -1,6 +1,6 @@
-"""Stage verification, inputs: one course over time given as table, function, text of the model, and as a parameter.
+"""Stage verification, inputs: one course over time as table, function, text of the model, and as a parameter.
 
-The course of each input is a straight line, of which a table is exact; a parameter stands for an input that is constant.
+The course of each input is a straight line, of which a table is exact; a parameter stands for a constant input.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 
 from ..finding import Finding
 from .compare import compare_module
-from .frames import number_of
 from .states import Original, compiled
+from .texts import number_of
 from .variant import Variant
 from .visit import copied
 
@@ -75,4 +75,4 @@ def duration(original: Original) -> float:
     n = original.module.n_q
     rates = original.module.rhs(0.0, original.states[:, 0])
     fast = max(float(np.abs(rates[:n]).max(initial=0.0)), float(np.abs(rates[n:]).max(initial=0.0)) ** 0.5, 1.0)
-    return 0.2 / fast
+    return float(0.2 / fast)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from ...describe.description import GROUND_NAME, Description
@@ -39,25 +38,28 @@ def rename(description: Description, random: Any) -> Variant:
     visitor = _Renamed(description, random, local)
     made = visit(description, visitor)
     bodies, words = visitor.bodies, visitor.words
-    for section, entries in made.sections.items():
+    for place, entries in made.sections.items():
         for entry in entries:
-            entry.name = bodies[entry.name] if section == "bodies" else words.get(entry.name, entry.name)
-            entry.path = f"{section}.{entry.name}"
+            entry.name = bodies[entry.name] if place == "bodies" else words.get(entry.name, entry.name)
+            entry.path = f"{place}.{entry.name}"
     for entry in made.sections["bodies"]:
         markers = entry.values.get("markers", {})
         entry.values["markers"] = {visitor.markers.get(name, name): placed for name, placed in markers.items()}
         about = entry.values.get("about")
         if isinstance(about, str) and about not in ("com", "origin"):
             entry.values["about"] = visitor.markers.get(about.rpartition(".")[2], about)
-    velocities = velocities_of(description)
-    sections = {
-        section: {e.name: words[e.name] for e in description.sections[section]}
-        for section in ("outputs", "parameters", "inputs", "joints")
-    }
+
+    def section(name: str) -> dict[str, str]:
+        return {e.name: words[e.name] for e in description.sections[name]}
+
     return Variant(
         made,
-        lambda values: {visitor.word(name) if name in velocities else words.get(name, name): v for name, v in values.items()},
-        **sections,  # type: ignore[arg-type]
+        lambda values: {visitor.word(name): value for name, value in values.items()},
+        outputs=section("outputs"),
+        parameters=section("parameters"),
+        inputs=section("inputs"),
+        joints=section("joints"),
+        events=section("events"),
     )
 
 
@@ -124,6 +126,3 @@ class _Renamed(Visitor):
             return f"{quantity}({self.marker(marker, slot)})"
 
         return rewritten(value, name, locate)
-
-
-__all__ = ["Mapping", "rename", "reorder"]

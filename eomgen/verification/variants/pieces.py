@@ -9,8 +9,9 @@ import numpy as np
 
 from ...describe.description import Description, Entry
 from ...describe.placement import TURNS, axis_columns
-from .frames import rpy_of, turn_of, values_of
+from .frames import values_of
 from .texts import number_of
+from .turns import rpy_of, turn_of
 
 Frame = dict[str, Any]
 
@@ -19,7 +20,11 @@ def frames_of(description: Description, entry: Entry) -> tuple[Frame, Frame]:
     """The markers of a joint, its axis as their z axis; each a mapping of body, at, rpy."""
     parameters = values_of(description)
     axis = entry.values.get("axis", "z")
-    columns = TURNS[axis] if isinstance(axis, str) else axis_columns(tuple(number_of(x, parameters) for x in axis))
+    if isinstance(axis, str):
+        columns = TURNS[axis]
+    else:
+        x, y, z = (number_of(part, parameters) for part in axis)
+        columns = axis_columns((x, y, z)) or TURNS["z"]
     turn = np.array(columns, dtype=float).T
     first, second = (_frame(description, reference, turn, parameters) for reference in entry.values["between"])
     return first, second

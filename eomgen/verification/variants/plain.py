@@ -42,9 +42,9 @@ def plain(model: Model | Description) -> Description:
     for entry in result.sections["bodies"]:
         _write_placements(entry)
     for entry in result.sections["constraints"]:
-        key = _ON_GROUND.get(entry.values["type"])
-        if key is not None and key not in entry.values and not (key == "on" and "marker" not in entry.values):
-            entry.values[key] = GROUND_NAME
+        side = _ON_GROUND.get(entry.values["type"])
+        if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
+            entry.values[side] = GROUND_NAME
     result = visit(result, _Placed())
     result.lines.clear()
     return result

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...describe.description import Description, Entry
 from ...describe.fields import SEQUENCES
-from .frames import matrix_of
+from .turns import matrix_of
 from .variant import NotApplicable, References, States, Variant, coordinates_of, drop
 from .visit import copied
 
@@ -149,6 +149,3 @@ def _sequence(made: Description, entry: Entry, own: Sequence[str], before: str, 
         if found != before and abs(np.linalg.det(of_angles(found, angles_of(found, turn))[1])) > 0.5:
             return found
     raise NotApplicable("no other sequence is far from its singular position")
-
-
-__all__ = ["angles_of", "of_angles", "parameters_of", "redescribe"]

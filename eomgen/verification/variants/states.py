@@ -1,8 +1,8 @@
-"""Stage verification, states: a model with probes -> states on its manifold, what its outputs are there, and the limits.
+"""Stage verification, states: a model with probes -> states on its manifold, its outputs there, and their limits.
 
 Error model.  Results of a stable calculation are those of a state and of data that differ from the given ones by a few
-roundings.  A relative change eps of every coordinate changes the accelerations by at most eps sum_j |da_i/dx_j| s_j, with
-the sizes s of the coordinates; the same change of the entries of M and C_q changes them by at most
+roundings.  A relative change eps of every coordinate changes the accelerations by at most eps sum_j |da_i/dx_j| s_j,
+with the sizes s of the coordinates; the same change of the entries of M and C_q changes them by at most
 eps cond(M) cond(C_q) max|a| after both are scaled to unit rows (Higham, *Accuracy and Stability*, 2002, ch. 7 and 20).
 The limit is :data:`ROUNDINGS` times the sum of the two.
 """
@@ -20,7 +20,8 @@ from ...errors import EomgenError
 from ...numeric.scales import Array
 from ...records import dataclass
 from .frames import length_of
-from .variant import ANGULAR, LINEAR, PLACE, SPEED, SPIN, kinds_of, velocities_of
+from .probes import ANGULAR, LINEAR, PLACE, SPEED, SPIN
+from .variant import kinds_of, velocities_of
 
 #: Roundings of the size of the result that a calculation may collect; the largest ratio seen stands in docs.
 ROUNDINGS = 200.0
@@ -76,15 +77,23 @@ def compiled(description: Description, **options: Any) -> Any:
     return Model.from_description(description).compile(**{"target": "numpy", **options})
 
 
-def observe(description: Description, kinds: Mapping[str, str], random: Any, count: int = STATES) -> Original:
-    """Compile a description with probes, find states, and evaluate."""
+def observe(
+    description: Description, kinds: Mapping[str, str], random: Any, count: int = STATES, motion_only: bool = False
+) -> Original:
+    """Compile a description with probes, find states, and evaluate.
+
+    ``motion_only`` leaves out reactions and limits, which take longest; another judge has to know the limits then.
+    """
     module = compiled(description)
     length = length_of(description)
     states = sample(module, description, length, random, count)
     values = module.outputs(0.0, states) if len(module.y_names) else np.zeros((0, states.shape[1]))
     sizes = sizes_of(module, kinds, values, states, length)
-    limits = np.array([relative_limit(module, states[:, k], description, length) for k in range(states.shape[1])])
-    reactions = reactions_of(module, states)
+    if motion_only:
+        limits, reactions = np.full(states.shape[1], np.nan), None
+    else:
+        limits = np.array([relative_limit(module, x, description, length) for x in states.T])
+        reactions = reactions_of(module, states)
     open_ = None
     if reactions is not None:
         open_ = np.any([module.undetermined_reactions(0.0, x) for x in states.T], axis=0)
@@ -113,7 +122,7 @@ def sample(module: Any, description: Description, length: float, random: Any, co
     sizes += [length if rates.get(name) == "length" else 1.0 for name in module.v_names]
     sizes += [0.0] * (len(start) - len(sizes))
     states = [start]
-    for k in range(count - 1):
+    for _ in range(count - 1):
         for spread in (0.3, 0.1, 0.03, 0.0):
             away = random.normal(size=len(start)) * np.array(sizes)
             away[: module.n_q] *= spread
@@ -128,7 +137,7 @@ def sample(module: Any, description: Description, length: float, random: Any, co
 
 
 def sizes_of(module: Any, kinds: Mapping[str, str], values: Array, states: Array, length: float) -> Array:
-    """For each output the size of its terms: all bodies' motion counts, as the motion of one follows from the others'."""
+    """For each output the size of its terms: the motion of all bodies counts, as one follows from the others."""
     groups: dict[str, list[int]] = {}
     for i, name in enumerate(module.y_names):
         groups.setdefault(kinds[name], []).append(i)

@@ -10,8 +10,10 @@ from .variant import NotApplicable, Variant, coordinates_of
 from .visit import Slot, Visitor, copied, visit
 
 #: Joints whose inverse is of the same type with all coordinates of the other sign.
-TYPES = ("revolute", "continuous", "prismatic", "screw", "cylindrical", "weld", "distance", "parallel", "perpendicular")
-TYPES += ("orientation", "spherical")
+TYPES = (
+    *("revolute", "continuous", "prismatic", "screw", "cylindrical", "spherical", "weld"),
+    *("distance", "parallel", "perpendicular", "orientation"),
+)
 #: Elements on a joint's coordinate -> the key that changes its sign, "" if none does.
 _ELEMENTS = {
     "torque": "value",
@@ -87,9 +89,9 @@ class _Signed(Visitor):
             value, lambda name: f"(-{name})" if name in self.signs else name, lambda q, marker: f"{q}({marker})"
         )
         if slot.key in ("initial", "guess"):
-            return negative(changed) if slot.index[0] in self.signs else changed
+            return negative(changed) if slot.place[0] in self.signs else changed
         if slot.type == "coupling" and slot.key == "coordinates":
-            return negative(changed) if slot.index[0] in self.signs | self.joints else changed
+            return negative(changed) if slot.place[0] in self.signs | self.joints else changed
         acts_on = None if slot.entry is None else slot.entry.values.get("joint", slot.entry.values.get("coordinate"))
         turned = acts_on in self.signs or acts_on in self.joints
         if slot.section in ("forces", "constraints") and turned and _ELEMENTS.get(slot.type) == slot.key:

@@ -16,7 +16,8 @@ from ...graph.evaluate import evaluate
 
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-    rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)?)\s*\)"
+    rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
+    r"\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)?)\s*\)"
     r"|(?P<name>[A-Za-z_]\w*)"
 )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
+from ...describe.names import QUANTITIES
 from ...describe.scope import ENERGIES
 from .dimensions import INERTIA, LENGTH, NONE, SPEED, SPIN, TORQUE, Dimension, dimension_of
 from .texts import rewritten, scaled
@@ -71,15 +72,15 @@ class _Scaled(Visitor):
         self.names.setdefault("total_mass", (_MARKER[6].of(scales), ""))
         for name in declared:
             self.names.pop(name, None)
-        joints = coordinates_of(description)
-        self.home = {joint: own[0] for joint, own in joints.items() if len(own) == 1}
+        self.joints = coordinates_of(description)
+        self.home = {joint: own[0] for joint, own in self.joints.items() if len(own) == 1}
 
     def acts_on_length(self, slot: Slot) -> bool:
         """Whether an entry acts along a length rather than an angle."""
         values = {} if slot.entry is None else slot.entry.values
         if slot.section == "joints":
-            own = str(values.get("coordinate", slot.entry.name if slot.entry else ""))
-            return self.kinds.get(own) == "length"
+            name = "" if slot.entry is None else slot.entry.name
+            return self.kinds.get((self.joints.get(name) or ("",))[0], "") == "length"
         if slot.type == "cam":
             key = "cam" if slot.key == "phase" else "follower"
             return self.kinds.get(self.home.get(values[key], values[key])) == "length"
@@ -94,10 +95,8 @@ class _Scaled(Visitor):
         return "between" in values or "marker" in values
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        if slot.section == "" and slot.key in ("initial", "guess"):
-            factor = self.names[slot.index[0]][0]
-        elif slot.section == "events" and slot.key == "reset":
-            factor = self.names[slot.index[0]][0]
+        if (slot.section, slot.key) in (("", "initial"), ("", "guess"), ("events", "reset")):
+            factor = self.names[slot.place[0]][0]
         elif slot.section in _KEPT or slot.type == "coupling":
             factor = 1.0
         else:
@@ -124,8 +123,6 @@ class _Scaled(Visitor):
             return word if factor == 1.0 else f"({word}/{factor!r})"
 
         def locate(quantity: str, marker: str) -> str:
-            from ...describe.names import QUANTITIES
-
             level = QUANTITIES[quantity][0]
             own = NONE if quantity == "angle" else _MARKER[level]
             return f"({quantity}({marker})/{own.of(self.scales)!r})"
@@ -140,7 +137,7 @@ class _Scaled(Visitor):
             rate = own._replace(time=-1)
             return {"length": own.of(self.scales), "angle": 1.0, "rate": rate.of(self.scales)}
         if slot.type == "cam" and slot.entry is not None:
-            cam = slot.entry.values["cam"]
+            cam = str(slot.entry.values["cam"])
             sliding = self.kinds.get(self.home.get(cam, cam)) == "length"
             return {"theta": (LENGTH if sliding else NONE).of(self.scales)}
         return {"theta": 1.0} if slot.type == "cam_contact" else {}

@@ -1,4 +1,4 @@
-"""Stage verification, variants: a description in other clothes, and how its states and results are read as the original's.
+"""Stage verification, variants: a description in other clothes, and how its states are read as the original's.
 
 Every change keeps the meaning of all outputs, so results are compared by outputs alone: the probes on every body.
 """
@@ -16,8 +16,8 @@ from ...describe.build_joints import coordinate_names
 from ...describe.description import Description, Entry
 from ...joints import JOINTS
 from ...records import dataclass
-from .texts import is_zero, names_of
-from .visit import Slot, Visitor, bodies_of, copied, visit
+from .texts import names_of
+from .visit import Slot, Visitor, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
 States = Callable[[Mapping[str, float]], dict[str, float]]
@@ -55,7 +55,7 @@ class Variant:
     description : Description
     state : callable
         Named coordinates and velocities of the original -> those of the variant.
-    outputs, parameters, inputs, joints : mapping
+    outputs, parameters, inputs, joints, events : mapping
         Name in the original -> name here, where they differ; joints that are no longer there are mapped to "".
     turn : (3, 3) array
         Takes ground axes of the original to those here.
@@ -69,6 +69,7 @@ class Variant:
     parameters: Mapping[str, str] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     joints: Mapping[str, str] = field(default_factory=dict)
+    events: Mapping[str, str] = field(default_factory=dict)
     turn: Any = None
     scales: Scales = Scales()
 
@@ -84,10 +85,11 @@ class Variant:
         return Variant(
             next_one.description,
             state,
-            *(
-                _chained(getattr(self, key), getattr(next_one, key))
-                for key in ("outputs", "parameters", "inputs", "joints")
-            ),
+            outputs=_chained(self.outputs, next_one.outputs),
+            parameters=_chained(self.parameters, next_one.parameters),
+            inputs=_chained(self.inputs, next_one.inputs),
+            joints=_chained(self.joints, next_one.joints),
+            events=_chained(self.events, next_one.events),
             turn=second @ first,
             scales=Scales(a.length * b.length, a.mass * b.mass, a.time * b.time),
         )
@@ -102,7 +104,9 @@ def _chained(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, s
 def coordinates_of(description: Description) -> dict[str, tuple[str, ...]]:
     """Names of the coordinates of every joint."""
     return {
-        entry.name: tuple(map(str, coordinate_names(entry.values["type"], entry.name, entry.values, sketch_of(entry.values))[0]))
+        entry.name: tuple(
+            map(str, coordinate_names(entry.values["type"], entry.name, entry.values, sketch_of(entry.values))[0])
+        )
         for entry in description.sections["joints"]
     }
 
@@ -140,51 +144,6 @@ def sketch_of(values: Mapping[str, Any]) -> Any:
     own = {key: values[key] for key in kind.options if key in ("sequence", "rotation") and key in values}
     rest = {key: None for key in kind.options if key not in ("sequence", "rotation")}
     return kind(**own, **rest)
-
-
-#: Motion of a probe: outputs of the group, by suffix.
-LINEAR = ("ax", "ay", "az")
-ANGULAR = ("wx_dot", "wy_dot", "wz_dot")
-SPEED, PLACE, SPIN = ("vx", "vy", "vz"), ("x", "y", "z"), ("wx", "wy", "wz")
-MARK = "probe_of_body"
-
-
-def with_probes(description: Description) -> tuple[Description, dict[str, str]]:
-    """A description with a probe at every body's centre of mass (its origin where that is not given), and its outputs.
-
-    Returns
-    -------
-    description
-    kinds : dict
-        Output -> what it is: the quantity of a probe, an energy, ``coordinate NAME``, ``velocity NAME``, or ``result``
-        for the model's own.
-    """
-    made, kinds = copied(description), dict[str, str]()
-    for entry in made.sections["outputs"]:  # an output that bears a coordinate's name could be that coordinate only
-        kinds[f"result_{entry.name}"] = "result"
-        entry.name = f"result_{entry.name}"
-    for number, entry in enumerate(bodies_of(made)):
-        entry.values["markers"][MARK] = {"at": list(entry.values.get("com", (0, 0, 0))), "rpy": [0, 0, 0]}
-        for quantity in (*LINEAR, *ANGULAR, *SPEED, *PLACE, *SPIN):
-            name = f"probe_{number}_{quantity}"
-            made.add("outputs", name, {"expression": f"{quantity}({entry.name}.{MARK})"})
-            kinds[name] = quantity
-    if bodies_of(made):
-        for energy in ("kinetic_energy", "potential_energy"):
-            made.add("outputs", f"probe_{energy}", {"expression": energy})
-            kinds[f"probe_{energy}"] = energy
-    if any(_has_mass(entry.values) for entry in bodies_of(made)):
-        made.add("outputs", "probe_mass", {"expression": "total_mass"})
-        kinds["probe_mass"] = "total_mass"
-    for what, names in (("coordinate", kinds_of(made)), ("velocity", velocities_of(made))):
-        for number, name in enumerate(names):
-            made.add("outputs", f"probe_{what}_{number}", {"expression": name})
-            kinds[f"probe_{what}_{number}"] = f"{what} {name}"
-    return made, kinds
-
-
-def _has_mass(values: Mapping[str, Any]) -> bool:
-    return "solids" in values or "points" in values or not is_zero(values.get("mass", 0.0))
 
 
 class References(Visitor):
@@ -226,9 +185,3 @@ def drop(description: Description, names: Iterable[str]) -> None:
 def entry_of(description: Description, section: str, name: str) -> Entry:
     """The entry of a name."""
     return next(entry for entry in description.sections[section] if entry.name == name)
-
-
-__all__ = [
-    "ANGULAR", "LINEAR", "MARK", "PLACE", "SPEED", "SPIN", "NotApplicable", "References", "Scales", "States",
-    "Variant", "coordinates_of", "drop", "entry_of", "kinds_of", "unchanged", "velocities_of", "with_probes",
-]  # fmt: skip

@@ -9,8 +9,17 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ...describe.description import GROUND_NAME, Description, Entry
-from ...describe.fields import BODY, EQUATIONS, EVENT, INPUT, LAGRANGIAN, OUTPUT_FIELDS, Fields
-from ...describe.fields import force_fields, joint_fields
+from ...describe.fields import (
+    BODY,
+    EQUATIONS,
+    EVENT,
+    INPUT,
+    LAGRANGIAN,
+    OUTPUT_FIELDS,
+    Fields,
+    force_fields,
+    joint_fields,
+)
 from ...describe.fields_constraints import constraint_fields
 
 
@@ -20,16 +29,16 @@ class Slot(NamedTuple):
     section: str
     type: str
     key: str
-    index: tuple[Any, ...] = ()
+    place: tuple[Any, ...] = ()
     entry: Entry | None = None
 
     def at(self, *index: Any) -> Slot:
         """A place within this one."""
-        return self._replace(index=(*self.index, *index))
+        return self._replace(place=(*self.place, *index))
 
     def named(self, key: str) -> Slot:
         """A key within this place, for placements, solids and points."""
-        return self._replace(key=key, index=())
+        return self._replace(key=key, place=())
 
 
 class Visitor:
