@@ -64,6 +64,8 @@ def split(description: Description, random: Any) -> Variant:
     """Every body as two halves of the same shape and place, each with half the mass and inertia, welded together."""
     if any(e.values["type"] == "point_gravity" for e in description.sections["forces"]):
         raise NotApplicable("point gravity acts on whole bodies")
+    if not bodies_of(description):
+        raise NotApplicable("there are no bodies")
     made = copied(description)
     for entry in bodies_of(made):
         for key, value in entry.values.items():
@@ -76,8 +78,6 @@ def split(description: Description, random: Any) -> Variant:
         other = f"half_of_{entry.name}"
         made.add("bodies", other, {**own, "markers": markers})
         made.add("joints", f"weld_of_{entry.name}", {"type": "weld", "between": [entry.name, other]})
-    if not made.sections["joints"]:
-        raise NotApplicable("there are no bodies")
     return Variant(made)
 
 

@@ -15,7 +15,7 @@ from ...describe.description import GROUND_NAME, Description, Entry, items
 from ...describe.fields import INERTIA
 from .texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
 from .turns import random_turn, rpy_of, turn_of
-from .variant import Variant
+from .variant import NotApplicable, Variant
 from .visit import Slot, Visitor, bodies_of, copied, visit
 
 WAS = "old_frame"  #: the marker that a body's former frame becomes
@@ -92,6 +92,7 @@ class _Moved(Visitor):
 
 def turn_bodies(description: Description, random: Any) -> Variant:
     """Every body's frame turned and shifted."""
+    _require_bodies(description)
     parameters, size = values_of(description), length_of(description)
     places = {
         entry.name: Placement(random_turn(random), size * random.uniform(-0.5, 0.5, 3), parameters)
@@ -146,11 +147,17 @@ def tensor_of(given: Any) -> list[list[Any]]:
     return [[given[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
 
 
+def _require_bodies(description: Description) -> None:
+    if not bodies_of(description):
+        raise NotApplicable("there are no bodies")
+
+
 def turn_ground(description: Description, random: Any) -> Variant:
     """Ground turned and shifted: gravity, markers of ground, and whatever is written in ground axes follow.
 
     Where an angle about z of ground is measured, ground is shifted only.
     """
+    _require_bodies(description)
     texts: set[tuple[str, str]] = set()
 
     class Seen(Visitor):
