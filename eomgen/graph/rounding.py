@@ -12,15 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ..limits.rounding import ROUNDED
 from .core import Expr, Graph
 from .evaluate import Evaluator
 from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
 
-EPS = float(np.finfo(float).eps)
-#: A value within so many times its bound is rounding.  The numbers of a description are rounded before they come here:
-#: the entries of a turned frame come from three angles by up to nine products.
-ROUNDED = 64.0 * EPS
 TRIES = 3  #: random points at which an identity is tried
 
 #: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.
@@ -122,6 +119,25 @@ def vanishing(outputs: Sequence[Expr]) -> list[bool]:
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
     """Whether each value is not told from zero by what is known of its rounding."""
     return np.asarray(np.isfinite(bounds) & (np.abs(values) <= ROUNDED * bounds))
+
+
+def terms_of(x: Expr) -> Expr:
+    """The sum of the magnitudes of the terms of a sum of products, as an expression; |x| where nothing is added."""
+    graph = x.graph
+    found: dict[int, Expr] = {}
+    for i in reachable(graph, [x.id]):
+        operation, *operands = graph.nodes[i]
+        if operation in ("add", "sub"):
+            found[i] = found[operands[0]] + found[operands[1]]
+        elif operation == "mul":
+            found[i] = found[operands[0]] * found[operands[1]]
+        elif operation == "div":
+            found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
+        elif operation == "neg":
+            found[i] = found[operands[0]]
+        else:
+            found[i] = graph.apply("abs", Expr(graph, i))
+    return found[x.id]
 
 
 def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:

@@ -11,6 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.rounding import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .state import State
 from .tree import Poses
@@ -100,16 +101,20 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State, length: Expr
 ) -> Constraints:
-    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
-    identical = dict(zip(rows, vanishing([r.expression for r in rows]), strict=True))
+    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically; ``length`` is that of the mechanism."""
+    sizes = {"length": length.value or 0.0, "angle": 1.0}
+    identical = {
+        r: zero or _is_closed(r, sizes[r.kind])
+        for r, zero in zip(rows, vanishing([r.expression for r in rows]), strict=True)
+    }
     kept = [r for r in rows if not identical[r]]
     kept.sort(key=lambda r: r.level != "position")
     values = [r.expression for r in kept if r.level == "position"]
     nonholonomic = [r.expression for r in kept if r.level != "position"]
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
-    along = dict(zip(state.q, state.rates, strict=True)) | {state.t: graph.one}
+    along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
     entries = state.slopes(values, velocity)
     m = len(values)
@@ -124,7 +129,7 @@ def differentiate_constraints(
         written=tuple(r.written for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
-        time_derivative=(*jvp(values, {state.t: graph.one, **dict(still)}), *substitute(nonholonomic, at_rest)),
+        time_derivative=(*jvp(values, {**state.clock, **dict(still)}), *substitute(nonholonomic, at_rest)),
         velocity=(*velocity, *nonholonomic),
         gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
         slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),
@@ -133,6 +138,12 @@ def differentiate_constraints(
         vanishing=tuple(r.label for r in rows if identical[r]),
         declared=len(rows),
     )
+
+
+def _is_closed(row: Row, size: float) -> bool:
+    """Whether a row is a number that is nothing but rounding of the places in it."""
+    value = row.expression.value
+    return value is not None and not row.written and abs(value) <= ROUNDED * size
 
 
 def own_rows(mechanism: Mechanism) -> list[Row]:

@@ -10,7 +10,7 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.rounding import settled_rotation, settled_vector, size_of
+from ..graph.rounding import settled_rotation
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .inertia import SpatialInertia, body_inertia, place_point, settled_matrix
@@ -32,6 +32,8 @@ class Link:
     parent: int  #: index of the parent link, GROUND for none
     first: int
     turn: Mat3  #: rotation of the joint's marker on the parent, constant
+    holder: Vec3  #: its place in parent link axes, constant
+    slide: Vec3  #: how far the joint has moved from there, along the marker's axes
     joint_rotation: Mat3
     position: Vec3
     columns: tuple[Twist, ...]
@@ -99,6 +101,8 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
                 parent=index[branch.parent],
                 first=first,
                 turn=holder.rotation,
+                holder=holder.position,
+                slide=position,
                 joint_rotation=rotation,
                 position=vec.add(holder.position, vec.times(holder.rotation, position)),
                 columns=tuple(columns),
@@ -134,10 +138,6 @@ def link_twists(graph: Graph, links: tuple[Link, ...], v: tuple[Expr, ...]) -> l
     return twists
 
 
-def _turned_point(axes: Mat3, point: Vec3) -> Vec3:
-    return settled_vector(vec.transpose_times(axes, point), size_of(point))
-
-
 class Poses:
     """Placement of links and markers in ground axes or in an ancestor link, each made once when asked for."""
 
@@ -145,7 +145,7 @@ class Poses:
         self.graph = mechanism.graph
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
-        self._known: dict[tuple[int, int, Mat3 | None], Frame] = {}
+        self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
         """Constant placement of a marker in its link frame (in ground for a ground marker)."""
@@ -160,38 +160,40 @@ class Poses:
             chain.append(self.links[chain[-1]].parent)
         return chain
 
-    def link(self, link: int, base: int = GROUND, axes: Mat3 | None = None) -> Frame:
-        """Placement of a link in link ``base``, one of its ancestors; in turned ``axes`` of the base, if given."""
+    def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""
         if link == base:
-            rotation = vec.identity(self.graph) if axes is None else vec.transpose(axes)
-            return Frame(rotation, vec.zero(self.graph))
-        key = (link, base, axes)
+            own = Frame(vec.identity(self.graph), vec.zero(self.graph))
+            return own if within is None else place(within, own)
+        key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:
             chain = self.ancestors(link)
             for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
-                if (k, base, axes) not in self._known:
-                    self._known[k, base, axes] = self._step(k, base, axes)
+                if (k, *key[1:]) not in self._known:
+                    self._known[k, base, key[2]] = self._step(k, base, within)
         return self._known[key]
 
-    def _step(self, k: int, base: int, axes: Mat3 | None) -> Frame:
+    def _step(self, k: int, base: int, within: Frame | None) -> Frame:
         link = self.links[k]
-        if link.parent == base:
-            if axes is None:
-                return Frame(vec.product(link.turn, link.joint_rotation), link.position)
-            turn = settled_rotation(vec.product(vec.transpose(axes), link.turn))
-            return Frame(vec.product(turn, link.joint_rotation), _turned_point(axes, link.position))
-        parent = self._known[link.parent, base, axes]
-        rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
-        return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+        if link.parent != base:
+            parent = self.link(link.parent, base, within)
+            rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
+            return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+        if within is None:
+            return Frame(vec.product(link.turn, link.joint_rotation), link.position)
+        holder = place(within, Frame(link.turn, link.holder))
+        moved = vec.add(holder.position, vec.times(holder.rotation, link.slide))
+        return Frame(vec.product(holder.rotation, link.joint_rotation), moved)
 
-    def marker(self, marker: Marker, base: int = GROUND, axes: Mat3 | None = None) -> Frame:
-        """Placement of a marker in link ``base``, an ancestor of its link; in turned ``axes`` of the base, if given."""
+    def marker(self, marker: Marker, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a marker in link ``base``, an ancestor of its link, or in a constant frame ``within`` that."""
         inner = self.marker_in_link(marker)
         link = self.link_of[marker.body]
-        outer = self.link(link, base, axes)
-        rotation = vec.product(outer.rotation, inner.rotation)
+        if link == base and within is not None:
+            return place(within, inner)
+        outer = self.link(link, base, within)
         return Frame(
-            settled_rotation(rotation) if link == base else rotation,
+            vec.product(outer.rotation, inner.rotation),
             vec.add(outer.position, vec.times(outer.rotation, inner.position)),
         )
 
@@ -202,25 +204,27 @@ class Poses:
         return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
 
     def pair(self, start: Marker, end: Marker) -> tuple[Frame, Frame]:
-        """Placements of two markers in the axes of :meth:`between`."""
-        base, axes = self.between(start, end)
-        return self.marker(start, base, axes), self.marker(end, base, axes)
+        """Placements of two markers in the frame of :meth:`between`."""
+        base, within = self.between(start, end)
+        return self.marker(start, base, within), self.marker(end, base, within)
 
-    def between(self, start: Marker, end: Marker) -> tuple[int, Mat3]:
-        """The nearest link that carries both markers, and axes of it (columns) with which one of their chains begins.
+    def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
+        """The nearest link that carries both markers, and a frame in it: the joint with which one of the chains begins.
 
-        So the axes of ground and of bodies, which a description may choose as it likes, drop out of what is relative.
+        So the frames of ground and of bodies, which a description may choose as it likes, drop out of what is relative.
         """
         base = self.common(start, end)
+        within = self.marker_in_link(start)
         for marker in (end, start):
             chain = self.ancestors(self.link_of[marker.body])
             if chain[0] != base:
-                axes = self.links[chain[chain.index(base) - 1]].turn
+                link = self.links[chain[chain.index(base) - 1]]
+                within = Frame(link.turn, link.holder)
                 break
-        else:
-            axes = self.marker_in_link(start).rotation
-        along = all(x.value in (0.0, 1.0, -1.0) for row in axes for x in row)  # then the base's own are as simple
-        return base, vec.identity(self.graph) if along else axes
+        along = all(x.value in (0.0, 1.0, -1.0) for row in within.rotation for x in row)
+        if along:  # then the axes of the base are as simple, and labels of rows say what they mean
+            within = Frame(vec.identity(self.graph), within.position)
+        return base, within
 
     def common(self, a: Marker, b: Marker) -> int:
         """The nearest link that carries both markers."""

@@ -44,7 +44,7 @@ class _Displaced(Poses):
         super().__init__(kinematics.mechanism, kinematics.links)
         self._true, self._origins, self._moves = kinematics.poses, origins, moves
 
-    def link(self, link: int, base: int = GROUND, axes: Mat3 | None = None) -> Frame:
+    def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
         frame = self._true.link(link)
         if link == GROUND:
             return frame
@@ -55,8 +55,8 @@ class _Displaced(Poses):
         rotation = vec.transpose((columns[0], columns[1], columns[2]))
         return Frame(rotation, vec.add(frame.position, vec.add(shift, vec.cross(turn, arm))))
 
-    def between(self, start: Marker, end: Marker) -> tuple[int, Mat3]:
-        return GROUND, vec.identity(self.graph)
+    def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
+        return GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph))
 
 
 class JointWrenches:
@@ -189,7 +189,7 @@ class JointWrenches:
         labels = [row.label for row in rows]
         if {"r_x", "r_y", "r_z"} <= set(labels):  # then these rows are along common axes (see close_loop)
             base, common = poses.between(spec.predecessor, spec.successor)
-            axes = vec.product(poses.link(base).rotation, common)
+            axes = vec.product(poses.link(base).rotation, common.rotation)
             for k, letter in enumerate("xyz"):
                 gradients[labels.index(f"r_{letter}")] = (*(row[k] for row in axes), *vec.zero(graph))
         named = [f"{spec.name}.{label}" for label in labels]
