@@ -1,6 +1,6 @@
 """A plugin of pytest: every model that the chosen tests compile is compared with itself in other clothes.
 
-``python -m pytest -p invariance.on_every_model tests/joints/test_adams.py tests/forces/test_motions.py`` ends with a table
+``python -m pytest -p invariance.on_every_model tests/joints/test_adams.py tests/forces`` ends with a table
 of breaches; the tests themselves run as always.  The published cases are models of such tests.
 """
 
