@@ -103,6 +103,7 @@ def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
 TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
 
 
