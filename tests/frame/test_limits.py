@@ -12,7 +12,7 @@ from eomgen.limits import in_c
 
 ROOT = Path(__file__).parents[2]
 BELOW = 5e-4  #: numbers in formulas, such as 1/720, are larger
-#: What is no limit: defaults of SciPy's interface, guards of folding, switches between two formulas for one thing, first
+#: What is no limit: defaults of SciPy, guards of folding, switches between two formulas for one thing, first
 #: values of iterations that adapt.
 OTHERS = {
     "graph/nodes.py": {1e-290},
