@@ -167,8 +167,11 @@ def integrate(
             raise Interrupted(_cut_short(times, states, trail, t_events, x_events, nodes[0], counts)) from interrupt
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)
+        if part.status == 1:
+            _complete(part, events, trail)
         t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
         fired: list[int] = []
+        over = False
         for e, event in enumerate(events):
             t_events[e].append(np.asarray(part.t_events[e]))
             x_events[e].append(np.asarray(part.y_events[e]).reshape(len(part.t_events[e]), len(x0)).T)
@@ -176,9 +179,9 @@ def integrate(
             if event.action != GO_ON and part.status == 1 and happened:
                 fired.append(e)
             if event.terminal:
-                over = happened >= event.terminal
+                over = over or happened >= event.terminal
                 event.terminal = max(event.terminal - happened, 1)
-                fired = [] if over else fired
+        fired = [] if over else fired
         if dense and part.sol is not None:
             pieces.append(part.sol)
         ended = float(part.t_events[fired[0]][-1]) if fired else float(span[1])
@@ -224,6 +227,28 @@ def integrate(
         counts,
         ends,
     )
+
+
+def _complete(part: Any, events: Sequence[Event], trail: Sequence[tuple[float, Array]]) -> None:
+    """Add the events of the same instant to that at which SciPy stopped: it tells of one alone.
+
+    An event whose value has changed sign since the beginning of the step, and that was not found before, is at that
+    instant, but for rounding; so is one that is to change it within the rounding of the time.
+    """
+    sign = 1.0 if trail[-1][0] >= trail[0][0] else -1.0
+    found = [(sign * times[-1], k) for k, times in enumerate(part.t_events) if len(times)]
+    latest, first = max(found)
+    t, x = sign * latest, np.array(part.y_events[first][-1])
+    began, state = next((point for point in reversed(trail) if sign * point[0] < latest), (t, x))
+    step, instant = abs(t - began), 1e-14 * max(abs(t), 1e-3)
+    for e, event in enumerate(events):
+        if len(part.t_events[e]) and sign * part.t_events[e][-1] > sign * began:
+            continue
+        a, b = event(began, state), event(t, x)
+        crossed = a * b <= 0.0 or abs(b) * step <= instant * abs(a - b)
+        if crossed and ((a < 0.0 and event.direction >= 0) or (a > 0.0 and event.direction <= 0)):
+            part.t_events[e] = np.append(part.t_events[e], t)
+            part.y_events[e] = np.vstack([np.asarray(part.y_events[e]).reshape(-1, len(x)), x])
 
 
 def _cut_short(
