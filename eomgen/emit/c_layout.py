@@ -5,27 +5,17 @@ from __future__ import annotations
 from ..program import Program
 from ..program.blocks import SHIFTS
 
+CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
+ACCELERATE = (*CLOSE, "eliminate", "partition", "embed", "ldl", "accelerate")
+#: from states on both sides of a change point
+PASSING = ("passing_curve", "passing_points", "passing", "passing_search")
+
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "project_drive"),
-    "rhs": (
-        "scaled",
-        "cholesky",
-        "residual_sizes",
-        "correct",
-        "project",
-        "close",
-        "eliminate",
-        "partition",
-        "embed",
-        "ldl",
-        "accelerate",
-        "rhs",
-    ),
+    "project": (*CLOSE, "project_drive"),
     "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
     "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
-    "outputs": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "outputs_closed"),
+    "outputs": (*CLOSE, "outputs_closed"),
 }
-ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
 
 TREES: dict[str, tuple[str, ...]] = {
     "rhs": ("tree", "tree_rhs"),
@@ -46,7 +36,18 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return ("shift_columns", name)
     if not program.has_loops:
         return ("tree", "shift_tree", name)
-    return (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
+    return (*ACCELERATE, "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
+
+
+def passes(program: Program) -> bool:
+    """Whether the right-hand side is taken from both sides of a change point where it is next to one."""
+    return program.has_loops and not program.given_rates and "system" not in program.block_names
+
+
+def rhs_files(program: Program) -> tuple[str, ...]:
+    """The files of the right-hand side of a mechanism with loops, but for its driver."""
+    here = "rhs_here_direct" if "dynamics" in program.block_names else "rhs_here"
+    return (*ACCELERATE, "weakest", here, *(PASSING if passes(program) else ()))
 
 
 def driver_files(program: Program) -> list[str]:
@@ -72,12 +73,13 @@ def driver_files(program: Program) -> list[str]:
             needed = ("tree", *along)
         elif not program.has_loops:
             needed = TREES[driver.name]
-        elif driver.name == "rhs" and "dynamics" in driver.blocks:
-            needed = (*LOOPS["rhs"][:-1], "rhs_direct")
+        elif driver.name == "rhs":
+            needed = (*rhs_files(program), "rhs_passing" if passes(program) else "rhs")
         elif driver.name == "jacobian":
-            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
+            derivative = ("multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
+            needed = (*rhs_files(program), *derivative, "jacobian_passing" if passes(program) else "jacobian_plain")
         elif driver.name == "outputs" and "terms" in driver.blocks:
-            needed = ACCELERATED
+            needed = (*ACCELERATE, "outputs_accelerated")
         else:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
@@ -90,8 +92,30 @@ def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     if name == "jacobian":
         return (*solve, direct, "system_jacobian")
     if program.has_loops and (program.projects or name == "outputs"):
-        return (*LOOPS["project"][:-1], *solve, f"system_{name}_closed")
+        return (*CLOSE, *solve, f"system_{name}_closed")
     return (*solve, f"system_{name}_given")
+
+
+def passing_areas(program: Program) -> list[tuple[str, int]]:
+    """Areas of :data:`PASSING`."""
+    if not passes(program):
+        return []
+    n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
+    values = 2 * (n_q + n)
+    return [
+        ("STATE", n_q + n),  # q, v in the middle
+        ("NEXT", values),  # q, v, x' at a point
+        ("TANGENT", n * f),
+        ("INVERSE", f * (f + n)),
+        ("HEADING", f),
+        ("DIRECTION", n),
+        ("AWAY", n_q + n),
+        ("POINTS", 10 * n_q),
+        ("SUMS", 3 * values),
+        ("BEST", values),
+        ("KEPT", n_q + n),
+        ("TURN", (n_q + n) ** 2 if "jacobian" in {d.name for d in program.drivers} else 0),
+    ]
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
@@ -145,8 +169,9 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
+            *passing_areas(program),
             ("CLOSING", n + 3 if "closing" in names else 0),
-            ("DYNAMICS", 2 * n + 1 if "dynamics" in names else 0),
+            ("DYNAMICS", 2 * n + 2 if "dynamics" in names else 0),
         ]
     if "system" in names and program.system is not None:
         size, places = len(program.system.unknowns), len(program.system.places)

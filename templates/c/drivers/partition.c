@@ -3,6 +3,7 @@ typedef struct {
     int dependent[N];
     int row[N];
     int independent[N];
+    double weakest; /* smallest of the best pivots, relative to the first: of the size of the smallest singular value */
 } partition;
 
 /* Rows [J | -column/s_c | I] of the given width in w + AT_ROWS; the unit matrix only where the width has room. */
@@ -43,6 +44,7 @@ static int split(int width, int strict, partition *restrict parts, double *restr
             }
         }
         size = step == 0 ? best_any : size;
+        parts->weakest = step == 0 ? 1.0 : fmin(parts->weakest, best_any / size);
         if (!strict && (best < 0.01 * best_any || best == 0.0)) {
             best = best_any, row = row_any, column = column_any;
         }

@@ -1,0 +1,56 @@
+/* The best interpolation of [q v x'] at the state x, to w + AT_BEST; its reach, 0 where none is better than the solution
+   at x itself; whether time goes on along the curve, and how fast the state moves (scaled). */
+static double interpolate_best(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                               double here, double *restrict pace, double *restrict speed, double *restrict w)
+{
+    double *const best = w + AT_BEST, *const state = w + AT_STATE;
+    double least = INFINITY, found = 0.0;
+    *pace = *speed = 0.0;
+    (void)rate_block(t, x, u, c, w + AT_RATE, w);
+    for (int i = 0; i < M; i++) {
+        *pace = w[AT_RATE + i] != 0.0 ? 1.0 : *pace;
+    }
+    for (int k = 0; k < NQ + N; k++) {
+        state[k] = x[k];
+        *speed = k < NQ ? 0.0 : fmax(*speed, fabs(x[k] / w[AT_SCALES + k - NQ]));
+    }
+    if (!(*speed > 1e-9)) {
+        return 0.0;
+    }
+    *pace /= *speed;
+    const double noise = 1e-15 * *speed * *speed, lost = fmax(here, 2e-4); /* of accelerations: this over the cube of the distance */
+    for (double reach = 0.1; reach > 0.01 && !(least <= 1e4 * noise); reach *= 0.5) {
+        const double error = interpolate(t, u, c, here, reach, *pace, *speed, w);
+        if (error < least) {
+            least = error, found = reach;
+            for (int k = 0; k < VALUES; k++) {
+                best[k] = w[AT_SUMS + 2 * VALUES + k];
+            }
+        }
+    }
+    return least * lost * lost * lost <= noise ? found : 0.0;
+}
+
+/* x' next to a change point, from states on both sides of it if they tell it better; status and x' at the state itself
+   are given, and come back. */
+static int rhs_across(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                      double weakest, int status, double *restrict out, double *restrict w)
+{
+    double *const best = w + AT_BEST, *const kept = w + AT_KEPT;
+    if (!(weakest < NEAR) || (status != 0 && status != EOMGEN_PARTITION_BAD)) {
+        return status;
+    }
+    for (int k = 0; k < NQ + N; k++) {
+        kept[k] = w[AT_X + k];
+    }
+    double pace, speed;
+    const int found = interpolate_best(t, x, u, c, weakest, &pace, &speed, w) > 0.0;
+    for (int k = 0; k < NQ + N; k++) {
+        w[AT_X + k] = found ? best[k] : kept[k];
+        out[k] = found ? best[NQ + N + k] : out[k];
+    }
+    if (found) {
+        normalise(w + AT_X);
+    }
+    return found ? 0 : status;
+}
