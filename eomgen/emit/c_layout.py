@@ -6,14 +6,17 @@ from ..program import Program
 from ..program.blocks import SHIFTS
 
 CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
-ACCELERATE = (*CLOSE, "eliminate", "partition", "embed", "ldl", "accelerate")
+PIVOT = ("eliminate", "pivots", "partition")
+ACCELERATE = (*CLOSE, *PIVOT, "embed", "ldl", "accelerate")
+SOLVE = ("system_balance", "system_factor", "system_substitute", "system_solve")
+DERIVE = ("correct_change", "jacobian_projection", "jacobian")
 #: from states on both sides of a change point
 PASSING = ("passing_curve", "passing_points", "passing", "passing_search")
 
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": (*CLOSE, "project_drive"),
-    "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
-    "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
+    "project": (*CLOSE, "is_closed", "project_drive"),
+    "embedded_mass_matrix": ("scaled", *PIVOT, "embed", "mass"),
+    "kinematics": ("scaled", *PIVOT, "embed", "kinematics", "kinematics_drive"),
     "outputs": (*CLOSE, "outputs_closed"),
 }
 
@@ -41,13 +44,16 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
 
 def passes(program: Program) -> bool:
     """Whether the right-hand side is taken from both sides of a change point where it is next to one."""
-    return program.has_loops and not program.given_rates and "system" not in program.block_names
+    return program.has_loops and program.projects and not program.given_rates
 
 
 def rhs_files(program: Program) -> tuple[str, ...]:
     """The files of the right-hand side of a mechanism with loops, but for its driver."""
-    here = "rhs_here_direct" if "dynamics" in program.block_names else "rhs_here"
-    return (*ACCELERATE, "weakest", here, *(PASSING if passes(program) else ()))
+    if "system" in program.block_names:
+        here: tuple[str, ...] = (*CLOSE, *PIVOT, "embed", *SOLVE, "weakest", "system_rhs_here")
+    else:
+        here = (*ACCELERATE, "weakest", "rhs_here_direct" if "dynamics" in program.block_names else "rhs_here")
+    return (*here, *(PASSING if passes(program) else ()))
 
 
 def driver_files(program: Program) -> list[str]:
@@ -64,6 +70,8 @@ def driver_files(program: Program) -> list[str]:
             needed: tuple[str, ...] = ("dae_jacobian",)
         elif driver.name in SHIFTS:
             needed = shift_files(program, driver.name, direct)
+        elif passes(program) and driver.name in ("rhs", "project", "outputs", "jacobian"):
+            needed = _passing_files(program, driver.name, direct)
         elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
         elif program.by_columns and "terms" not in driver.blocks:
@@ -74,10 +82,9 @@ def driver_files(program: Program) -> list[str]:
         elif not program.has_loops:
             needed = TREES[driver.name]
         elif driver.name == "rhs":
-            needed = (*rhs_files(program), "rhs_passing" if passes(program) else "rhs")
+            needed = (*rhs_files(program), "rhs")
         elif driver.name == "jacobian":
-            derivative = ("multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
-            needed = (*rhs_files(program), *derivative, "jacobian_passing" if passes(program) else "jacobian_plain")
+            needed = (*rhs_files(program), "multipliers", direct, *DERIVE, "jacobian_plain")
         elif driver.name == "outputs" and "terms" in driver.blocks:
             needed = (*ACCELERATE, "outputs_accelerated")
         else:
@@ -86,14 +93,26 @@ def driver_files(program: Program) -> list[str]:
     return list(files)
 
 
+def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """Files of a driver of :func:`passes`."""
+    accelerates = {"system", "terms"} & {block for d in program.drivers if d.name == name for block in d.blocks}
+    if name == "jacobian":
+        return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *DERIVE, "jacobian_passing")
+    if name == "project":
+        rates = any(d.name == "rhs" for d in program.drivers)
+        return (*CLOSE, "is_closed", *((*rhs_files(program), "project_passing") if rates else ("project_drive",)))
+    if name == "outputs" and not accelerates:
+        return LOOPS[name]
+    return (*rhs_files(program), f"{name}_passing")
+
+
 def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """Files of a driver that solves the linear system of a method."""
-    solve = ("system_balance", "system_factor", "system_substitute", "system_solve")
     if name == "jacobian":
-        return (*solve, direct, "system_jacobian")
+        return (*SOLVE, direct, "system_jacobian")
     if program.has_loops and (program.projects or name == "outputs"):
-        return (*CLOSE, *solve, f"system_{name}_closed")
-    return (*solve, f"system_{name}_given")
+        return (*rhs_files(program), "rhs") if name == "rhs" else (*CLOSE, *SOLVE, "system_outputs_closed")
+    return (*SOLVE, f"system_{name}_given")
 
 
 def passing_areas(program: Program) -> list[tuple[str, int]]:
@@ -114,6 +133,7 @@ def passing_areas(program: Program) -> list[tuple[str, int]]:
         ("SUMS", 3 * values),
         ("BEST", values),
         ("KEPT", n_q + n),
+        ("RATED", n_q + n),
         ("TURN", (n_q + n) ** 2 if "jacobian" in {d.name for d in program.drivers} else 0),
     ]
 

@@ -10,7 +10,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     }
     double pace, speed;
     const double reach = interpolate_best(t, x, u, c, weakest, &pace, &speed, w);
-    if (!(reach > 0.0) || !set_out(t, u, c, reach, pace, speed, w)) {
+    if (!(reach > 0.0) || !(set_out(t, u, c, reach, pace, speed, w) > 0.0)) {
         return status;
     }
     for (int k = 0; k < NX * NX; k++) {

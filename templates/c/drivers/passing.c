@@ -27,12 +27,13 @@ static double interpolate(double t, const double *restrict u, const double *rest
 {
     double *const sums = w + AT_SUMS, *const state = w + AT_NEXT, *const x_dot = state + NQ + N;
     const double *const s = w + AT_SCALES;
-    double around = 0.0, weakest, last = 0.0, before = 0.0;
+    double around, weakest, last = 0.0, before = 0.0;
     partition parts;
     for (int k = 0; k < 3 * VALUES; k++) {
         sums[k] = 0.0;
     }
-    if (!set_out(t, u, c, reach, pace, speed, w)) {
+    around = set_out(t, u, c, reach, pace, speed, w);
+    if (!(around > 0.0)) {
         return INFINITY;
     }
     for (int pair = 1; pair <= PAIRS; pair++) {
@@ -42,7 +43,7 @@ static double interpolate(double t, const double *restrict u, const double *rest
             if (p == NULL) {
                 return INFINITY;
             }
-            around += pair == 1 ? find_weakest(at, p, u, c, &parts, w) : 0.0;
+            around += pair == 1 && side == 1 ? find_weakest(at, p, u, c, &parts, w) : 0.0;
             for (int k = 0; k < NQ + N; k++) {
                 state[k] = k < NQ ? p[k] : w[AT_STATE + k];
             }

@@ -13,8 +13,8 @@ static void step_along(double t, const double *restrict u, const double *restric
     move(p, step);
 }
 
-/* Tangent basis, heading and direction, from a first point of the curve for the velocities v. */
-static int set_out(double t, const double *restrict u, const double *restrict c, double reach, double pace,
+/* Tangent basis, heading and direction, from a first point of the curve for the velocities v; its weakest pivot, or 0. */
+static double set_out(double t, const double *restrict u, const double *restrict c, double reach, double pace,
                    double speed, double *restrict w)
 {
     partition parts;
@@ -23,15 +23,16 @@ static int set_out(double t, const double *restrict u, const double *restrict c,
         w[AT_DIRECTION + k] = w[AT_STATE + NQ + k] / w[AT_SCALES + k] / speed;
     }
     step_along(t, u, c, reach, p, w);
-    if (bring(t + reach * pace, p, u, c, w) != 0 || find_weakest(t + reach * pace, p, u, c, &parts, w) == 0.0) {
-        return 0;
+    const double weakest = bring(t + reach * pace, p, u, c, w) == 0 ? find_weakest(t + reach * pace, p, u, c, &parts, w) : 0.0;
+    if (weakest == 0.0) {
+        return 0.0;
     }
     form_transformation(N + 1, &parts, w);
     for (int k = 0; k < N * F; k++) {
         w[AT_TANGENT + k] = w[AT_B + k];
     }
     invert_tangent(w);
-    return set_heading(w);
+    return set_heading(w) ? weakest : 0.0;
 }
 
 /* Closes the point p, guessed, at a distance along the curve. */

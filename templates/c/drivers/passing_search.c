@@ -18,8 +18,8 @@ static double interpolate_best(double t, const double *restrict x, const double 
         return 0.0;
     }
     *pace /= *speed;
-    const double noise = 1e-15 * *speed * *speed, lost = fmax(here, 2e-4); /* of accelerations: this over the cube of the distance */
-    for (double reach = 0.1; reach > 0.01 && !(least <= 1e4 * noise); reach *= 0.5) {
+    const double square = *speed * *speed, lost = fmax(here, 1e-4);
+    for (double reach = 0.1; reach > 0.01 && !(least <= 1e-11 * square); reach *= 0.5) {
         const double error = interpolate(t, u, c, here, reach, *pace, *speed, w);
         if (error < least) {
             least = error, found = reach;
@@ -28,7 +28,7 @@ static double interpolate_best(double t, const double *restrict x, const double 
             }
         }
     }
-    return least * lost * lost * lost <= noise ? found : 0.0;
+    return least * lost * lost * lost <= 1e-16 * square ? found : 0.0;
 }
 
 /* x' next to a change point, from states on both sides of it if they tell it better; status and x' at the state itself
@@ -37,7 +37,7 @@ static int rhs_across(double t, const double *restrict x, const double *restrict
                       double weakest, int status, double *restrict out, double *restrict w)
 {
     double *const best = w + AT_BEST, *const kept = w + AT_KEPT;
-    if (!(weakest < NEAR) || (status != 0 && status != EOMGEN_PARTITION_BAD)) {
+    if (!(weakest < NEAR) || (status != 0 && status != EOMGEN_PARTITION_BAD && status != EOMGEN_UNSOLVED)) {
         return status;
     }
     for (int k = 0; k < NQ + N; k++) {
