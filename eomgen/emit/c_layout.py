@@ -130,7 +130,7 @@ def passing_areas(program: Program) -> list[tuple[str, int]]:
         ("DIRECTION", n),
         ("AWAY", n_q + n),
         ("POINTS", 10 * n_q),
-        ("SUMS", 3 * values),
+        ("SUMS", 4 * values),
         ("BEST", values),
         ("KEPT", n_q + n),
         ("RATED", n_q + n),

@@ -28,7 +28,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
                 return status;
             }
             for (int k = 0; k < NX * NX; k++) {
-                out[k] += WEIGHT[2][pair - 1] * turn[k];
+                out[k] += WEIGHT[3][pair - 1] * turn[k];
             }
         }
     }

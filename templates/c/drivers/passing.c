@@ -1,5 +1,6 @@
-/* Both points of the pair at so many reaches by 3, 4 and 5 pairs: interpolation in the middle. */
-static const double WEIGHT[3][PAIRS] = {{ 3.0 / 4, -3.0 / 10, 1.0 / 20, 0.0, 0.0 },
+/* Both points of the pair at so many reaches by 2 to 5 pairs: interpolation in the middle. */
+static const double WEIGHT[4][PAIRS] = {{ 2.0 / 3, -1.0 / 6, 0.0, 0.0, 0.0 },
+                                        { 3.0 / 4, -3.0 / 10, 1.0 / 20, 0.0, 0.0 },
                                         { 4.0 / 5, -2.0 / 5, 4.0 / 35, -1.0 / 70, 0.0 },
                                         { 5.0 / 6, -10.0 / 21, 5.0 / 28, -5.0 / 126, 1.0 / 252 }};
 
@@ -27,19 +28,16 @@ static double interpolate(double t, const double *restrict u, const double *rest
 {
     double *const sums = w + AT_SUMS, *const state = w + AT_NEXT, *const x_dot = state + NQ + N;
     const double *const s = w + AT_SCALES;
-    double around, weakest, last = 0.0, before = 0.0;
+    double around, weakest, total = 0.0, last[3] = {0.0, 0.0, 0.0};
     partition parts;
-    for (int k = 0; k < 3 * VALUES; k++) {
+    around = set_out(t, u, c, reach, pace, speed, w);
+    for (int k = 0; k < 4 * VALUES; k++) {
         sums[k] = 0.0;
     }
-    around = set_out(t, u, c, reach, pace, speed, w);
-    if (!(around > 0.0)) {
-        return INFINITY;
-    }
     for (int pair = 1; pair <= PAIRS; pair++) {
-        for (int side = 0; side < 2; side++) {
+        for (int side = 0; side < 2; side++) { /* no curve: around = 0 */
             const double at = t + (side ? -reach : reach) * pair * pace;
-            const double *const p = next_point(t, u, c, pair, side, reach, pace, w);
+            const double *const p = around > 0.0 ? next_point(t, u, c, pair, side, reach, pace, w) : NULL;
             if (p == NULL) {
                 return INFINITY;
             }
@@ -51,14 +49,14 @@ static double interpolate(double t, const double *restrict u, const double *rest
                 rhs_here(at, state, u, c, x_dot, &weakest, w) != 0) {
                 return INFINITY;
             }
-            for (int n = 0; n < 3; n++) {
+            for (int n = 0; n < 4; n++) {
                 for (int k = 0; k < VALUES; k++) {
                     sums[n * VALUES + k] += WEIGHT[n][pair - 1] * (k < NQ + N ? w[AT_X + k] : x_dot[k - NQ - N]);
                 }
             }
         }
     }
-    const double *const q = sums + 2 * VALUES;
+    const double *const q = sums + 3 * VALUES;
     (void)position_block(t, q, u, c, w + AT_POSITION, w);
     form_scaled(w + AT_POSITION + MH, s, w + AT_J);
     if (!is_within(1e-12, 64.0, w + AT_POSITION, w + AT_J, q, s)) { /* the branch does not run through */
@@ -67,8 +65,13 @@ static double interpolate(double t, const double *restrict u, const double *rest
     for (int k = NQ; k < VALUES; k++) {
         const int rate = k - NQ - N - NQ; /* accelerations; velocities, by what they change in unit distance */
         const double unit = rate >= 0 ? s[rate] : k < NQ + N ? s[k - NQ] / speed : INFINITY;
-        last = fmax(last, fabs(q[k] - q[k - VALUES]) / unit);
-        before = fmax(before, fabs(q[k - VALUES] - q[k - 2 * VALUES]) / unit);
+        total += q[k];
+        for (int n = 0; n < 3; n++) {
+            last[n] = fmax(last[n], fabs(q[k - n * VALUES] - q[k - (n + 1) * VALUES]) / unit);
+        }
     }
-    return isfinite(last) && isfinite(before) ? (last < before ? last * (last / before) : last) : INFINITY;
+    /* differences fall by this factor at least; one alone may be small by chance */
+    const double factor = fmin(1.0, fmax(last[0] / last[1], last[1] / last[2]));
+    const double error = fmax(last[0] * factor, last[1] * factor * factor);
+    return !isfinite(total) ? INFINITY : last[0] > 0.0 ? error : 0.0;
 }

@@ -46,6 +46,7 @@ static int find_point(double t, const double *restrict u, const double *restrict
         if (bring(t, p, u, c, w) != 0) {
             return 0;
         }
+        normalise(p);
         for (int k = 0; k < NQ; k++) {
             away[k] = p[k] - q[k];
         }

@@ -14,6 +14,7 @@ static double interpolate_best(double t, const double *restrict x, const double 
         state[k] = x[k];
         *speed = k < NQ ? 0.0 : fmax(*speed, fabs(x[k] / w[AT_SCALES + k - NQ]));
     }
+    normalise(state);
     if (!(*speed > 1e-9)) {
         return 0.0;
     }
@@ -24,7 +25,7 @@ static double interpolate_best(double t, const double *restrict x, const double 
         if (error < least) {
             least = error, found = reach;
             for (int k = 0; k < VALUES; k++) {
-                best[k] = w[AT_SUMS + 2 * VALUES + k];
+                best[k] = w[AT_SUMS + 3 * VALUES + k];
             }
         }
     }
