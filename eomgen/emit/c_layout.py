@@ -100,10 +100,11 @@ def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *DERIVE, "jacobian_passing")
     if name == "project":
         rates = any(d.name == "rhs" for d in program.drivers)
-        return (*CLOSE, "is_closed", *((*rhs_files(program), "project_passing") if rates else ("project_drive",)))
+        across = (*rhs_files(program), "rhs_across", "project_passing")
+        return (*CLOSE, "is_closed", *(across if rates else ("project_drive",)))
     if name == "outputs" and not accelerates:
         return LOOPS[name]
-    return (*rhs_files(program), f"{name}_passing")
+    return (*rhs_files(program), "rhs_across", f"{name}_passing")
 
 
 def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Next to a change point and in it: accelerations and their Jacobian against the same motion without that singularity.
 
-A parallelogram whose fourth hinge is replaced by the couplings bend = -theta, psi = theta moves in the same way, and its
+A parallelogram whose fourth hinge is replaced by the couplings bend = -theta, psi = theta moves in the same way; its
 constraints never lose rank.
 """
 
