@@ -219,7 +219,7 @@ class LoopBlocks:
             least = pivots[0]
             for pivot in pivots[1:]:
                 least = graph.apply("min", least, pivot)
-            far = graph.apply("or", far, graph.apply("lt", self._rows_size * NEAR_SQUARE_SQUARE, least))
+            far = graph.apply("or", far, graph.apply("lt", self._rows_size * NEAR_SQUARE, least))
         return far
 
     # -- partition ------------------------------------------------------------------------------------------------
