@@ -16,6 +16,7 @@ from .events import CROWD, CROWDED, GO_ON, WAIT, Event, Events
 from .names import require, unknown
 from .pace import Pace, watch_steps
 
+KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -31,6 +32,7 @@ class Solution(NamedTuple):
     message: str
     counts: dict[str, int]
     ends: tuple[float, float]  #: first and last time reached
+    steps: tuple[Array, Array] | None = None  #: (k,), (n_x, k) of every step, where others are stored; k = 0: too many
 
 
 class Interrupted(KeyboardInterrupt):
@@ -137,6 +139,7 @@ def integrate(
     t_events: list[list[Array]] = [[] for _ in events]
     x_events: list[list[Array]] = [[] for _ in events]
     pieces: list[Any] = []
+    walked: list[tuple[float, Array]] = []
     counts = {"nfev": 0, "njev": 0, "nlu": 0}
     x, k, start, jumped = x0, 0, nodes[0], True
     last_reset, crowded, resets = np.inf, 0, 0
@@ -176,6 +179,10 @@ def integrate(
         if dense and part.sol is not None:
             pieces.append(part.sol)
         ended = float(part.t_events[fired[0]][-1]) if fired else float(span[1])
+        if t_eval is not None:
+            walked += trail[0 if jumped else 1 :]
+            if part.status == 1:  # an event, beyond which the last step went
+                walked[-1] = _stopped(part, nodes[-1] >= nodes[0])
         done = (last and not fired) or part.status == -1 or (part.status == 1 and not fired)
         if t_eval is None:
             skip = 0 if jumped else 1  # a part starts where the last one ended
@@ -226,7 +233,20 @@ def integrate(
         str(part.message),
         counts,
         ends,
+        _columns(walked, len(x0)) if t_eval is not None else None,
     )
+
+
+def _columns(walked: Sequence[tuple[float, Array]], n: int) -> tuple[Array, Array]:
+    """Times (k,) and states (n, k) of steps; none where they are more than KEPT."""
+    kept = walked if len(walked) * (1 + n) <= KEPT else []
+    return np.array([t for t, _ in kept]), np.array([x for _, x in kept]).reshape(len(kept), n).T
+
+
+def _stopped(part: Any, forward: bool) -> tuple[float, Array]:
+    """Time and state of the event that ended a part, which is the last of all."""
+    found = [(float(t[-1]), x[-1]) for t, x in zip(part.t_events, part.y_events, strict=True) if len(t)]
+    return max(found, key=lambda pair: pair[0] if forward else -pair[0])
 
 
 def _cut_short(
