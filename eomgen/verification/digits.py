@@ -174,7 +174,10 @@ def solve(matrix: list[Numbers], right: list[Numbers]) -> list[Numbers]:
         for i in range(k + 1, n):
             if rows[i][k]:
                 factor = rows[i][k] / pivot[k]
-                rows[i] = [*rows[i][: k + 1], *(x - factor * y if y else x for x, y in zip(rows[i][k + 1 :], pivot[k + 1 :], strict=True))]
+                rows[i] = [
+                    *rows[i][: k + 1],
+                    *(x - factor * y if y else x for x, y in zip(rows[i][k + 1 :], pivot[k + 1 :], strict=True)),
+                ]
     solution: list[Numbers] = [[] for _ in range(n)]
     for i in reversed(range(n)):
         row = rows[i]

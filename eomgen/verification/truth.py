@@ -266,7 +266,9 @@ class Truth:
     def drives(self) -> list[tuple[str, Number]]:
         """Inertias of drives, by the coordinate they turn with."""
         specs = [s for s in self.system.mechanism.joints if s.armature is not None]
-        flat = self.system.evaluate("drives", lambda: [s.armature for s in specs if s.armature is not None], self.values)
+        flat = self.system.evaluate(
+            "drives", lambda: [s.armature for s in specs if s.armature is not None], self.values
+        )
         return [(s.coordinates[0], x) for s, x in zip(specs, flat, strict=True)]
 
     # -- equations of motion of the tree ------------------------------------------------------------------------------
@@ -359,7 +361,9 @@ class Truth:
     def rate_rows(self, values: Values) -> Numbers:
         """The nonholonomic rows A v + b."""
         terms = self.system.terms
-        return self.system.evaluate("velocity rows", lambda: terms.velocity_constraints[len(terms.constraints) :], values)
+        return self.system.evaluate(
+            "velocity rows", lambda: terms.velocity_constraints[len(terms.constraints) :], values
+        )
 
     @cached_property
     def constraint_jacobian(self) -> Matrix:

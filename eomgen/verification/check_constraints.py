@@ -1,0 +1,172 @@
+"""Stage verification, check constraints: joints hold what they should, and derivatives of constraints are derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..frames import GROUND, Marker
+from . import bodies
+from .bench import Bench, numbers
+from .comparison import Comparison, pairs, size_of
+from .finding import Finding
+from .rounding import UNIT
+from .truth import Truth
+
+
+def check(bench: Bench) -> list[Finding]:
+    """Poses and joints; C_q, C' and gamma by differences; slopes of potentials."""
+    return [_rigid(bench), _joints(bench), _jacobian(bench), _velocity(bench), _gamma(bench), _potentials(bench)]
+
+
+def _rigid(bench: Bench) -> Finding:
+    """R^T R = 1 and det R = 1 for every body."""
+    check = "poses: rotations are rotations"
+    if not bench.layout.n_bodies:
+        return Finding.skipped(check, "there are no bodies")
+    found = Comparison(check)
+    bounds = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    for k, case in enumerate(bench.cases):
+        poses = bench.call("poses", case)
+        error = 8.0 * bounds[:, k].reshape(-1, 4, 4)[:, :3, :3].max(axis=(1, 2)) + 8.0 * UNIT
+        R = poses[:, :3, :3]
+        gap = np.abs(np.einsum("bij,bik->bjk", R, R) - np.eye(3)).max(axis=(1, 2))
+        gap = np.maximum(gap, np.abs(np.linalg.det(R) - 1.0))
+        found.add(k, gap, error, 1.0, bench.layout.bodies)
+    return found.finding()
+
+
+def placed(truth: Truth, marker: Marker, name: str) -> bodies.Pose:
+    """A marker in ground axes, from the pose of its body."""
+    frame = marker.frame
+    flat = truth.system.evaluate(
+        f"marker {name}", lambda: [*frame.position, *(x for row in frame.rotation for x in row)], truth.values
+    )
+    position, rotation = flat[:3], [flat[3:6], flat[6:9], flat[9:12]]
+    if marker.body == GROUND:
+        return bodies.Pose(rotation, position)
+    body = truth.here[marker.body]
+    return bodies.Pose(
+        bodies.product(body.rotation, rotation), bodies.add(body.position, bodies.times(body.rotation, position))
+    )
+
+
+def _joints(bench: Bench) -> Finding:
+    """At every joint the successor stands, seen from the predecessor, where the joint's coordinates say.
+
+    Joints of the tree and cut ones alike, which tells whether loops have all the equations they need; joints without
+    coordinates by their own equations.
+    """
+    check = "joints: ends where their coordinates say"
+    if not bench.mechanism.joints:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    cut = bench.kinematics.loop_coordinates
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    held = (
+        bench.bounds("constraints", lambda: bench.terms.constraints)[1]
+        if bench.terms.constraints
+        else np.zeros((0, len(bench.cases)))
+    )
+    for k, truth in enumerate(bench.truths):
+        measured = dict(zip(cut.names, truth.measured(truth.values), strict=True)) if cut.names else {}
+        gaps, labels = [], []
+        for spec in bench.mechanism.joints:
+            if not spec.joint.coordinates and spec.joint.role == "loop":
+                continue
+            outer = placed(truth, spec.predecessor, f"{spec.name} P")
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            symbols = [graph.symbol(name) for name in spec.coordinates]
+            rotation, position = spec.joint.pose(graph, symbols)
+            values = truth.values | {n: measured[n] for n in spec.coordinates if n in measured}
+            flat = truth.system.evaluate(
+                f"pose {spec.name}", lambda r=rotation, p=position: [*p, *(x for row in r for x in row)], values
+            )  # type: ignore[misc]
+            back = bodies.transpose(outer.rotation)
+            turn = bodies.product(back, inner.rotation)
+            place = bodies.times(back, bodies.sub(inner.position, outer.position))
+            own = [*place, *(x for row in turn for x in row)]
+            gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+            labels += [f"{spec.name} {what}" for what in ("x", "y", "z", *["rotation"] * 9)]
+        C = bench.module.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all")
+        moved = float(np.abs(np.linalg.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
+        length = max(1.0, bench.layout.length)
+        rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
+            np.abs(C).max(initial=0.0)
+        )
+        limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _jacobian(bench: Bench) -> Finding:
+    check = "constraint_jacobian: differences of C"
+    if not bench.terms.n_c:
+        return Finding.skipped(check, "there are no constraints")
+    found, layout = Comparison(check), bench.layout
+    bounds = bench.bounds("constraint_jacobian", bench.graph_kernels["constraint_jacobian"])[1]
+    for k, truth in enumerate(bench.truths):
+        expected = numbers([x for row in truth.constraint_jacobian for x in row])
+        actual = bench.call("constraint_jacobian", truth.case).ravel()
+        limit = bounds[:, k] + UNIT * np.abs(expected)
+        found.add(k, actual - expected, limit + 1e-30, size_of(expected), pairs(layout.constraint_labels, layout.v))
+    return found.finding()
+
+
+def _velocity(bench: Bench) -> Finding:
+    check = "velocity_constraints: rate of C along the motion"
+    if not bench.terms.n_c:
+        return Finding.skipped(check, "there are no constraints")
+    found = Comparison(check)
+    bounds = bench.bounds("velocity_constraints", bench.graph_kernels["velocity_constraints"])[1]
+    for k, truth in enumerate(bench.truths):
+        expected = numbers(truth.velocity_rows)
+        actual = bench.call("velocity_constraints", truth.case)
+        size = float((np.abs(bench.call("constraint_jacobian", truth.case)) @ np.abs(truth.case.v)).max(initial=0.0))
+        limit = bounds[:, k] + UNIT * np.abs(expected)
+        found.add(k, actual - expected, limit + 1e-30, size, bench.layout.constraint_labels)
+    return found.finding()
+
+
+def _gamma(bench: Bench) -> Finding:
+    """gamma has no kernel of its own: the graph's is judged here, what is generated from it by the accelerations."""
+    check = "gamma: second differences of C along the motion"
+    if not bench.terms.n_c or not bench.layout.projects:
+        return Finding.skipped(
+            check, "there are no constraints" if bench.layout.projects else "derived with baumgarte="
+        )
+    found = Comparison(check)
+    values, bounds = bench.bounds("gamma", lambda: bench.terms.gamma)
+    for k, truth in enumerate(bench.truths):
+        expected = numbers(truth.gamma)
+        limit = bounds[:, k] + UNIT * np.abs(expected)
+        found.add(
+            k,
+            values[:, k] - expected,
+            limit + 1e-24 * size_of(expected),
+            size_of(expected),
+            bench.layout.constraint_labels,
+        )
+    return found.finding()
+
+
+def _potentials(bench: Bench) -> Finding:
+    """What an element with a potential exerts, less its friction, is the slope of the potential."""
+    check = "forces: slopes of their potentials"
+    forces = [terms for terms in bench.kinematics.forces if terms.potential is not None]
+    if not forces:
+        return Finding.skipped(check, "no force element has a potential")
+    found, layout = Comparison(check), bench.layout
+    for k, truth in enumerate(bench.truths):
+        parts = [terms.potential for terms in forces if terms.potential is not None]
+
+        def total(values: dict[str, bodies.Number], parts: list = parts, truth: Truth = truth) -> list[bodies.Number]:  # type: ignore[type-arg]
+            return [sum(truth.system.evaluate("potentials", lambda: parts, values), truth.zero)]
+
+        slopes = [truth.slope(total, lambda s, j=j: truth.displaced(j, s))[0] for j in range(layout.n_v)]  # type: ignore[misc]
+        every, rest = truth.applied(), truth.applied(remainder=True)
+        gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
+        own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
+        # in many digits on both sides: differences leave 1e-32, declared functions are known in doubles
+        limit = 64.0 * UNIT * own if bench.kinematics.graph.calls else 1e-24 * own + 1e-40
+        found.add(k, gap, limit, size_of(own), layout.v)
+    return found.finding()
