@@ -1,10 +1,12 @@
-"""Stage verification, check constraints: joints hold what they should, and derivatives of constraints are derivatives."""
+"""Stage verification, check constraints: joints and poses, and derivatives of constraints by differences."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..describe.mechanism import JointSpec
 from ..frames import GROUND, Marker
+from ..joints import Prismatic, Revolute
 from . import bodies
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
@@ -13,9 +15,20 @@ from .rounding import UNIT
 from .truth import Truth
 
 
+PARTS = ("x", "y", "z", *["rotation"] * 9)  #: of a relative pose
+
+
 def check(bench: Bench) -> list[Finding]:
     """Poses and joints; C_q, C' and gamma by differences; slopes of potentials."""
-    return [_rigid(bench), _joints(bench), _jacobian(bench), _velocity(bench), _gamma(bench), _potentials(bench)]
+    return [
+        _rigid(bench),
+        _joints(bench),
+        _freedoms(bench),
+        _jacobian(bench),
+        _velocity(bench),
+        _gamma(bench),
+        _potentials(bench),
+    ]
 
 
 def _rigid(bench: Bench) -> Finding:
@@ -86,7 +99,12 @@ def _joints(bench: Bench) -> Finding:
             place = bodies.times(back, bodies.sub(inner.position, outer.position))
             own = [*place, *(x for row in turn for x in row)]
             gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
-            labels += [f"{spec.name} {what}" for what in ("x", "y", "z", *["rotation"] * 9)]
+            labels += [f"{spec.name} {what}" for what in PARTS]
+            plain = _textbook(spec, truth)
+            if plain is not None:
+                flat = [*plain.position, *(x for row in plain.rotation for x in row)]
+                gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
+                labels += [f"{spec.name} {what}" for what in PARTS]
         C = bench.module.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all")
         moved = float(np.abs(np.linalg.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, bench.layout.length)
@@ -96,6 +114,58 @@ def _joints(bench: Bench) -> Finding:
         limit = 8.0 * length * (float(limits[:, k].max(initial=0.0)) + UNIT + (1.0 + moved) * rounding)
         found.add(k, gaps, limit, 1.0, labels)
     return found.finding()
+
+
+def _textbook(spec: JointSpec, truth: Truth) -> bodies.Pose | None:
+    """Joints of one degree, written out once more: S turned by q about z, or shifted by q along z, in P."""
+    if not isinstance(spec.joint, Revolute | Prismatic) or spec.coordinates[0] not in truth.values:
+        return None
+    mp, q, o = truth.mp, truth.values[spec.coordinates[0]], truth.zero
+    one = mp.mpf(1)
+    if isinstance(spec.joint, Prismatic):
+        return bodies.Pose([[one, o, o], [o, one, o], [o, o, one]], [o, o, q])
+    c, s = mp.cos(q), mp.sin(q)
+    return bodies.Pose([[c, -s, o], [s, c, o], [o, o, one]], [o, o, o])
+
+
+def _freedoms(bench: Bench) -> Finding:
+    """In a unit of one velocity, and q' = N v, the successor moves by the joint's column of it, all else at rest.
+
+    An angular velocity of a joint in Euler parameters is the relative one, in the successor's axes.
+    """
+    check = "joints: relative velocities"
+    if not bench.mechanism.joints or bench.mechanism.bare:
+        return Finding.skipped(check, "there are no joints")
+    found, graph = Comparison(check), bench.kinematics.graph
+    limits = bench.bounds("poses", lambda: bench.terms.poses)[1]
+    names = bench.layout.v
+    for k, truth in enumerate(bench.truths):
+        gaps, labels = [], []
+        for spec in (bench.mechanism.joints[b.joint] for b in bench.kinematics.topology.branches):
+            columns = spec.joint.subspace(graph, [graph.symbol(name) for name in spec.coordinates])
+            inner = placed(truth, spec.successor, f"{spec.name} S")
+            for name, (angular, linear) in zip(spec.velocities, columns, strict=True):
+                flat = truth.system.evaluate(f"column {name}", lambda a=angular, l=linear: [*a, *l], truth.values)  # type: ignore[misc]
+                turn, shift = (bodies.times(inner.rotation, part) for part in (flat[:3], flat[3:]))
+                own = _relative(truth, spec, names.index(name), inner)
+                gaps += [float(x - y) for x, y in zip((*own.angular, *own.linear), (*turn, *shift), strict=True)]
+                labels += [f"{name} {what}" for what in ("turning", "turning", "turning", "moving", "moving", "moving")]
+        limit = 64.0 * (float(limits[:, k].max(initial=0.0)) + UNIT) * max(1.0, bench.layout.length)
+        found.add(k, gaps, limit, 1.0, labels)
+    return found.finding()
+
+
+def _relative(truth: Truth, spec: JointSpec, j: int, inner: bodies.Pose) -> bodies.Twist:
+    """Twist of S relative to P at S, ground axes, in a unit of velocity j."""
+    ends = []
+    for marker in (spec.successor, spec.predecessor):
+        if marker.body == GROUND:
+            ends.append(bodies.Twist([truth.zero] * 3, [truth.zero] * 3))
+            continue
+        w = truth.virtual[j][marker.body]
+        ends.append(bodies.Twist(w.angular, w.at(bodies.sub(inner.position, truth.here[marker.body].position))))
+    s, p = ends
+    return bodies.Twist(bodies.sub(s.angular, p.angular), bodies.sub(s.linear, p.linear))
 
 
 def _jacobian(bench: Bench) -> Finding:
