@@ -16,7 +16,7 @@ from .screen import print_json, stage
 @click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")
 def verify(work: Prepared, states: int, seed: int, as_json: bool) -> None:
-    """Compare a compiled model with its graph, 50 digits, free bodies and more; exits with 5 where a limit is broken."""
+    """Compare a compiled model with its graph, 50 digits and free bodies; exits with 5 where a limit is broken."""
     from ..verification.verify import verify_model
 
     with stage("verify"):

@@ -104,8 +104,7 @@ class Bench:
         }
         if not terms.by_columns:
             found["mass_matrix"] = lambda: flat(tree.mass_matrix)
-        known = self.layout.metadata["kernels"] if "kernels" in self.layout.metadata else KERNELS
-        names = set(self.module.core.names) & (set(known) | set(self.module.core.names))
+        names = self.module.core.names
         return {k: f for k, f in found.items() if k in names and 0 not in self.layout.shape(k)}
 
     # -- labels -------------------------------------------------------------------------------------------------------

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
+from .digits import Number
 from .finding import Finding
 from .rounding import EPS, UNIT
 from .truth import Truth
@@ -46,7 +48,7 @@ def _tree(bench: Bench, name: str) -> Finding:
         else:
             bound = layout.n_v * bench.bounds("inverse_dynamics", lambda: bench.terms.inverse_dynamics)[1][:, k].max()
         size = size_of(expected)
-        floor = EPS * size  # of turns by rounded angles, which the derivation may take as exact
+        floor = np.full(len(expected), EPS * size)  # of turns by rounded angles, which the derivation may take as exact
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
             floor = EPS * np.outer(d, d).ravel()
@@ -68,7 +70,7 @@ def _accelerations(bench: Bench) -> Finding:
     return found.finding()
 
 
-def kinetic(truth: Truth) -> bodies.Number:
+def kinetic(truth: Truth) -> Number:
     """T of the bodies and the rotors of drives."""
     total = sum((b.product(w, w) for b, w in zip(truth.bodies, truth.twists, strict=True)), truth.zero)
     for name, inertia in truth.drives:
@@ -78,7 +80,7 @@ def kinetic(truth: Truth) -> bodies.Number:
     return total / 2
 
 
-def potential(truth: Truth, poses: list[bodies.Pose], values: dict[str, bodies.Number]) -> bodies.Number:
+def potential(truth: Truth, poses: list[bodies.Pose], values: dict[str, Number]) -> Number:
     """V of gravity and of the force elements, with bodies at some poses."""
     total = truth.zero
     for body, pose, here in zip(truth.bodies, poses, truth.here, strict=True):
@@ -120,7 +122,7 @@ def _momentum(bench: Bench) -> Finding:
     return found.finding()
 
 
-def _centre(truth: Truth) -> list[bodies.Number]:
+def _centre(truth: Truth) -> list[Number]:
     mass = sum((b.mass for b in truth.bodies), truth.zero)
     total = [truth.zero] * 3
     for body, pose in zip(truth.bodies, truth.here, strict=True):
@@ -128,7 +130,7 @@ def _centre(truth: Truth) -> list[bodies.Number]:
     return total
 
 
-def _momenta(truth: Truth) -> list[bodies.Number]:
+def _momenta(truth: Truth) -> list[Number]:
     centre, linear, angular = _centre(truth), [truth.zero] * 3, [truth.zero] * 3
     for body, pose, w in zip(truth.bodies, truth.here, truth.twists, strict=True):
         own = bodies.scale(body.mass, w.at(body.arm))
@@ -148,18 +150,13 @@ def _power(bench: Bench) -> Finding:
     if bench.mechanism.bare or "energy" not in bench.graph_kernels:
         return Finding.skipped(check, "there are no bodies, so that it is not known which forces have a potential")
     found, layout = Comparison(check), bench.layout
-    energies = bench.graph_kernels["energy"]
     for k, truth in enumerate(bench.truths):
         a = bench.rhs(truth.case)[bench.module.n_q :]
         try:
             exact, multipliers = truth.solve(list(layout.rows))
         except ZeroDivisionError:
             return Finding.skipped(check, "the system of accelerations and multipliers is singular")
-        many = [truth.mp.mpf(float(x)) for x in a]
-        rate = truth.slope(
-            lambda values: [sum(bench.system.evaluate("kernel energy", energies, values), truth.zero)],
-            lambda s, many=many: truth.later(s, many, frozen=True),  # type: ignore[misc]
-        )[0]
+        rate = _energy_rate(bench, truth, a)
         v = [truth.values[name] for name in bench.terms.v]
         parts = [f * x for f, x in zip(truth.applied(remainder=True), v, strict=True)]
         C, rows = truth.constraint_jacobian, truth.velocity_rows
@@ -171,7 +168,16 @@ def _power(bench: Bench) -> Finding:
         )
         slack = bench.acceleration_limit(k, numbers(exact), numbers(multipliers))
         gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
-        limit = float(momentum @ slack) + gap + UNIT * float(np.abs(numbers(parts)).sum())
+        limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
         size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), 1e-300)
         found.add(k, [float(rate - power)], [limit], size)
     return found.finding()
+
+
+def _energy_rate(bench: Bench, truth: Truth, a: Array) -> Number:
+    """d(T + V)/dt along q' = N v, v' = a at a held time."""
+    energies, many = bench.graph_kernels["energy"], [truth.mp.mpf(float(x)) for x in a]
+    return truth.slope(
+        lambda values: [sum(bench.system.evaluate("kernel energy", energies, values), truth.zero)],
+        lambda s: truth.later(s, many, frozen=True),
+    )[0]

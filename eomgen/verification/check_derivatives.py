@@ -105,7 +105,9 @@ def _along(bench: Bench) -> Finding:
     for k, truth in enumerate(bench.truths):
         case = truth.case
         J = bench.module.jacobian(case.t, case.x, p=case.p, u=case.u)
-        condition = _condition(bench, case) * bench.dependence(bench.module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t))
+        condition = _condition(bench, case) * bench.dependence(
+            bench.module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
+        )
         for _ in range(DIRECTIONS):
             try:
                 w, change = _tangent(bench, truth, rng)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .bench import Bench, numbers
-from .comparison import Comparison, size_of
+from .comparison import Comparison, size_of, terms_size
 from .finding import Finding
-from .rounding import UNIT
+from .rounding import UNIT, bounded
 
 COLUMNS = 9  #: states of a batch: more than a vector holds, and no multiple of it
 
@@ -23,7 +23,7 @@ def _kernel(bench: Bench, name: str) -> Finding:
     values, bounds = bench.bounds(name, bench.graph_kernels[name])
     for k, case in enumerate(bench.cases):
         actual = bench.call(name, case).ravel()
-        found.add(k, actual - values[:, k], 2.0 * bounds[:, k], size_of(values[:, k]), labels)
+        found.add(k, actual - values[:, k], 2.0 * bounds[:, k], terms_size(values[:, k], bounds[:, k]), labels)
     return found.finding()
 
 
@@ -57,9 +57,7 @@ def _batches(bench: Bench) -> Finding:
     x = np.concatenate([q, case.v[:, None] + rng.standard_normal((module.n_v, COLUMNS))])
     terms = bench.terms
     symbols = {name: np.full(COLUMNS, float(v[0])) for name, v in bench.symbols.items()}
-    symbols |= {name: row for name, row in zip((*terms.q, *terms.v), x, strict=True)}
-    from .rounding import bounded
-
+    symbols |= dict(zip((*terms.q, *terms.v), x, strict=True))
     for name in ("mass_matrix", "bias", "energy", "poses", "constraints", "constraint_jacobian"):
         if name not in bench.graph_kernels:
             continue
@@ -71,7 +69,7 @@ def _batches(bench: Bench) -> Finding:
         for k in range(COLUMNS):
             single = np.asarray(kernel(np.ascontiguousarray(states[:, k]), p=case.p, u=case.u, t=case.t)).ravel()
             labels = [f"{name} {label}" for label in bench.labels(name)]
-            found.add(0, batch[:, k] - single, 2.0 * bounds[:, k], size_of(single), labels)
+            found.add(0, batch[:, k] - single, 2.0 * bounds[:, k], terms_size(single, bounds[:, k]), labels)
     found.cases = 1
     return found.finding()
 
@@ -96,6 +94,8 @@ def _digits(bench: Bench) -> Finding:
         for k, truth in enumerate(bench.truths):
             exact = bench.system.evaluate(f"kernel {name}", outputs, truth.values)
             apart = numbers([truth.mp.mpf(float(x)) - y for x, y in zip(values[:, k], exact, strict=True)])
-            found.add(k, apart, bounds[:, k] + UNIT * np.abs(numbers(exact)), size_of(values[:, k]), labels)
+            found.add(
+                k, apart, bounds[:, k] + UNIT * np.abs(numbers(exact)), terms_size(values[:, k], bounds[:, k]), labels
+            )
     found.cases = len(bench.truths)
     return found.finding()

@@ -13,8 +13,9 @@ from ..joints import Continuous, Prismatic, Revolute
 from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
-from .check_constraints import placed
+from .check_joints import placed
 from .comparison import Comparison, size_of
+from .digits import Number
 from .finding import Finding
 from .rounding import UNIT
 from .truth import Truth
@@ -86,7 +87,7 @@ def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray)
     rates = truth.body_rates([truth.mp.mpf(float(x)) for x in a])
     total, size = np.zeros((len(truth.bodies), 6)), np.zeros((len(truth.bodies), 6))
 
-    def take(body: int, force: list[bodies.Number], moment: list[bodies.Number], arm: list[bodies.Number]) -> None:
+    def take(body: int, force: list[Number], moment: list[Number], arm: list[Number]) -> None:
         whole = numbers([*force, *bodies.add(moment, bodies.cross(arm, force))])
         total[body] += whole
         size[body] += np.abs(whole)
@@ -116,9 +117,9 @@ def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray)
     return total.ravel(), size.ravel()
 
 
-def _along(truth: Truth, a: Array) -> dict[str, bodies.Number]:
+def _along(truth: Truth, a: Array) -> dict[str, Number]:
     """Forces along joint coordinates, inertias of drives among them."""
-    total: dict[str, bodies.Number] = {}
+    total: dict[str, Number] = {}
     for name, value in truth.coordinate_loads():
         total[name] = total.get(name, truth.zero) + value
     many = [truth.mp.mpf(float(x)) for x in a]

@@ -8,6 +8,7 @@ order p is of order h^(p + 1).
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +22,10 @@ from .comparison import Comparison, size_of
 from .finding import Finding
 
 ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
-SHORT = 0.75  #: by how much an observed order may fall short: an order is a whole number, steps are not infinitely small
+SHORT = (
+    0.5  #: by how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others
+)
+LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
 LOOSE = 1e6  #: tolerance that accepts every step
 TIGHT = {"rtol": 1e-13, "atol": 1e-16}
 KINKED = frozenset({"abs", "sign", "min", "max", "lt", "le", "select"})  #: operations with kinks
@@ -37,10 +41,16 @@ def check(bench: Bench) -> list[Finding]:
     why = _inapplicable(bench)
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
+    kinked = _kinked(bench)
     found = [_order(bench, method) for method in ORDERS if method in _methods(bench)]
     if not found:
         found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
-    return [*found, _agreement(bench), _energy(bench)]
+    end = _far(bench, bench.cases[0])
+    found += [_agreement(bench, *end), _energy(bench, end[0])]
+    why = "its forces have kinks or tables, at which no method keeps its order"
+    return [
+        f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in found
+    ]
 
 
 def _inapplicable(bench: Bench) -> str:
@@ -50,12 +60,14 @@ def _inapplicable(bench: Bench) -> str:
         return "events reset its state"
     if not bench.layout.projects:
         return "derived with baumgarte="
-    terms = bench.terms
-    roots = [*terms.inverse_dynamics, *terms.gamma]
-    nodes = reachable(terms.graph, (x.id for x in roots))
-    if any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes):
-        return "its forces have kinks or tables, at which no method keeps its order"
     return ""
+
+
+def _kinked(bench: Bench) -> bool:
+    """Whether right-hand sides may have kinks, where methods need not keep their order."""
+    terms = bench.terms
+    nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
+    return any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes)
 
 
 def _methods(bench: Bench) -> tuple[str, ...]:
@@ -117,7 +129,8 @@ def _far(bench: Bench, case: Case) -> tuple[float, Array]:
 def _order(bench: Bench, method: str) -> Finding:
     """Between a step h and h/2 the error falls by 2^(p + 1), until it is lost in rounding.
 
-    The best of three states counts: a fault of the method shows at each, an error that changes its sign at one.
+    The mean over three halvings counts, and the best of three states: a fault of the method shows at each, an error
+    that changes its sign at one.
     """
     check, order = f"steppers: order of {method}", ORDERS[method]
     found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
@@ -125,7 +138,7 @@ def _order(bench: Bench, method: str) -> Finding:
     for case in bench.cases[:3]:
         bound, judge = bench.module.bind(case.p, case.u), _judge(bench, case)
         size = size_of(case.x) + size_of(bench.rhs(case)) * _pace(bench, case)
-        lost = 1e3 * TIGHT["rtol"] * size
+        lost = 30.0 * TIGHT["rtol"] * size
         errors: list[float] = []
         h = FIRST * _pace(bench, case)
         for _ in range(SMALLEST):
@@ -141,9 +154,9 @@ def _order(bench: Bench, method: str) -> Finding:
             h *= 0.5
             if errors[-1] < lost:
                 break
-        slopes = [np.log2(a / b) for a, b in zip(errors, errors[1:], strict=False) if np.isfinite(a) and b > lost]
+        slopes = [np.log2(a / b) for a, b in pairwise(errors) if a < LARGE * size and b > lost]
         if slopes:
-            observed.append((max(0.0, order + 1 - max(slopes[-2:])), case.number))
+            observed.append((max(0.0, order + 1 - float(np.mean(slopes[-3:]))), case.number))
     if not observed:
         return Finding.skipped(check, "one step is exact to rounding, or no two steps' errors can be told from it")
     best, number = min(observed)
@@ -151,11 +164,11 @@ def _order(bench: Bench, method: str) -> Finding:
     return found.finding()
 
 
-def _agreement(bench: Bench) -> Finding:
+def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
     """DOP853, RK45 and Radau at tight tolerances end where SciPy's DOP853 does."""
     check, case = "runs: methods agree", bench.cases[0]
     methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(bench)] or ["DOP853"]
-    bound, (h, expected) = bench.module.bind(case.p, case.u), _far(bench, case)
+    bound = bench.module.bind(case.p, case.u)
     found = Comparison(check, ", ".join(methods))
     size = size_of(expected)
     for method in methods:
@@ -166,11 +179,11 @@ def _agreement(bench: Bench) -> Finding:
     return found.finding()
 
 
-def _energy(bench: Bench) -> Finding:
+def _energy(bench: Bench, h: float) -> Finding:
     """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
     module, case = bench.module, bench.cases[0]
     found = Comparison("runs: energy and loops")
-    bound, (h, _) = module.bind(case.p, case.u), _far(bench, case)
+    bound = module.bind(case.p, case.u)
     rtol = 1e-10
     run = bound.simulate((case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=1e-13)
     residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))

@@ -80,6 +80,11 @@ def size_of(values: ArrayLike) -> float:
     return float(np.abs(np.asarray(values, dtype=float)).max(initial=0.0))
 
 
+def terms_size(values: ArrayLike, bounds: ArrayLike) -> float:
+    """The largest entry, or the size of the terms that cancel in it, told from the bound of its rounding."""
+    return max(size_of(values), size_of(bounds) / 1e-14)
+
+
 def pairs(rows: Sequence[str], columns: Sequence[str]) -> list[str]:
     """Labels of a matrix."""
     return [f"{row} by {column}" for row in rows for column in columns]

@@ -30,7 +30,7 @@ def context() -> Any:
     MissingDependencyError
     """
     try:
-        from mpmath import MPContext
+        from mpmath import MPContext  # type: ignore[import-untyped]
     except ImportError:
         message = "verify compares with 50 digits, for which it needs mpmath (it comes with SymPy); pip install mpmath"
         raise MissingDependencyError(message) from None

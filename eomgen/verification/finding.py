@@ -37,7 +37,9 @@ class Finding(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as JSON has them: figures that are no numbers are None."""
-        figures = {key: value if isfinite(value) else None for key, value in (("worst", self.worst), ("limit", self.limit))}
+        figures = {
+            key: value if isfinite(value) else None for key, value in (("worst", self.worst), ("limit", self.limit))
+        }
         own = {"check": self.check, "ok": self.ok, "left_out": self.left_out}
         return own | figures | {"where": self.where, "cases": self.cases, "note": self.note}
 
@@ -84,7 +86,8 @@ class Verification(NamedTuple):
         ending += f", {left_out} left out" if left_out else ""
         return f"verification of {self.name}\n\n{self.table}\n\n{'ok' if self.ok else 'BREACH'}: {ending}"
 
-    __repr__ = __str__
+    def __repr__(self) -> str:
+        return str(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as JSON has them."""

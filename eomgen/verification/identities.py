@@ -185,7 +185,9 @@ def _minimal(module: Module, cases: Sequence[Case]) -> Finding:
     except EomgenError:
         return Finding.skipped(check, "positions do not follow from independent coordinates")
     if not module.n_dof or not layout.projects:
-        return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "derived with baumgarte=")
+        return Finding.skipped(
+            check, "there is no degree of freedom" if not module.n_dof else "derived with baumgarte="
+        )
     found = Comparison(check)
     for c in cases:
         bound = module.bind(c.p, c.u)

@@ -35,7 +35,7 @@ def record(program: Program) -> str:
     reference = np.array(metadata.get("q_reference") or np.zeros(sizes.n_q), dtype=float)
     values = np.array([0.0 if x is None else x for x in metadata["p_values"]], dtype=float)
     inputs = np.array([0.0 if x is None else x for x in metadata["u_values"]], dtype=float)
-    states = []
+    states: list[dict[str, Any]] = []
     for _ in range(STATES):
         states.append(
             {
@@ -48,7 +48,12 @@ def record(program: Program) -> str:
             }
         )
     symbols = {program.time: np.array([s["t"] for s in states])}
-    for names, key in ((program.parameters, "p"), (program.inputs, "u"), (program.coordinates, "q"), (program.velocities, "v")):
+    for names, key in (
+        (program.parameters, "p"),
+        (program.inputs, "u"),
+        (program.coordinates, "q"),
+        (program.velocities, "v"),
+    ):
         symbols |= {name: np.array([s[key][k] for s in states]) for k, name in enumerate(names)}
     figures = _figures(program, symbols, states)
     plain = [{key: value if np.ndim(value) == 0 else value.tolist() for key, value in s.items()} for s in states]

@@ -45,8 +45,8 @@ def _compare(module: Module, name: str, figures: list[dict[str, Any]], states: l
 
 def _call(module: Module, name: str, given: dict[str, Array]) -> Array:
     q, v, t = given["q"], given["v"], float(given["t"])
-    options = {"p": given["p"], "u": given["u"], "t": t}
+    p, u = given["p"], given["u"]
     takes = KERNELS[name][0]
     if takes == "motion":
-        return np.asarray(module.kernels.motion(name)(q, v, given["a"], **options))
-    return np.asarray(module.kernels.state(name)(q if takes == "q" else np.concatenate([q, v]), **options))
+        return np.asarray(module.kernels.motion(name)(q, v, given["a"], p=p, u=u, t=t))
+    return np.asarray(module.kernels.state(name)(q if takes == "q" else np.concatenate([q, v]), p=p, u=u, t=t))

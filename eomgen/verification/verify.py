@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 STATES = 6  #: random states
 #: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
-GROUPS = ("kernels", "bodies", "reactions", "constraints", "derivatives", "runs")
+GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivatives", "runs")
 #: Findings about a model as it was described: called with the model, ``seed=`` and ``seconds=``.
 OF_MODELS: tuple[Callable[..., list[Finding]], ...] = ()
 
