@@ -70,6 +70,11 @@ class Twist(NamedTuple):
     angular: Numbers
     linear: Numbers
 
+    @property
+    def moves(self) -> bool:
+        """Whether it is not rest."""
+        return any(self.angular) or any(self.linear)
+
     def at(self, arm: Sequence[Number]) -> Numbers:
         """Velocity of a point of the body, ``arm`` from its origin in ground axes."""
         return add(self.linear, cross(self.angular, arm))

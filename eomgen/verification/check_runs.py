@@ -7,7 +7,8 @@ order p is of order h^(p + 1).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,7 @@ ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
 SHORT = (
     0.5  #: by how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others
 )
+JUDGED = 3  #: states that single steps are taken from
 LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
 LOOSE = 1e6  #: tolerance that accepts every step
 TIGHT = {"rtol": 1e-13, "atol": 1e-16}
@@ -35,6 +37,8 @@ MOST = 3000  #: evaluations of a run that is smooth
 EVEN = 0.1  #: shortest step of a smooth run beside its longest: shorter ones pass by a singular position
 SMALLEST = 14  #: halvings of the step
 
+Judge = Callable[[float], Array]  #: h -> the state a time h later
+
 
 def check(bench: Bench) -> list[Finding]:
     """Orders of the steppers, methods against each other, energy and loops of a short run."""
@@ -42,10 +46,11 @@ def check(bench: Bench) -> list[Finding]:
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
     kinked = _kinked(bench)
-    found = [_order(bench, method) for method in ORDERS if method in _methods(bench)]
+    judges = [(case, cache(_judge(bench, case))) for case in bench.cases[:JUDGED]]
+    found = [_order(bench, method, judges) for method in ORDERS if method in _methods(bench)]
     if not found:
         found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
-    end = _far(bench, bench.cases[0])
+    end = _far(bench, *judges[0])
     found += [_agreement(bench, *end), _energy(bench, end[0])]
     why = "its forces have kinks or tables, at which no method keeps its order"
     return [
@@ -85,7 +90,7 @@ def _pace(bench: Bench, case: Case) -> float:
     return 1.0 / max(fastest, speed, 1e-3)
 
 
-def _judge(bench: Bench, case: Case) -> Callable[[float], Array]:
+def _judge(bench: Bench, case: Case) -> Judge:
     """The state a time after the case, by SciPy; on the constraints."""
     integrate = require("scipy.integrate", "scipy", "verify")
     bound = bench.module.bind(case.p, case.u)
@@ -109,7 +114,7 @@ def _judge(bench: Bench, case: Case) -> Callable[[float], Array]:
     return at
 
 
-def _far(bench: Bench, case: Case) -> tuple[float, Array]:
+def _far(bench: Bench, case: Case, judge: Judge) -> tuple[float, Array]:
     """How long a smooth run from the case can be (s), and where it ends.
 
     Raises
@@ -117,7 +122,7 @@ def _far(bench: Bench, case: Case) -> tuple[float, Array]:
     SimulationError
         None is possible.
     """
-    judge, h = _judge(bench, case), LONG * _pace(bench, case)
+    h = LONG * _pace(bench, case)
     for _ in range(SMALLEST):
         try:
             return h, judge(h)
@@ -126,7 +131,7 @@ def _far(bench: Bench, case: Case) -> tuple[float, Array]:
     raise SimulationError(f"no run from state {case.number} succeeds, however short")
 
 
-def _order(bench: Bench, method: str) -> Finding:
+def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> Finding:
     """Between a step h and h/2 the error falls by 2^(p + 1), until it is lost in rounding.
 
     The mean over three halvings counts, and the best of three states: a fault of the method shows at each, an error
@@ -135,8 +140,8 @@ def _order(bench: Bench, method: str) -> Finding:
     check, order = f"steppers: order of {method}", ORDERS[method]
     found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
     observed: list[tuple[float, int]] = []
-    for case in bench.cases[:3]:
-        bound, judge = bench.module.bind(case.p, case.u), _judge(bench, case)
+    for case, judge in judges:
+        bound = bench.module.bind(case.p, case.u)
         size = size_of(case.x) + size_of(bench.rhs(case)) * _pace(bench, case)
         lost = 30.0 * TIGHT["rtol"] * size
         errors: list[float] = []

@@ -154,7 +154,7 @@ class Truth(State):
         for i in range(self.n):
             for j in range(i + 1):
                 pairs = zip(self.bodies, self.virtual[i], self.virtual[j], strict=True)
-                M[i][j] = M[j][i] = sum((b.product(w, z) for b, w, z in pairs), self.zero)
+                M[i][j] = M[j][i] = sum((b.product(w, z) for b, w, z in pairs if w.moves and z.moves), self.zero)
         for name, inertia in self.drives:
             y = self.coordinate_slopes(name)
             M = [[x + inertia * y[i] * y[j] for j, x in enumerate(row)] for i, row in enumerate(M)]
@@ -172,7 +172,9 @@ class Truth(State):
         rates, total = self.body_rates([self.zero] * self.n), [-f for f in self.applied()]
         for j in range(self.n):
             for body, w, rate, twist in zip(self.bodies, self.virtual[j], rates, self.twists, strict=True):
-                total[j] += body.power(w, rate, twist.angular) - body.mass * bodies.dot(self.gravity, w.at(body.arm))
+                if w.moves:
+                    weight = body.mass * bodies.dot(self.gravity, w.at(body.arm))
+                    total[j] += body.power(w, rate, twist.angular) - weight
         for name, inertia in self.drives:
             if name in self.system.kinematics.freedoms:
                 continue  # its y'' is that velocity's own acceleration

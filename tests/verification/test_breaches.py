@@ -42,7 +42,7 @@ def test_the_unbroken_module_has_no_breach() -> None:
     assert verified(derived()) == set()
 
 
-# -- faults of the derivation, which the generated code repeats ---------------------------------------------------------
+# -- faults of the derivation, which the generated code repeats
 
 
 def test_a_wrong_sign_in_the_bias() -> None:
@@ -155,7 +155,7 @@ def test_momentum_about_the_wrong_point(monkeypatch: pytest.MonkeyPatch) -> None
     assert "momentum: of the bodies" in verified(derived())
 
 
-# -- faults of the generated code ---------------------------------------------------------------------------------------
+# -- faults of the generated code
 
 
 def broken_line(text: str, function: str) -> str:
@@ -200,7 +200,7 @@ def test_a_sign_in_generated_c(monkeypatch: pytest.MonkeyPatch, warm_cache: Path
     assert "poses: generated code and graph" in found_by(module.verify(states=2))
 
 
-# -- faults of what is built on the kernels -----------------------------------------------------------------------------
+# -- faults of what is built on the kernels
 
 
 @pytest.fixture
