@@ -13,7 +13,7 @@ from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from ..runtime.layout import KERNELS
 from .cases import Case
-from .rounding import UNIT, bounded
+from .rounding import FOLDED, UNIT, bounded
 from .truth import System, Truth
 
 if TYPE_CHECKING:
@@ -148,6 +148,9 @@ class Bench:
         if self.terms.by_columns:
             M = module.mass_matrix(case.q, p=case.p, u=case.u, t=case.t)
             E_M = n * UNIT * np.abs(M)
+        d = np.sqrt(np.maximum(np.diag(M), 0.0))
+        E_M = E_M + FOLDED * np.outer(d, d)
+        E_C = E_C + FOLDED * np.abs(C).max(axis=1, initial=0.0)[:, None]
         m = len(layout.rows)
         K = np.block([[M, C.T], [C, np.zeros((m, m))]])
         E_K = np.block([[E_M, E_C.T], [E_C, np.zeros((m, m))]])

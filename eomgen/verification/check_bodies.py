@@ -14,7 +14,7 @@ from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import EPS, UNIT
+from .rounding import FOLDED, UNIT
 from .truth import Truth
 
 
@@ -51,7 +51,7 @@ def _tree(bench: Bench, name: str) -> Finding:
         floor = np.full(len(expected), EPS * size)  # of turns by rounded angles, which the derivation may take as exact
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
-            floor = EPS * np.outer(d, d).ravel()
+            floor = FOLDED * np.outer(d, d).ravel()
         found.add(k, actual - expected, bound + UNIT * np.abs(expected) + floor, size, labels)
     return found.finding()
 
@@ -65,7 +65,7 @@ def _accelerations(bench: Bench) -> Finding:
         except ZeroDivisionError:
             return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
         actual = bench.rhs(truth.case)
-        limit = bench.acceleration_limit(k, a, multipliers) + EPS * size_of(a)
+        limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * size_of(a)
         found.add(k, actual[n_q:] - a, limit, size_of(a), [f"{n}'" for n in bench.layout.v])
     return found.finding()
 
@@ -100,7 +100,7 @@ def _energy(bench: Bench) -> Finding:
     for k, truth in enumerate(bench.truths):
         expected = numbers([kinetic(truth), potential(truth, truth.here, truth.values)])
         actual = bench.call("energy", truth.case)
-        limit = bounds[:, k] + UNIT * np.abs(expected) + EPS * size_of(expected)
+        limit = bounds[:, k] + UNIT * np.abs(expected) + FOLDED * size_of(expected)
         found.add(k, actual - expected, limit, size_of(expected), bench.labels("energy"))
     return found.finding()
 
@@ -118,7 +118,7 @@ def _momentum(bench: Bench) -> Finding:
         actual, limit = (np.concatenate([y[:3], y[n : n + 6]]) for y in (every, bounds[:, k]))
         labels = [f"{what} {axis}" for what in ("centre", "linear", "angular") for axis in "xyz"]
         size = size_of(expected)
-        found.add(k, actual - expected, limit + UNIT * np.abs(expected) + EPS * size, size, labels)
+        found.add(k, actual - expected, limit + UNIT * np.abs(expected) + FOLDED * size, size, labels)
     return found.finding()
 
 

@@ -10,7 +10,7 @@ from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import UNIT
+from .rounding import FOLDED, UNIT
 from .truth import Truth, Values
 
 
@@ -82,8 +82,7 @@ def _potentials(bench: Bench) -> Finding:
         every, rest = truth.applied(), truth.applied(remainder=True)
         gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
         own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
-        # in many digits on both sides: differences leave 1e-32, declared functions are known in doubles
-        limit = 64.0 * UNIT * own if bench.kinematics.graph.calls else 1e-24 * own + 1e-40
+        limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * own + 1e-40
         found.add(k, gap, limit, size_of(own), layout.v)
     return found.finding()
 
