@@ -48,7 +48,7 @@ def _tree(bench: Bench, name: str) -> Finding:
         else:
             bound = layout.n_v * bench.bounds("inverse_dynamics", lambda: bench.terms.inverse_dynamics)[1][:, k].max()
         size = size_of(expected)
-        floor = np.full(len(expected), EPS * size)  # of turns by rounded angles, which the derivation may take as exact
+        floor = np.full(len(expected), FOLDED * size)
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
             floor = FOLDED * np.outer(d, d).ravel()

@@ -23,8 +23,8 @@ EPS = float(np.finfo(float).eps)
 #: the last place, 2 roundings, of a function; 4 half units each way.
 UNIT = 2.0 * EPS
 TURN = 2.0 * UNIT  #: absolute error of a sine or cosine formed from those of the parts of a sum: two products, a sum
-#: Relative error of constants that are formed in doubles while the graph is made and count as exact in it: turns by given
-#: angles, products of them along fixed parts, inertias in link axes.
+#: Relative error of constants that are formed in doubles while the graph is made and count as exact in it: turns by
+#: given angles, products of them along fixed parts, inertias in link axes.
 FOLDED = 16.0 * EPS
 NUDGE = 1e-6  #: relative shift by which the slope of a declared function is estimated
 
