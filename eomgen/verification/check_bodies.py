@@ -14,7 +14,7 @@ from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import FOLDED, UNIT
+from .rounding import EPS, FOLDED, UNIT
 from .truth import Truth
 
 
@@ -51,7 +51,7 @@ def _tree(bench: Bench, name: str) -> Finding:
         floor = np.full(len(expected), FOLDED * size)
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
-            floor = FOLDED * np.outer(d, d).ravel()
+            floor = FOLDED * np.outer(d, d).ravel() + 4.0 * EPS * size
         found.add(k, actual - expected, bound + UNIT * np.abs(expected) + floor, size, labels)
     return found.finding()
 

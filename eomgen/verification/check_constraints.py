@@ -82,7 +82,7 @@ def _potentials(bench: Bench) -> Finding:
         every, rest = truth.applied(), truth.applied(remainder=True)
         gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
         own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
-        limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * own + 1e-40
+        limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + 1e-40
         found.add(k, gap, limit, size_of(own), layout.v)
     return found.finding()
 

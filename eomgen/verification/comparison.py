@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..numeric.scales import Array
 from .finding import Finding
 
+UNDERFLOW = float(np.finfo(float).tiny)  #: below it roundings are not relative (Higham 2002, sec. 2.2)
 FAILED = np.inf  #: the figure of a check that could not be carried out
 
 
@@ -55,7 +56,7 @@ class Comparison:
         """
         self.cases += 1
         apart = np.abs(np.asarray(difference, dtype=float)).ravel()
-        allowed = np.broadcast_to(np.asarray(limit, dtype=float), np.shape(difference)).ravel()
+        allowed = np.broadcast_to(np.asarray(limit, dtype=float), np.shape(difference)).ravel() + UNDERFLOW
         if not apart.size:
             return
         with np.errstate(all="ignore"):
