@@ -159,7 +159,9 @@ def test_momentum_about_the_wrong_point(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def broken_line(text: str, function: str) -> str:
-    """The first sum of a generated function made a difference."""
+    """The first sum of a generated function made a difference; sources of rarer kernels may not have the function."""
+    if function not in text:
+        return text
     start = text.index(function)
     place = text.index(" + ", start)
     return text[:place] + " - " + text[place + 3 :]
@@ -183,20 +185,11 @@ def test_a_sign_in_generated_c(monkeypatch: pytest.MonkeyPatch, warm_cache: Path
 
     def wrong(program: Any) -> dict[str, str]:
         sources = dict(right(program))
-        sources["slider_crank.c"] = broken_line(sources["slider_crank.c"], "slider_crank_poses(")
+        sources["slider_crank.c"] = broken_line(sources["slider_crank.c"], "static int poses_block(")
         return sources
 
     monkeypatch.setattr(eomgen.emit, "emit_c", wrong)
-    kernels = ["rhs", "poses", "mass_matrix", "bias", "inverse_dynamics", "energy", "constraints", "project"]
-    kernels += [
-        "constraint_jacobian",
-        "velocity_constraints",
-        "embedded_mass_matrix",
-        "jacobian",
-        "alignment",
-        "kinematics",
-    ]
-    module = derived().compile(kernels=[*kernels, "loop_coordinates", "loop_coordinate_jacobian"])
+    module = derived().compile()
     assert "poses: generated code and graph" in found_by(module.verify(states=2))
 
 
