@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -163,8 +164,7 @@ def broken_line(text: str, function: str) -> str:
     if function not in text:
         return text
     start = text.index(function)
-    place = text.index(" + ", start)
-    return text[:place] + " - " + text[place + 3 :]
+    return text[:start] + re.sub(r"(v\d+) \+ (?=v\d)", r"\1 - ", text[start:], count=1)
 
 
 def test_a_sign_in_generated_python(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,12 +185,12 @@ def test_a_sign_in_generated_c(monkeypatch: pytest.MonkeyPatch, warm_cache: Path
 
     def wrong(program: Any) -> dict[str, str]:
         sources = dict(right(program))
-        sources["slider_crank.c"] = broken_line(sources["slider_crank.c"], "static int poses_block(")
+        sources["slider_crank.c"] = broken_line(sources["slider_crank.c"], "static flag bias_block(")
         return sources
 
     monkeypatch.setattr(eomgen.emit, "emit_c", wrong)
     module = derived().compile()
-    assert "poses: generated code and graph" in found_by(module.verify(states=2))
+    assert "bias: generated code and graph" in found_by(module.verify(states=2))
 
 
 # -- faults of what is built on the kernels
