@@ -90,7 +90,7 @@ def point_chain() -> eg.Model:
 
 
 def tilted_four_bar() -> eg.Model:
-    """The example four_bar in a plane of general attitude and place: no row of its loop vanishes identically."""
+    """The example four_bar in a plane of general attitude and place: rows across the plane vanish to rounding."""
     m = eg.Model("tilted_four_bar")
     rpy = (0.4, -0.7, 1.1)
     a4 = np.array(rotation(rpy)) @ np.array([0.1, 0.0, 0.0])

@@ -14,19 +14,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import MEASURED
+from ..limits.impacts import HELD, TOUCHING
+from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
+from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import States, conditioned_motions, prepare, solve_multipliers
-from .impact_gaps import Gaps, allowance, by_velocity, check_gaps, drift
+from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
 from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-TOUCHING = 1e-8  #: gaps of a run at most this open, in lengths of the model or rad, take part in an impact
-CLOSED = 1e-6  #: the same of gaps that a user says are closed
-HELD = 1e-9  #: part of a normal, along which nothing is free to move, that is rounding
 ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
@@ -107,7 +108,13 @@ def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]
 
 
 def strike_events(
-    module: Module, t: float, x: Array, events: Sequence[Mapping[str, Any]], fired: Sequence[int], u: Array
+    module: Module,
+    t: float,
+    x: Array,
+    events: Sequence[Mapping[str, Any]],
+    fired: Sequence[int],
+    u: Array,
+    state_dependent: Sequence[int] = (),
 ) -> Array:
     """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
 
@@ -121,13 +128,16 @@ def strike_events(
     fired : sequence of int
         Events that happened.
     u : (n_u,) array
+    state_dependent : sequence of int
+        Inputs that depend on the state.
 
     Raises
     ------
     UsageError
-        A gap depends on velocities, or no impulses obey the constraints and the laws of restitution.
+        A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws.
     """
     layout = module.layout
+    module = module.bind(None, u)
     kernel = module.kernels.timed("events")
     values = kernel(t, x, u=u)
     near = TOUCHING * max(1.0, layout.length)
@@ -136,6 +146,14 @@ def strike_events(
         for i, event in enumerate(events)
         if event.get("restitution") is not None and (i in fired or abs(values[i]) <= near)
     }
+    for k in state_dependent:
+        change = kernel(t, x, u=u + np.eye(layout.n_u)[k]) - values
+        for i in gaps:
+            if change[i] != 0.0:
+                raise UsageError(
+                    f"event {events[i]['name']}: the input {layout.u[k]} depends on the state, and so does its rate, "
+                    "which an impact changes; write the gap itself in coordinates"
+                )
     slopes = module.kernels.timed("event_slopes")(t, x, u=u)
     states = _one_state(module, t, x)
     q, v = states.q[:, 0], states.v[:, 0]
@@ -143,7 +161,8 @@ def strike_events(
         if np.abs(slopes[i, layout.n_q :]).max(initial=0.0) > 0.0:
             raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
     rows = np.array([by_velocity(layout, q, slopes[i, : layout.n_q]) for i in gaps])
-    rates = rows @ v + drift(lambda time: kernel(time, x, u=u), t)[[*gaps]]
+    moved = moving_inputs(layout, u)
+    rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
     names = [str(events[i]["name"]) for i in gaps]
     return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
 
@@ -157,7 +176,7 @@ def _one_state(module: Module, t: float, x: ArrayLike) -> States:
 
 def _require_closed(gaps: Gaps, states: States) -> None:
     values = gaps.values(float(states.t[0]), states.x[:, 0])
-    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, CLOSED), strict=True):
+    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, MEASURED), strict=True):
         if abs(value) > limit:
             how = "open" if value > 0.0 else "closed too far"
             unit = gaps.layout.unit(name)
@@ -203,7 +222,7 @@ def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[
                 f"{what} at the rate {rates[i]:.6g}, which drivers or constraints impose: no impulse changes it"
             )
     if B.shape[1]:
-        factor = np.linalg.cholesky(B.T @ M @ B)
+        factor = definite_factor(B.T @ M @ B, "an impact")
         H = np.where(fixed, 0.0, np.linalg.solve(factor, B.T @ rows.T))
         impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
         change = B @ np.linalg.solve(factor.T, z)

@@ -16,6 +16,7 @@ from ..errors import ModelError, Problem
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
 
@@ -60,8 +61,13 @@ class Body:
     inertia: Mat3
     moment: Vec3 | None = None
     inertia_origin: Mat3 | None = None
-    checked: bool = True  #: whether mass and inertia must be those of a possible body
+    check: str = "error"  #: what becomes of a mass and inertia that no body can have: error, note or off
     plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
+
+    @property
+    def checked(self) -> bool:
+        """Whether mass and inertia must be those of a possible body."""
+        return self.check == "error"
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,7 @@ def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
 TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
 
 
@@ -179,8 +186,8 @@ class Simulation:
 
     end: float = 10.0
     method: str = "DOP853"
-    rtol: float = 1e-8
-    atol: float = 1e-10
+    rtol: float = RTOL
+    atol: float = ATOL
     step: float | None = None
 
 
@@ -208,6 +215,9 @@ class Mechanism:
     constraints: tuple[Constraint, ...] = ()
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
+    check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
+    notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
 
     @property
     def bare(self) -> bool:

@@ -106,7 +106,7 @@ class FreeBodies:
     def _products(self) -> list[Twist]:
         kinematics = self.kinematics
         columns = [x for link in kinematics.links for column in link.columns for part in column for x in part]
-        flows = jvp(columns, kinematics.flow | {kinematics.t: self.graph.one})
+        flows = jvp(columns, kinematics.flow | kinematics.clock)
         result: list[Twist] = []
         at = 0
         for link, twist in zip(kinematics.links, kinematics.twists, strict=True):
@@ -219,12 +219,7 @@ def cut_joints(bodies: FreeBodies) -> list[CutJoint]:
 def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
     kinematics, graph = bodies.kinematics, bodies.graph
     poses = kinematics.poses
-    base = poses.common(spec.predecessor, spec.successor)
-    outer, inner = (poses.marker(marker, base) for marker in (spec.predecessor, spec.successor))
-    pose = Frame(
-        vec.product(vec.transpose(outer.rotation), inner.rotation),
-        vec.transpose_times(outer.rotation, vec.sub(inner.position, outer.position)),
-    )
+    pose = poses.relative(spec.predecessor, spec.successor)
     links = [poses.link_of[m.body] for m in (spec.predecessor, spec.successor)]
     holder, marker = (poses.marker_in_link(m) for m in (spec.predecessor, spec.successor))
     first, second = (_twist(kinematics, m, k) for m, k in zip((holder, marker), links, strict=True))

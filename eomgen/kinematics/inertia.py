@@ -9,6 +9,7 @@ from ..describe.mechanism import Body
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from ..graph.rounding import settled_vector, size_of
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 
@@ -74,9 +75,20 @@ def body_inertia(body: Body, frame: Frame) -> SpatialInertia:
     if body.moment is not None and body.inertia_origin is not None:
         about_body = SpatialInertia(body.mass, body.moment, symmetric(body.inertia_origin))
         return about_body.shifted(vec.neg(frame.position)).turned(back)
-    com = vec.times(back, vec.sub(body.com, frame.position))
-    still = SpatialInertia(body.mass, vec.zero(body.mass.graph), rotate_symmetric(back, symmetric(body.inertia)))
-    return still.shifted(com)
+    inertia = settled_matrix(rotate_symmetric(back, symmetric(body.inertia)), body.inertia)
+    return SpatialInertia(body.mass, vec.zero(body.mass.graph), inertia).shifted(place_point(frame, body.com))
+
+
+def place_point(frame: Frame, point: Vec3) -> Vec3:
+    """A point of a body, in the frame: numbers that cancel are exactly 0."""
+    moved = vec.transpose_times(frame.rotation, vec.sub(point, frame.position))
+    return settled_vector(moved, size_of(point, frame.position))
+
+
+def settled_matrix(turned: Mat3, before: Mat3) -> Mat3:
+    """A matrix that was turned, its constant entries exactly 0 where they are rounding of those before."""
+    size = max(size_of(row) for row in before)
+    return (settled_vector(turned[0], size), settled_vector(turned[1], size), settled_vector(turned[2], size))
 
 
 def symmetric(a: Mat3) -> Mat3:

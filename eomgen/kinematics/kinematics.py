@@ -6,19 +6,19 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cached_property
 
+from ..describe.input_rates import clock
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..frames import Marker
-from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
-from ..joints.rods import Distance, RevoluteSpherical
 from ..records import dataclass
 from .couplings import couple
 from .flaws import find_flaws
+from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
@@ -110,6 +110,11 @@ class Kinematics:
         return dict(zip(self.q, self.rates, strict=True))
 
     @cached_property
+    def clock(self) -> dict[Expr, Expr]:
+        """The rates of all that is prescribed, t' = 1 and those of the inputs, as the direction of a derivative."""
+        return clock(self.graph, self.mechanism.inputs)
+
+    @cached_property
     def freedoms(self) -> tuple[str, ...]:
         """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
         if self.mechanism.given is not None:
@@ -129,9 +134,9 @@ class Kinematics:
         return tuple(self.rates.index(v) if v in self.rates else -1 for v in self.v)
 
     def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """d/dt along q' = N v, v' = a, t' = 1."""
+        """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
         along = self.flow | dict(zip(self.v, self.a, strict=True))
-        return jvp(list(expressions), along | {self.t: self.graph.one})
+        return jvp(list(expressions), along | self.clock)
 
     def resolve(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Replace coordinates of cut joints and marker quantities by what they are in terms of the tree."""
@@ -149,7 +154,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
     t = graph.symbol("t")
     rates = layout.rates(graph, q, v)
-    state = State(q, v, a, t, rates, not layout.given)
+    state = State(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
     links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
@@ -174,7 +179,8 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
-    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state)
+    length = length_scale(mechanism)
+    constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,
@@ -199,7 +205,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         hints=tuple(hint for hint in coupled.hints if hint[0] in names),
         loop_coordinates=loop,
         forces=tuple(_resolve_force(f, motion, mechanism) for f in mechanism.forces),
-        length_scale=_length_scale(mechanism),
+        length_scale=length,
     )
 
 
@@ -219,7 +225,7 @@ def _loop_coordinates(
     state: State,
 ) -> LoopCoordinates:
     names, kinds, values = measured
-    along = {symbol: rate for symbol, rate in state.along.items() if symbol != state.t}
+    along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.clock}
     rates = jvp(values, along)
     entries = state.slopes(values, rates)
     zero = graph.zero
@@ -317,26 +323,3 @@ def _with_entries(load: Load, values: Iterator[Expr]) -> Load:
 
 def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
     return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]
-
-
-def _length_scale(mechanism: Mechanism) -> Expr:
-    """Root mean square length of rods, and distance of joint markers from their bodies' origins; 1 if there is none.
-
-    Minimum-norm corrections compare lengths with angles; measured in this length, units do not matter.
-    """
-    graph = mechanism.graph
-    squares = []
-    for spec in mechanism.joints:
-        for marker in (spec.predecessor, spec.successor):
-            square = vec.dot(marker.frame.position, marker.frame.position)
-            if not square.is_zero:
-                squares.append(square)
-        if isinstance(spec.joint, Distance | RevoluteSpherical):
-            squares.append(spec.joint.length * spec.joint.length)
-    if not squares:
-        return graph.one
-    total = graph.zero
-    for square in squares:
-        total = total + square
-    size = graph.apply("sqrt", total / float(len(squares)))
-    return graph.apply("select", graph.apply("lt", size, 1e-9), 1.0, size)  # parameters may make all of them 0

@@ -9,7 +9,9 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
+from ..graph.rounding import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .state import State
 from .tree import Poses
@@ -77,9 +79,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
     it is measured between -pi and pi.
     """
     graph = poses.graph
-    base = poses.common(spec.predecessor, spec.successor)
-    outer = poses.marker(spec.predecessor, base)
-    inner = poses.marker(spec.successor, base)
+    outer, inner = poses.pair(spec.predecessor, spec.successor)
     rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
     gap = vec.sub(inner.position, outer.position)
     position = vec.transpose_times(outer.rotation, gap)
@@ -89,11 +89,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
         rows = spec.joint.closure_in_turns(graph, rotation, position, turns[0])
     else:
         rows = spec.joint.closure(graph, rotation, position)
-    if {r.label for r in rows} >= {
-        "r_x",
-        "r_y",
-        "r_z",
-    }:  # all three vanish, so any axes do: those of the base are simplest
+    if {r.label for r in rows} >= {"r_x", "r_y", "r_z"}:  # all three vanish: any axes do, common ones are simplest
         free = dict(zip(("r_x", "r_y", "r_z"), gap, strict=True))
         rows = [r._replace(expression=free.get(r.label, r.expression)) for r in rows]
     measured = spec.joint.measure(graph, rotation, position)
@@ -105,15 +101,20 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State, length: Expr
 ) -> Constraints:
-    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically."""
-    kept = [r for r in rows if not r.expression.is_zero]
+    """Form C_q, C_t, C' and gamma of the rows that do not vanish identically; ``length`` is that of the mechanism."""
+    sizes = {"length": length.value or 0.0, "angle": 1.0}
+    identical = {
+        r: zero or _is_closed(r, sizes[r.kind])
+        for r, zero in zip(rows, vanishing([r.expression for r in rows]), strict=True)
+    }
+    kept = [r for r in rows if not identical[r]]
     kept.sort(key=lambda r: r.level != "position")
     values = [r.expression for r in kept if r.level == "position"]
     nonholonomic = [r.expression for r in kept if r.level != "position"]
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
-    along = dict(zip(state.q, state.rates, strict=True)) | {state.t: graph.one}
+    along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
     entries = state.slopes(values, velocity)
     m = len(values)
@@ -128,15 +129,21 @@ def differentiate_constraints(
         written=tuple(r.written for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
-        time_derivative=(*jvp(values, {state.t: graph.one, **dict(still)}), *substitute(nonholonomic, at_rest)),
+        time_derivative=(*jvp(values, {**state.clock, **dict(still)}), *substitute(nonholonomic, at_rest)),
         velocity=(*velocity, *nonholonomic),
         gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
         slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),
         aligned=tuple(e for _, e in open_conditions),
         aligned_joints=tuple(joint for joint, _ in open_conditions),
-        vanishing=tuple(r.label for r in rows if r.expression.is_zero),
+        vanishing=tuple(r.label for r in rows if identical[r]),
         declared=len(rows),
     )
+
+
+def _is_closed(row: Row, size: float) -> bool:
+    """Whether a row is a number that is nothing but rounding of the places in it."""
+    value = row.expression.value
+    return value is not None and not row.written and abs(value) <= ROUNDED * size
 
 
 def own_rows(mechanism: Mechanism) -> list[Row]:

@@ -47,10 +47,7 @@ class Motion:
 
     def relative(self, start: Marker, end: Marker) -> Frame:
         """Placement of marker ``end`` in the axes of marker ``start``."""
-        base = self.poses.common(start, end)
-        outer, inner = self.poses.marker(start, base), self.poses.marker(end, base)
-        back = vec.transpose(outer.rotation)
-        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
+        return self.poses.relative(start, end)
 
     def position(self, marker: Marker) -> Vec3:
         """Origin of the marker, ground axes (m)."""
@@ -98,9 +95,7 @@ class Motion:
 
         It is where the relative rotation is about that axis at every configuration.
         """
-        base = self.poses.common(start, end)
-        outer = self.poses.marker(start, base).rotation
-        rotation = vec.product(vec.transpose(outer), self.poses.marker(end, base).rotation)
+        rotation = self.poses.relative(start, end).rotation
         found = sum_of_turns(self.graph, rotation, self.state.q)
         if found is not None:
             angle, terms = found

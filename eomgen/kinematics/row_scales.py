@@ -4,24 +4,34 @@ A gap of a joint or contact changes by about as much as the coordinates that mak
 length scale of the mechanism or 1.  That of a loop far smaller than the mechanism, a thousandth or less, is the length
 of its own scaled gradient, or its rows would be lost beside the others.  A relation written by a user may be multiplied
 by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
-matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  Factors that are parameters stay symbols.
+matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A gradient that is not told from rounding
+of the terms that were added in it (:mod:`~..graph.rounding`) is no size: such a row counts as nothing beside those
+terms.  Factors that are parameters stay symbols.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.evaluate import compile_evaluator
+from ..graph.rounding import is_rounding, terms_of, with_bounds
 from ..graph.substitute import substitute, symbols_of
+from ..graph.traverse import reachable
+from ..limits.descriptions import BY_CHANCE, SMALL_LOOP
+from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
-SMALL = 1e-3  #: a gap whose gradient is below this part of its kind's size is of a loop that small
-LEAST = 1e-3  #: gradients at the initial values that are this part of those beside them vanish there by chance
-TINY = 1e-150  #: stands for the size of a row whose factors are all 0
+
+
+class Length(NamedTuple):
+    """The length of a gradient at one place, 0 where it is rounding, and of the terms that were added in it."""
+
+    value: float
+    terms: float
 
 
 def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
@@ -29,53 +39,30 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
     graph, c = kinematics.graph, kinematics.constraints
     sizes = {"length": kinematics.length_scale, "angle": graph.one}
     found = [sizes[kind] for kind in c.kinds]
-    places: list[dict[Expr, Expr]] | None = None
-    gaps: dict[int, list[Expr]] = {}
+    places: list[dict[Expr, Expr]] = []
+    numbers: list[dict[str, float]] = []
+    usual = 0.0
     for i, row in enumerate(c.jacobian):
         gradient = [x * sizes[kind] for x, kind in zip(row, kinematics.velocity_kinds, strict=True) if not x.is_zero]
-        if not c.written[i]:
-            gaps |= {i: gradient} if c.kinds[i] == "length" and gradient else {}
+        written = c.written[i]
+        if not gradient or (not written and c.kinds[i] != "length"):
             continue
-        if _is_plain([x / found[i] for x in gradient]):
+        if written and _is_plain([x / found[i] for x in gradient]):
             continue
-        if not _moves(kinematics, row):
-            found[i] = _length(gradient)
+        if written and not _moves(kinematics, row):
+            found[i] = _coefficient_size(gradient)
             continue
-        places = _places(kinematics) if places is None else places
-        there = [_length(substitute(gradient, place)) for place in places]
-        values = [x if np.isfinite(x) and x > TINY else 0.0 for x in _values(kinematics, there)]
-        if max(values) > 0.0:
-            found[i] = there[0] if values[0] >= LEAST * values[1] else there[1]
-    if gaps:
-        for i, size in _small_gaps(kinematics, gaps, places or _places(kinematics)).items():
-            found[i] = size
-    return tuple(found)
-
-
-def _small_gaps(
-    kinematics: Kinematics, gaps: Mapping[int, list[Expr]], places: Sequence[dict[Expr, Expr]]
-) -> dict[int, Expr]:
-    """The own sizes of the rows, with their gradients, that are far below the size of their kind."""
-    every = [x for gradient in gaps.values() for x in gradient]
-    there = [iter(substitute(every, place)) for place in places]
-    sizes = [_length([next(values) for _ in gradient]) for gradient in gaps.values() for values in there]
-    *numbers, usual = (x if np.isfinite(x) else np.inf for x in _values(kinematics, [*sizes, kinematics.length_scale]))
-    found = {}
-    for k, i in enumerate(gaps):
-        first, second = numbers[2 * k : 2 * k + 2]
-        if TINY < max(first, second) < SMALL * usual:
-            found[i] = sizes[2 * k + (first < LEAST * second)]
-    return found
-
-
-def coefficient_rows(kinematics: Kinematics) -> tuple[int, ...]:
-    """Rows whose size is the length of a gradient that depends on parameters only."""
-    c = kinematics.constraints
-    found = []
-    for i, row in enumerate(c.jacobian):
-        sized = c.written[i] and not symbols_of(row).isdisjoint(kinematics.parameter_names)
-        if sized and not _moves(kinematics, row):
-            found.append(i)
+        if not places:
+            places = _places(kinematics)
+            numbers = [_numbers(kinematics, place) for place in places]
+            usual = _length_at([kinematics.length_scale], numbers[0]).value
+        first, second = (_length_at(gradient, known) for known in numbers)
+        largest = max(first.value, second.value)
+        if written and largest <= TINY_ROOT:
+            found[i] = graph.constant(max(first.terms, second.terms) or 1.0)
+        elif written or TINY_ROOT < largest < SMALL_LOOP * usual:
+            place = places[first.value < BY_CHANCE * second.value]
+            found[i] = _length(substitute(gradient, place))
     return tuple(found)
 
 
@@ -90,12 +77,21 @@ def _is_plain(gradient: Sequence[Expr]) -> bool:
     return len(numbers) == len(values) and (not numbers or 1 / PLAIN <= float(np.linalg.norm(numbers)) <= PLAIN)
 
 
+def _coefficient_size(gradient: Sequence[Expr]) -> Expr:
+    """The length of a gradient of parameters only, or of its terms where their values make it rounding."""
+    size, graph = _length(gradient), gradient[0].graph
+    if not any(graph.nodes[i][0] in ("add", "sub") for i in reachable(graph, [x.id for x in gradient])):
+        return size
+    terms = _length([terms_of(x) for x in gradient])
+    return graph.apply("select", graph.apply("lt", terms * ROUNDED, size), size, terms)
+
+
 def _length(gradient: Sequence[Expr]) -> Expr:
     total = gradient[0] * gradient[0]
     for x in gradient[1:]:
         total = total + x * x
     graph = total.graph
-    return graph.apply("max", graph.apply("sqrt", total), graph.constant(TINY))
+    return graph.apply("max", graph.apply("sqrt", total), graph.constant(TINY_ROOT))
 
 
 def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
@@ -115,9 +111,14 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     return [first | still, second | still]
 
 
-def _values(kinematics: Kinematics, sizes: Sequence[Expr]) -> list[float]:
-    """Numbers with the declared parameter values, 1 where there is none."""
-    m = kinematics.mechanism
-    numbers = {p.name: 1.0 if p.value is None else float(p.value) for p in m.parameters}
-    with np.errstate(all="ignore"):
-        return [float(x) for x in compile_evaluator(list(sizes), tuple(numbers))(list(numbers.values()))]
+def _numbers(kinematics: Kinematics, place: Mapping[Expr, Expr]) -> dict[str, float]:
+    """A place in numbers, with the declared parameter values, 1 where there is none."""
+    numbers = {p.name: 1.0 if p.value is None else float(p.value) for p in kinematics.mechanism.parameters}
+    return numbers | dict(zip((x.node[1] for x in place), with_bounds(list(place.values()), numbers)[0], strict=True))
+
+
+def _length_at(gradient: Sequence[Expr], numbers: Mapping[str, float]) -> Length:
+    values, bounds = with_bounds(gradient, numbers)
+    nothing = not np.isfinite(values).all() or bool(is_rounding(values, bounds).all())
+    terms = float(np.linalg.norm(bounds)) if np.isfinite(bounds).all() else 0.0
+    return Length(0.0 if nothing else float(np.linalg.norm(values)), terms)

@@ -10,9 +10,10 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
+from ..graph.rounding import settled_rotation
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .inertia import SpatialInertia, body_inertia
+from .inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
 
 Twist = tuple[Vec3, Vec3]
@@ -31,6 +32,8 @@ class Link:
     parent: int  #: index of the parent link, GROUND for none
     first: int
     turn: Mat3  #: rotation of the joint's marker on the parent, constant
+    holder: Vec3  #: its place in parent link axes, constant
+    slide: Vec3  #: how far the joint has moved from there, along the marker's axes
     joint_rotation: Mat3
     position: Vec3
     columns: tuple[Twist, ...]
@@ -59,9 +62,13 @@ class Link:
 
 
 def place(frame: Frame, marker: Frame) -> Frame:
-    """A marker of the body, in the link frame ``frame`` of the same body."""
+    """A marker of the body, in the link frame ``frame`` of the same body.
+
+    However the body's own axes are turned and shifted, numbers that cancel are exactly 0, so that the equations of a
+    mechanism do not depend on how its bodies are described.
+    """
     turn = vec.transpose(frame.rotation)
-    return Frame(vec.product(turn, marker.rotation), vec.times(turn, vec.sub(marker.position, frame.position)))
+    return Frame(settled_rotation(vec.product(turn, marker.rotation)), place_point(frame, marker.position))
 
 
 def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Expr]) -> tuple[Link, ...]:
@@ -94,12 +101,14 @@ def build_links(mechanism: Mechanism, topology: Topology, symbols: dict[str, Exp
                 parent=index[branch.parent],
                 first=first,
                 turn=holder.rotation,
+                holder=holder.position,
+                slide=position,
                 joint_rotation=rotation,
                 position=vec.add(holder.position, vec.times(holder.rotation, position)),
                 columns=tuple(columns),
                 mass=body.mass,
-                com=vec.times(back, vec.sub(body.com, frame.position)),
-                inertia=vec.product(back, vec.product(body.inertia, frame.rotation)),
+                com=place_point(frame, body.com),
+                inertia=settled_matrix(vec.product(back, vec.product(body.inertia, frame.rotation)), body.inertia),
                 spatial=body_inertia(body, frame),
                 frame=frame,
             )
@@ -136,7 +145,7 @@ class Poses:
         self.graph = mechanism.graph
         self.links = links
         self.link_of = {link.body: k for k, link in enumerate(links)} | {GROUND: GROUND}
-        self._known: dict[tuple[int, int], Frame] = {}
+        self._known: dict[tuple[int, int, tuple[Mat3, Vec3] | None], Frame] = {}
 
     def marker_in_link(self, marker: Marker) -> Frame:
         """Constant placement of a marker in its link frame (in ground for a ground marker)."""
@@ -151,35 +160,71 @@ class Poses:
             chain.append(self.links[chain[-1]].parent)
         return chain
 
-    def link(self, link: int, base: int = GROUND) -> Frame:
-        """Placement of a link in link ``base``, one of its ancestors."""
+    def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a link in link ``base``, one of its ancestors, or in a constant frame ``within`` that link."""
         if link == base:
-            return Frame(vec.identity(self.graph), vec.zero(self.graph))
-        key = (link, base)
+            own = Frame(vec.identity(self.graph), vec.zero(self.graph))
+            return own if within is None else place(within, own)
+        key = (link, base, None if within is None else (within.rotation, within.position))
         if key not in self._known:
             chain = self.ancestors(link)
             for k in reversed(chain[: chain.index(base)]):  # from base outwards, so that no chain recurses deeply
-                if (k, base) not in self._known:
-                    self._known[k, base] = self._step(k, base)
+                if (k, *key[1:]) not in self._known:
+                    self._known[k, base, key[2]] = self._step(k, base, within)
         return self._known[key]
 
-    def _step(self, k: int, base: int) -> Frame:
+    def _step(self, k: int, base: int, within: Frame | None) -> Frame:
         link = self.links[k]
-        local = vec.product(link.turn, link.joint_rotation)
-        if link.parent == base:
-            return Frame(local, link.position)
-        parent = self._known[link.parent, base]
-        rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
-        return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+        if link.parent != base:
+            parent = self.link(link.parent, base, within)
+            rotation = vec.product(vec.product(parent.rotation, link.turn), link.joint_rotation)
+            return Frame(rotation, vec.add(parent.position, vec.times(parent.rotation, link.position)))
+        if within is None:
+            return Frame(vec.product(link.turn, link.joint_rotation), link.position)
+        holder = place(within, Frame(link.turn, link.holder))
+        moved = vec.add(holder.position, vec.times(holder.rotation, link.slide))
+        return Frame(vec.product(holder.rotation, link.joint_rotation), moved)
 
-    def marker(self, marker: Marker, base: int = GROUND) -> Frame:
-        """Placement of a marker in link ``base``, an ancestor of its link."""
+    def marker(self, marker: Marker, base: int = GROUND, within: Frame | None = None) -> Frame:
+        """Placement of a marker in link ``base``, an ancestor of its link, or in a constant frame ``within`` that."""
         inner = self.marker_in_link(marker)
-        outer = self.link(self.link_of[marker.body], base)
+        link = self.link_of[marker.body]
+        if link == base and within is not None:
+            return place(within, inner)
+        outer = self.link(link, base, within)
         return Frame(
             vec.product(outer.rotation, inner.rotation),
             vec.add(outer.position, vec.times(outer.rotation, inner.position)),
         )
+
+    def relative(self, start: Marker, end: Marker) -> Frame:
+        """Placement of marker ``end`` in the axes of marker ``start``."""
+        outer, inner = self.pair(start, end)
+        back = vec.transpose(outer.rotation)
+        return Frame(vec.product(back, inner.rotation), vec.times(back, vec.sub(inner.position, outer.position)))
+
+    def pair(self, start: Marker, end: Marker) -> tuple[Frame, Frame]:
+        """Placements of two markers in the frame of :meth:`between`."""
+        base, within = self.between(start, end)
+        return self.marker(start, base, within), self.marker(end, base, within)
+
+    def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
+        """The nearest link that carries both markers, and a frame in it: the joint with which one of the chains begins.
+
+        So the frames of ground and of bodies, which a description may choose as it likes, drop out of what is relative.
+        """
+        base = self.common(start, end)
+        within = self.marker_in_link(start)
+        for marker in (end, start):
+            chain = self.ancestors(self.link_of[marker.body])
+            if chain[0] != base:
+                link = self.links[chain[chain.index(base) - 1]]
+                within = Frame(link.turn, link.holder)
+                break
+        along = all(x.value in (0.0, 1.0, -1.0) for row in within.rotation for x in row)
+        if along:  # then the axes of the base are as simple, and labels of rows say what they mean
+            within = Frame(vec.identity(self.graph), within.position)
+        return base, within
 
     def common(self, a: Marker, b: Marker) -> int:
         """The nearest link that carries both markers."""

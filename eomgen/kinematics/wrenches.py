@@ -44,7 +44,7 @@ class _Displaced(Poses):
         super().__init__(kinematics.mechanism, kinematics.links)
         self._true, self._origins, self._moves = kinematics.poses, origins, moves
 
-    def link(self, link: int, base: int = GROUND) -> Frame:
+    def link(self, link: int, base: int = GROUND, within: Frame | None = None) -> Frame:
         frame = self._true.link(link)
         if link == GROUND:
             return frame
@@ -55,8 +55,8 @@ class _Displaced(Poses):
         rotation = vec.transpose((columns[0], columns[1], columns[2]))
         return Frame(rotation, vec.add(frame.position, vec.add(shift, vec.cross(turn, arm))))
 
-    def common(self, a: Marker, b: Marker) -> int:
-        return GROUND
+    def between(self, start: Marker, end: Marker) -> tuple[int, Frame]:
+        return GROUND, Frame(vec.identity(self.graph), vec.zero(self.graph))
 
 
 class JointWrenches:
@@ -155,10 +155,8 @@ class JointWrenches:
 
     def _cut_joint(self, spec: JointSpec) -> CutJoint:
         graph, poses = self.kinematics.graph, self.kinematics.poses
-        base = poses.common(spec.predecessor, spec.successor)
-        outer, inner = poses.marker(spec.predecessor, base), poses.marker(spec.successor, base)
-        rotation = vec.product(vec.transpose(outer.rotation), inner.rotation)
-        position = vec.transpose_times(outer.rotation, vec.sub(inner.position, outer.position))
+        pose = poses.relative(spec.predecessor, spec.successor)
+        rotation, position = pose.rotation, pose.position
         R: Mat3 = tuple(tuple(graph.symbol(f"R({i},{k})") for k in range(3)) for i in range(3))  # type: ignore[assignment]
         r: Vec3 = (graph.symbol("r(0)"), graph.symbol("r(1)"), graph.symbol("r(2)"))
         turn = graph.symbol("turn(z)")
@@ -189,8 +187,9 @@ class JointWrenches:
             turned = vec.times(to_ground, (values[3], values[4], values[5]))
             gradients.append((*force, *turned))
         labels = [row.label for row in rows]
-        if {"r_x", "r_y", "r_z"} <= set(labels):  # then these rows are along the axes of the base (see close_loop)
-            axes = poses.link(base).rotation
+        if {"r_x", "r_y", "r_z"} <= set(labels):  # then these rows are along common axes (see close_loop)
+            base, common = poses.between(spec.predecessor, spec.successor)
+            axes = vec.product(poses.link(base).rotation, common.rotation)
             for k, letter in enumerate("xyz"):
                 gradients[labels.index(f"r_{letter}")] = (*(row[k] for row in axes), *vec.zero(graph))
         named = [f"{spec.name}.{label}" for label in labels]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import PartitionError
-from .rank_limits import CHOSEN as STRICT
-from .rank_limits import STATE as RANK
+from ..limits.constraints import CHOSEN as STRICT
+from ..limits.constraints import STATE as RANK
 from .scales import Array, Indices
 
 PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best
@@ -61,7 +61,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     Raises
     ------
     PartitionError
-        Fewer than `rank` good pivots: below 1e-10 of the largest entry of J, or 1e-8 if `strict`.
+        Fewer than `rank` good pivots: below STATE of the largest entry of J, or CHOSEN if `strict`.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..limits.rounding import ROUNDED
 from .given_rates import GivenRates
 from .space import Array, Indices, Space
 
@@ -16,9 +17,6 @@ __all__ = ["Array", "GivenRates", "Indices", "Position", "Rate", "Scales", "Spac
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 #: q (n,) -> C_t (m,)
 Rate: TypeAlias = Callable[[Array], Array]
-
-
-ROUNDED = 64.0 * float(np.finfo(float).eps)  #: of a coordinate, and of what it goes into
 
 
 class Scales(NamedTuple):
@@ -47,12 +45,6 @@ class Scales(NamedTuple):
             space,
             np.array([float(kind == "length") for kind in velocities]),
         )
-
-    def resized(self, C_q: Array, rows: Indices) -> Scales:
-        """The same with the lengths of the scaled gradients C_q (m, n) for the sizes of some rows."""
-        sizes, new = np.array(self.c), np.linalg.norm(C_q[rows] * self.q, axis=1)
-        sizes[rows] = np.where(np.isfinite(new) & (new > 0.0), new, sizes[rows])
-        return self._replace(c=sizes)
 
     def jacobian(self, C_q: Array) -> Array:
         """The scaled Jacobian J = diag(1/s_c) C_q diag(s_q), (m, n), of all rows or the first; or (..., m, n)."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
-    from ..analysis.sensitivities import Sensitivities
+    from ..analysis.sensitivity_result import Sensitivities
     from ..numeric.scales import Array
     from ..verification.finding import Verification
     from .kernels import Kernels
@@ -221,7 +221,9 @@ class Analyses(ForceAnalyses):
         hold: Mapping[str, float | None] | Sequence[str] = (),
         unknowns: Sequence[str] = (),
     ) -> Equilibrium:
-        """Find a position at rest in which all forces are in balance (virtual work, Newton's iteration).
+        """Find a position at rest in which all forces are in balance (virtual work) and nonholonomic rows allow rest.
+
+        Newton's iteration, then the motion in a viscous fluid, then Levenberg's and Marquardt's steps.
 
         Parameters
         ----------
@@ -245,7 +247,8 @@ class Analyses(ForceAnalyses):
         Raises
         ------
         EquilibriumError
-            None was found from the guess; the message names the coordinate with the largest force left.
+            None was found from the guess; the message names the coordinate with the largest force left, or one that
+            nonholonomic constraints move even at rest.
         AssemblyError
             The loops do not close with the held values.
         UsageError

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,16 @@ class Layout:
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.n_events: int = data.get("n_events", 0)
         self.n_resets: int = data.get("n_resets", 0)
+        self.n_strike: int = data.get("n_strike", 0)
         self.n_e = len(self.fragile_forces)
+        #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
+        #: itself, or stands in the equations by its rates only.
+        self.input_rates: dict[str, list[tuple[str, int]]] = {
+            name: [(str(rate), int(times)) for rate, times in rates]
+            for name, rates in data.get("input_rates", {}).items()
+        }
+        #: places in u of the inputs on which constraints depend
+        self.constraint_inputs = [self.u.index(name) for name in data.get("constraint_inputs", ())]
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
@@ -79,10 +89,10 @@ class Layout:
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
+        self.velocity_lengths = np.array([kind == "length" for kind in kinds], dtype=bool)
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
-        self.coefficient_rows = np.array(data.get("coefficient_rows", ()), dtype=np.intp)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
@@ -95,7 +105,8 @@ class Layout:
         ]
         self.loop_kinds = tuple(loop_kinds)
         self.loop_angles = np.array([kind == "angle" for kind in loop_kinds], dtype=bool)
-        self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in loop_kinds])
+        self.loop_lengths = np.array([kind == "length" for kind in loop_kinds], dtype=bool)
+        self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
         self.limits: dict[str, dict[str, float]] = data.get("limits", {})
@@ -103,15 +114,20 @@ class Layout:
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
 
-    def sized(self, C_q: Callable[[], Array]) -> tuple[Scales, Scales]:
-        """The scales, and those of positions, with parameters that may have other values than declared.
-
-        ``C_q`` gives the Jacobian (m, n) with the parameters' own values.
-        """
-        if not self.coefficient_rows.size:
-            return self.scales, self.place_scales
-        scales = self.scales.resized(C_q(), self.coefficient_rows)
-        return scales, self.place_scales._replace(c=scales.c[: len(self.place_scales.c)])
+    def sized(self, sizes: Array) -> Layout:
+        """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values."""
+        s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
+        if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
+            return self
+        found = copy(self)
+        lengths = [*s_q[self.velocity_lengths], *s_c[self.scales.c == self.length]]
+        found.length = float(lengths[0]) if lengths else self.length
+        found.scales = self.scales._replace(q=s_q, c=s_c)
+        found.place_scales = found.scales
+        if self.given_rates:
+            found.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), found.length)
+        found.loop_scales = np.where(self.loop_lengths, found.length, 1.0)
+        return found
 
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.
@@ -138,6 +154,7 @@ class Layout:
         """Length of the vector x a kernel takes."""
         motion, dae = self.n_q + 2 * self.n_v, 2 * self.n_dae
         sizes = {"q": self.n_q, "x": self.n_x, "motion": motion, "none": 0, "dae": dae, "dae_cj": dae + 1}
+        sizes["strike"] = motion + self.n_c + self.n_events
         return sizes.get(KERNELS[kernel][0], 3 * self.n_dof + self.n_q)
 
     def shape(self, kernel: str) -> tuple[int, ...]:
@@ -147,6 +164,8 @@ class Layout:
             "n_v+n_c": self.n_v + self.n_c,
             "n_centroidal": self.n_com * (self.n_v + 6),
             "n_assembly": self.n_h + self.n_c + 2 * self.n_k,
+            "n_events+n_resets": self.n_events + self.n_resets,
+            "n_x+1+n_u+n_p": self.n_x + 1 + self.n_u + self.n_p,
             "n_x+n_u+n_p": self.n_x + self.n_u + self.n_p,
             "n_motion+n_u+n_p": self.n_x + self.n_v + self.n_u + self.n_p,
         }
@@ -195,7 +214,11 @@ class Layout:
         shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
         head = "the constants that follow from the parameters are not finite"
         which = " (changed from their declared values)" if changed else ""
-        return f"{head} with {', '.join(shown)}{which}; look for a division by zero, a root or an overflow in a law"
+        masses = self.metadata.get("masses", {})
+        nought = [f"{name} is the mass of body {masses[name]!r}" for name, x, _ in named if name in masses and x == 0.0]
+        cause = f": {', '.join(nought)}" if nought else ""
+        remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
+        return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
 
     def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
         """Refuse a negative value of a parameter that is a body's mass."""
@@ -259,5 +282,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "events": ("x", ("n_events",)),
     "resets": ("x", ("n_resets",)),
     "event_slopes": ("x", ("n_events", "n_x")),
+    "event_derivatives": ("x", ("n_events+n_resets", "n_x+1+n_u+n_p")),
+    "strike_derivatives": ("strike", ("n_strike", "n_x+1+n_u+n_p")),
     "scales": ("none", ("n_v+n_c",)),
 }

@@ -53,9 +53,8 @@ def _definite(module: Module, cases: Sequence[Case]) -> Finding:
     check = "embedded_mass_matrix: symmetric, positive definite"
     if not module.n_dof or module.layout.given_rates:
         return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "equations are given")
-    equations = module.equations
-    if equations is not None and not all(body.checked for body in equations.kinematics.mechanism.bodies):
-        return Finding.skipped(check, "masses and inertias of the model are not checked, so that it need not be")
+    if module.metadata.get("indefinite"):
+        return Finding.skipped(check, "the model allows masses and inertias that no body has")
     found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
     for c in cases:
         M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)

@@ -6,7 +6,6 @@ bodies, constraints, derivatives and runs; then what concerns the model as it wa
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 STATES = 6  #: random states
 #: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
 GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivatives", "runs")
-#: Findings about a model as it was described: called with the model, ``seed=`` and ``seconds=``.
-OF_MODELS: tuple[Callable[..., list[Finding]], ...] = ()
 
 
 def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verification:
@@ -52,6 +49,9 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
         mpmath or SciPy is missing where the equations are there.
     """
     start = perf_counter()
+    if module.metadata.get("no_inertia"):
+        why = f"it is there for kinematics only: {module.metadata['no_inertia']}"
+        return Verification(module.name, (Finding.skipped("all that moves by forces", why),))
     cases = random_cases(module, states, seed)
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
@@ -77,11 +77,11 @@ def verify_model(
         Time for what concerns the model.
     """
     start = perf_counter()
+    from .variants import variant_findings
+
     own = verify(module, states=states, seed=seed)
-    found = [*own.findings]
-    for find in OF_MODELS:
-        found += find(model, seed=seed, seconds=seconds)
-    return Verification(own.name, tuple(found), perf_counter() - start)
+    found = (*own.findings, *variant_findings(model, seed=seed, seconds=seconds))
+    return Verification(own.name, found, perf_counter() - start)
 
 
 def _with_equations(module: Module, equations: Equations, cases: list[Case]) -> list[Finding]:

@@ -1,0 +1,171 @@
+"""Stage graph: expressions and numbers -> values with bounds of their rounding; which expressions vanish identically.
+
+Running error analysis (J. H. Wilkinson; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002,
+3.3): beside every value x stands a bound e such that x is known to about eps e.  A sum adds the bounds of its terms, so
+that what cancels is judged by the magnitudes of the terms that were added, not by their sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ..limits.rounding import ROUNDED
+from .core import Expr, Graph
+from .evaluate import Evaluator
+from .traverse import LEAVES, common_graph, reachable
+from .vectors import Mat3, Vec3
+
+TRIES = 3  #: random points at which an identity is tried
+
+#: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.
+ANALYTIC = LEAVES | {"add", "sub", "mul", "div", "neg", "exp", "sin", "cos", "tan", "sinh", "cosh", "tanh"}
+
+Numbers = Sequence[float]
+
+#: How bounds (e, f) of operands (a, b) reach y = operation(a, b), rounding of y itself apart.
+SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
+    "add": lambda y, x, e: e[0] + e[1],
+    "sub": lambda y, x, e: e[0] + e[1],
+    "mul": lambda y, x, e: abs(x[1]) * e[0] + abs(x[0]) * e[1],
+    "div": lambda y, x, e: (e[0] + abs(y) * e[1]) / abs(x[1]),
+    "neg": lambda y, x, e: e[0] - abs(y),  # exact
+    "pow": lambda y, x, e: abs(x[1] * y / x[0]) * e[0] + (abs(y * math.log(x[0])) * e[1] if e[1] else 0.0),
+    "sqrt": lambda y, x, e: 0.5 * e[0] / y if e[0] else 0.0,
+    "exp": lambda y, x, e: y * e[0],
+    "log": lambda y, x, e: e[0] / abs(x[0]),
+    "sin": lambda y, x, e: abs(math.cos(x[0])) * e[0],
+    "cos": lambda y, x, e: abs(math.sin(x[0])) * e[0],
+    "tan": lambda y, x, e: (1.0 + y * y) * e[0],
+    "asin": lambda y, x, e: e[0] / math.sqrt(1.0 - x[0] * x[0]),
+    "acos": lambda y, x, e: e[0] / math.sqrt(1.0 - x[0] * x[0]),
+    "atan": lambda y, x, e: e[0] / (1.0 + x[0] * x[0]),
+    "sinh": lambda y, x, e: math.cosh(x[0]) * e[0],
+    "cosh": lambda y, x, e: abs(math.sinh(x[0])) * e[0],
+    "tanh": lambda y, x, e: (1.0 - y * y) * e[0],
+    "atan2": lambda y, x, e: (abs(x[1]) * e[0] + abs(x[0]) * e[1]) / (x[0] * x[0] + x[1] * x[1]),
+    "abs": lambda y, x, e: e[0] - y,
+    "min": lambda y, x, e: (e[0] if y == x[0] else e[1]) - abs(y),
+    "max": lambda y, x, e: (e[0] if y == x[0] else e[1]) - abs(y),
+    "select": lambda y, x, e: (e[1] if x[0] else e[2]) - abs(y),
+}
+
+
+def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of expressions and the bounds of their rounding.
+
+    Parameters
+    ----------
+    outputs : sequence of Expr
+        Expressions of one graph.
+    values : mapping of str to float
+        Of all symbols, taken as exact.
+
+    Returns
+    -------
+    values : (n,) array
+        NaN outside of an operation's domain.
+    bounds : (n,) array
+        In units of eps; infinite where nothing is known, as of a square root at 0.
+    """
+    graph = common_graph(outputs)
+    if graph is None:
+        return np.empty(0), np.empty(0)
+    order = reachable(graph, (y.id for y in outputs))
+    names = list(values)
+    found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
+    bounds: dict[int, float] = {}
+    for i in order:
+        operation, *operands = graph.nodes[i]
+        y = found[i]
+        if operation == "sym":
+            bounds[i] = 0.0
+            continue
+        spread = SPREAD.get(operation)
+        bounds[i] = abs(y)  # a constant is rounded once, a table or a function in C knows its value
+        if spread is not None:
+            try:
+                bounds[i] += spread(y, [found[k] for k in operands], [bounds[k] for k in operands])
+            except (ValueError, ZeroDivisionError, OverflowError):
+                bounds[i] = math.inf
+    return np.array([found[y.id] for y in outputs]), np.array([bounds[y.id] for y in outputs])
+
+
+def vanishing(outputs: Sequence[Expr]) -> list[bool]:
+    """Which expressions are zero, to rounding, at all values of their symbols.
+
+    Tried at random values: an analytic expression that is zero at some of them is zero everywhere, with probability 1.
+    Others, such as ``max(x, 0)``, may vanish in a part of their domain and do not count.
+    """
+    graph = common_graph(outputs)
+    left = [k for k, analytic in enumerate(_analytic(graph, outputs)) if analytic] if graph is not None else []
+    random = np.random.default_rng(11)
+    names: dict[str, float] = {}
+    for _ in range(TRIES):
+        if not left or graph is None:
+            break
+        for i in reachable(graph, (outputs[k].id for k in left)):
+            if graph.nodes[i][0] == "sym":
+                names[graph.nodes[i][1]] = float(random.uniform(0.2, 1.4) * random.choice((-1.0, 1.0)))
+        values, bounds = with_bounds([outputs[k] for k in left], names)
+        zero = is_rounding(values, bounds)
+        left = [k for k, z in zip(left, zero, strict=True) if z]
+    found = set(left)
+    return [k in found for k in range(len(outputs))]
+
+
+def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Whether each value is not told from zero by what is known of its rounding."""
+    return np.asarray(np.isfinite(bounds) & (np.abs(values) <= ROUNDED * bounds))
+
+
+def terms_of(x: Expr) -> Expr:
+    """The sum of the magnitudes of the terms of a sum of products, as an expression; |x| where nothing is added."""
+    graph = x.graph
+    found: dict[int, Expr] = {}
+    for i in reachable(graph, [x.id]):
+        operation, *operands = graph.nodes[i]
+        if operation in ("add", "sub"):
+            found[i] = found[operands[0]] + found[operands[1]]
+        elif operation == "mul":
+            found[i] = found[operands[0]] * found[operands[1]]
+        elif operation == "div":
+            found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
+        elif operation == "neg":
+            found[i] = found[operands[0]]
+        else:
+            found[i] = graph.apply("abs", Expr(graph, i))
+    return found[x.id]
+
+
+def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
+    found: dict[int, bool] = {}
+    for i in reachable(graph, (y.id for y in outputs)):
+        operation, *operands = graph.nodes[i]
+        found[i] = operation in ANALYTIC and (operation in LEAVES or all(found[k] for k in operands))
+    return [found[y.id] for y in outputs]
+
+
+def settled_vector(a: Vec3, size: float) -> Vec3:
+    """A vector whose constant components are exactly 0 where they are rounding of terms of a size."""
+    x, y, z = (c.graph.zero if c.value is not None and abs(c.value) <= ROUNDED * size else c for c in a)
+    return (x, y, z)
+
+
+def settled_rotation(m: Mat3) -> Mat3:
+    """A rotation whose constant entries are exactly 0, 1 or -1 where rounding alone keeps them from it."""
+    rows = [list(settled_vector(row, 1.0)) for row in m]
+    graph = m[0][0].graph
+    for i, row in enumerate(rows):
+        found = [j for j, x in enumerate(row) if not x.is_zero]
+        alone = len(found) == 1 and all(other[found[0]].is_zero for k, other in enumerate(rows) if k != i)
+        if alone and (value := row[found[0]].value) is not None:
+            row[found[0]] = graph.constant(math.copysign(1.0, value))
+    return tuple((x, y, z) for x, y, z in rows)  # type: ignore[return-value]
+
+
+def size_of(*vectors: Vec3) -> float:
+    """The sum of the largest constant components of some vectors."""
+    return sum(max((abs(c.value) for c in a if c.value is not None), default=0.0) for a in vectors)
