@@ -89,7 +89,7 @@ class _Worst:
 
 
 def _compare_reactions(worst: _Worst, original: Original, variant: Variant, module: Any, states: Any) -> None:
-    """Reactions, also those that rigid bodies leave undetermined: the smallest, which no change of clothes alters."""
+    """Reactions; of those that rigid bodies leave undetermined the smallest, which no change of clothes alters."""
     found = reactions_of(module, states)
     if original.reactions is None or found is None:
         return

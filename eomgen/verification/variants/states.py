@@ -143,10 +143,12 @@ def sizes_of(module: Any, kinds: Mapping[str, str], values: Array, states: Array
         return np.abs(values[rows]).max(axis=0) if rows else np.zeros(values.shape[1])
 
     turning = largest(SPIN)
-    speed = largest(SPEED) + length * turning
-    linear = largest(LINEAR) + length * largest(ANGULAR) + length * turning**2
+    speed = largest(SPEED) + length * turning + length
+    # at rest without loads nothing accelerates: a length a second squared is the least size
+    linear = largest(LINEAR) + length * largest(ANGULAR) + length * turning**2 + length
     place = largest(PLACE) + length
-    energy = np.full(values.shape[1], max(float(np.max(largest(("kinetic_energy", "potential_energy")))), 0.0))
+    # potentials are differences of larger numbers: the work of what accelerates the mass over a place
+    energy = float(np.max(largest(("kinetic_energy", "potential_energy")))) + largest(("total_mass",)) * linear * place
     by_kind = dict.fromkeys(LINEAR, linear) | dict.fromkeys(ANGULAR, linear / length)
     by_kind |= dict.fromkeys(SPEED, speed) | dict.fromkeys(SPIN, speed / length) | dict.fromkeys(PLACE, place)
     by_kind |= dict.fromkeys(("kinetic_energy", "potential_energy"), energy)
