@@ -7,9 +7,10 @@ from functools import cached_property
 from itertools import chain
 
 from ..graph.core import Expr
-from ..graph.differentiate import jacobian, jvp
+from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
 from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
@@ -217,11 +218,13 @@ class BlockMaker:
             "finite_forces": lambda: terms.finite_forces,
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
-            "event_slopes": self._event_slopes,
-            "event_derivatives": lambda: self._by_everything([*terms.events, *terms.resets]),
-            "strike_derivatives": lambda: self._by_everything(self._strike),
-            "assembly_jacobian": self._assembly_jacobian,
-            "output_derivatives": self._output_derivatives,
+            "event_slopes": lambda: derivatives(terms, terms.events, (*terms.q, *terms.v)),
+            "event_derivatives": lambda: by_everything(terms, [*terms.events, *terms.resets]),
+            "strike_derivatives": lambda: by_everything(
+                terms, strike_rows(terms, self._symbols(self.port("impulses").symbols))
+            ),
+            "assembly_jacobian": lambda: assembly_jacobian(terms, self.sizes.n_k),
+            "output_derivatives": lambda: output_derivatives(terms),
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),
             "scales": lambda: (*terms.coordinate_scales, *terms.constraint_scales),
@@ -375,50 +378,6 @@ class BlockMaker:
             return unrolled_jacobian(self.terms, self.slopes)
         names = self.terms.u if SHIFTS[name] == "input" else self.terms.p
         return unrolled_shift(self.terms, self.slopes, names)
-
-    def _derivatives(self, rows: Sequence[Expr], names: Sequence[str]) -> list[Expr]:
-        """All derivatives of rows by symbols, row-major."""
-        entries, zero = jacobian(rows, self._symbols(names)), self.terms.graph.zero
-        return [entries.get((i, k), zero) for i in range(len(rows)) for k in range(len(names))]
-
-    def _assembly_jacobian(self) -> list[Expr]:
-        terms = self.terms
-        held = terms.loop_coordinates[: 2 * self.sizes.n_k]
-        rows = [*terms.constraints, *terms.velocity_constraints, *held]
-        return self._derivatives(rows, (*terms.q, *terms.v, *terms.u, *terms.p))
-
-    def _event_slopes(self) -> list[Expr]:
-        return self._derivatives(self.terms.events, (*self.terms.q, *self.terms.v))
-
-    @property
-    def _strike(self) -> list[Expr]:
-        """What rules velocities at an instant, a their change: impulses l of constraints and g of gaps with normals n,
-        or the least scaled change; constraints and the events' rates of (q, v)."""
-        terms, zero = self.terms, self.terms.graph.zero
-        v, a = self._symbols(terms.v), self._symbols(terms.a)
-        rates = jvp(terms.events, dict(zip(self._symbols(terms.q), terms.rates or v, strict=True)))
-        time = terms.graph.symbol(terms.t)
-        moving = {terms.graph.symbol(u): terms.graph.symbol(rate) for u, rate in terms.input_rates}
-        drift = jvp(terms.events, {time: terms.graph.one} | moving)
-        normals = jacobian(rates, v)
-        change = jvp(terms.inverse_dynamics, {x: x for x in a})
-        least = [x / (s * s) for x, s in zip(a, terms.coordinate_scales, strict=True)]
-        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
-            change = [x + c * l for x, c in zip(change, row, strict=True)]
-            least = [x + c * l for x, c in zip(least, row, strict=True)]
-        for i, g in enumerate(self._symbols(self.port("impulses").symbols)):
-            change = [x - normals.get((i, k), zero) * g for k, x in enumerate(change)]
-        moved = [x + y for x, y in zip(rates, drift, strict=True)]
-        return [*change, *least, *terms.velocity_constraints, *moved]
-
-    def _by_everything(self, rows: Sequence[Expr]) -> list[Expr]:
-        """Derivatives by coordinates, velocities, time, inputs and parameters."""
-        terms = self.terms
-        return self._derivatives(rows, (*terms.q, *terms.v, terms.t, *terms.u, *terms.p))
-
-    def _output_derivatives(self) -> list[Expr]:
-        terms = self.terms
-        return self._derivatives(terms.outputs, (*terms.q, *terms.v, *terms.a, *terms.u, *terms.p))
 
     @property
     def _directions(self) -> dict[Expr, Expr]:
