@@ -6,7 +6,8 @@ from mutations.fault import Fault
 
 LOOPS, TREES = "tests/emit/test_c_loops.py", "tests/emit/test_c_trees.py"
 DERIVATIVES, STEPS = "tests/emit/test_c_derivatives.py", "tests/emit/test_steps_of_scipy_in_c.py"
-BALL = "tests/emit/test_steppers_in_c.py"
+BALL, EVENTS = "tests/emit/test_steppers_in_c.py", "tests/emit/test_events_in_c.py"
+MODELS = "tests/emit/test_c_models.py"
 DRIVERS, STEPPERS = "templates/c/drivers", "templates/c/steppers"
 
 FAULTS = (
@@ -78,7 +79,7 @@ FAULTS = (
     Fault(
         "c-ldl", f"{DRIVERS}/ldl.c",
         "b[i] -= a[k * F + i] * b[k];", "b[i] -= a[i * F + k] * b[k];",
-        "backward substitution: a transpose is lost", (LOOPS, "tests/emit/test_c_freedoms.py"),
+        "backward substitution: a transpose is lost", (LOOPS, MODELS),
     ),
     Fault(
         "c-ldl-singular", f"{DRIVERS}/ldl.c",
@@ -118,27 +119,27 @@ FAULTS = (
     Fault(
         "c-ball-rates", f"{DRIVERS}/space_balls.c",
         "rates[2] += e[3] * x + e[0] * y - e[1] * z;", "rates[2] += e[3] * x + e[0] * y + e[1] * z;",
-        "rates of Euler parameters: a sign", ("tests/emit/test_c_turns.py",),
+        "rates of Euler parameters: a sign", (MODELS,),
     ),
     Fault(
         "c-ball-factor", f"{DRIVERS}/space_balls.c",
         "const double x = 0.5 * factor * w[0]", "const double x = 1.0 * factor * w[0]",
-        "rates of Euler parameters: a factor 1/2", ("tests/emit/test_c_turns.py",),
+        "rates of Euler parameters: a factor 1/2", (MODELS,),
     ),
     Fault(
         "c-ball-velocities", f"{DRIVERS}/space_balls_more.c",
         "w[1] = scale * (e[0] * de[2] - e[2] * de[0] + e[1] * de[3] - e[3] * de[1]);", "w[1] = scale * (e[0] * de[2] - e[2] * de[0] + e[1] * de[3]);",
-        "angular velocity of a change of Euler parameters: a term is left out", ("tests/emit/test_c_turns.py",),
+        "angular velocity of a change of Euler parameters: a term is left out", (MODELS,),
     ),
     Fault(
         "c-system-solve", f"{DRIVERS}/system_substitute.c",
         "d[i] -= lu[i * NZ + k] * entry;", "d[i] -= lu[k * NZ + i] * entry;",
-        "forward substitution: a transpose is lost", ("tests/emit/test_c_systems.py",),
+        "forward substitution: a transpose is lost", (MODELS,),
     ),
     Fault(
         "c-columns-jacobian", f"{DRIVERS}/columns_jacobian.c",
         "out[(NQ + k) * NX + column] = da[k];", "out[(NQ + k) * NX + column] = da[N - 1 - k];",
-        "the Jacobian of a long chain: rows in the wrong order", ("tests/emit/test_c_columns.py",),
+        "the Jacobian of a long chain: rows in the wrong order", (MODELS,),
     ),
     Fault(
         "rk45-stage", f"{STEPPERS}/rk45.c",
@@ -218,7 +219,7 @@ FAULTS = (
     Fault(
         "taylor-defect", f"{STEPPERS}/taylor_terms.c",
         "TAYLOR_DEFECT = 10.0", "TAYLOR_DEFECT = 1e9",
-        "steps are not judged by their ends", ("tests/emit/test_taylor_in_c.py", STEPS),
+        "steps are not judged by their ends", (STEPS,),
     ),
     Fault(
         "first-step", f"{STEPPERS}/control.c",
@@ -233,17 +234,17 @@ FAULTS = (
     Fault(
         "event-direction", f"{STEPPERS}/crossings.c",
         "ev->direction[i] != 0 && ev->direction[i] * (fb - fa) < 0.0", "ev->direction[i] == 2",
-        "the direction of an event is ignored", ("tests/emit/test_events_in_c.py",),
+        "the direction of an event is ignored", (EVENTS,),
     ),
     Fault(
         "event-touch", f"{STEPPERS}/crossings.c",
         "return least < 0.5 * fmin(fabs(a), fabs(b));", "return least < -0.5 * fmin(fabs(a), fabs(b));",
-        "a value that comes to zero and back within a step is missed", ("tests/emit/test_events_in_c.py",),
+        "a value that comes to zero and back within a step is missed", (EVENTS,),
     ),
     Fault(
         "event-tolerance", f"{STEPPERS}/event_zero.c",
         "tolerance = 2.0 * DBL_EPSILON * (1.0 + fabs(b))", "tolerance = 2e9 * DBL_EPSILON * (1.0 + fabs(b))",
-        "times of events are found to 1e-7 only", (BALL, "tests/emit/test_events_in_c.py"),
+        "times of events are found to 1e-7 only", (EVENTS,),
     ),
     Fault(
         "reset-after-event", f"{STEPPERS}/loop.c",
@@ -253,12 +254,12 @@ FAULTS = (
     Fault(
         "table-hold", f"{STEPPERS}/signals.c",
         "if (s->times[middle] <= t) {", "if (s->times[middle] <= t + 0.1) {",
-        "values of a table are held from too early", ("tests/emit/test_events_in_c.py",),
+        "values of a table are held from too early", (EVENTS,),
     ),
     Fault(
         "table-cubic", f"{STEPPERS}/signals.c",
         "return v[0] + x * (v[1] + x * (v[2] + x * v[3]));", "return v[0] + x * (v[1] + x * (2.0 * v[2] + x * v[3]));",
-        "a cubic table doubles its curvature", ("tests/emit/test_events_in_c.py",),
+        "a cubic table doubles its curvature", (EVENTS,),
     ),
     Fault(
         "sine-coefficient", "templates/c/eomgen_sincos.h",
@@ -267,6 +268,7 @@ FAULTS = (
     ),
     Fault(
         "wide-steps", f"{STEPPERS}/wide.c",
-        "WIDE-PLACEHOLDER", "", "", ("tests/emit/test_wide_steps_in_c.py",),
+        "(a >= b ? a : b) * run->rtol;", "(a >= b ? b : a) * run->rtol;",
+        "steps four states at a time measure errors by the smaller of two sizes", ("tests/emit/test_wide_steps_in_c.py",),
     ),
 )  # fmt: skip

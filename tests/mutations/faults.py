@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from mutations import derivation, elements
+from mutations import c_code, derivation, elements, numerics
 
-FAULTS = (*derivation.FAULTS, *elements.FAULTS)
+FAULTS = (*derivation.FAULTS, *elements.FAULTS, *numerics.FAULTS, *c_code.FAULTS)
