@@ -30,6 +30,7 @@ _ERRORS = (
     "ExpressionError",
     "MissingDependencyError",
     "ModelError",
+    "NoDerivativeError",
     "NonFiniteError",
     "PartitionError",
     "ProjectionError",

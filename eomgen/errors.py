@@ -14,7 +14,8 @@
     |  '- NonFiniteError            a result is not a finite number
     |- EquilibriumError      no equilibrium was found from the guess; .forces says what is left
     |- SimulationError       the integration ended early; its __cause__ is the last failure of a kernel
-    |  '- ZenoError                 events that reset the state follow each other ever faster
+    |  |- ZenoError                 events that reset the state follow each other ever faster
+    |  '- NoDerivativeError         a run has no derivative: an event grazes its surface, or two happen at once
     |- ToolchainError        no compiler, or the compiler failed; .command and .output say what it said
     |- MissingDependencyError       an optional package is needed; the message says what to install
     '- UsageError            a call with names or shapes that do not fit the model
@@ -155,6 +156,10 @@ class SimulationError(EomgenError):
 
 class ZenoError(SimulationError):
     """Events that reset the state follow each other ever faster, or a reset leads nowhere."""
+
+
+class NoDerivativeError(SimulationError):
+    """A run has no derivative by its parameters: an event grazes its surface, or two happen at once."""
 
 
 class SimulationInterrupted(KeyboardInterrupt):

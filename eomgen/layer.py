@@ -6,6 +6,8 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from .limits.in_c import definitions
+
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
     *("control", "signals", "tape"),
@@ -47,7 +49,8 @@ LAYER = {
 @cache
 def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
-    return {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+    texts = {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+    return {name: definitions(text) + text if name.endswith((".c", ".h")) else text for name, text in texts.items()}
 
 
 def read_header(name: str) -> str:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import Any
 
 from .describe import Model, load_yaml
-from .errors import UsageError
+from .errors import ModelError, UsageError
+from .numeric.inertia import CHECKS, word_of_check
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
 ROBOTS = {".urdf": "a robot (URDF)", ".xml": "a robot (MJCF or URDF)"}
 
 
-def load(path: str | os.PathLike[str], *, allow_native: bool = False, **robot: Any) -> Model:
+def load(
+    path: str | os.PathLike[str], *, allow_native: bool = False, check_inertia: bool | str | None = None, **robot: Any
+) -> Model:
     """A model from a file, by its suffix.
 
     Parameters
@@ -23,8 +27,12 @@ def load(path: str | os.PathLike[str], *, allow_native: bool = False, **robot: A
     allow_native : bool, optional
         Whether native functions of the file are compiled and run; else each is a fault of the model, and the files it
         names are not read.
+    check_inertia : {'error', 'note', 'off'} or bool, optional
+        What becomes of masses and inertias that no body can have, and of motions without inertia: refused (the default,
+        True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
     **robot
-        For robots: ``floating``, ``lock``, ``mimic`` and the other fields of :class:`eomgen.robots.Options`.
+        For robots: ``floating``, ``lock``, ``mimic``, ``limits`` and the other fields of
+        :class:`eomgen.robots.Options`.
 
     Returns
     -------
@@ -43,7 +51,9 @@ def load(path: str | os.PathLike[str], *, allow_native: bool = False, **robot: A
     if suffix in ROBOTS:
         from .robots import describe_file  # only where it is needed: MJCF brings its own compiler
 
-        return Model.from_description(describe_file(path, **robot))
+        if check_inertia is not None:
+            robot["check_inertia"] = check_inertia
+        return _with_notes(Model.from_description(describe_file(path, **robot)))
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
         raise UsageError(
@@ -51,4 +61,19 @@ def load(path: str | os.PathLike[str], *, allow_native: bool = False, **robot: A
         )
     if robot:
         raise UsageError(f"{os.fspath(path)}: {', '.join(robot)}: options of robot files, not of model files")
-    return load_yaml(path, allow_native=allow_native)
+    model = load_yaml(path, allow_native=allow_native)
+    if check_inertia is not None:
+        word = word_of_check(check_inertia)
+        if word is None:
+            raise UsageError(f"check_inertia={check_inertia!r}: allowed: {', '.join(CHECKS)}, True, False")
+        model.check_inertia = word
+    return _with_notes(model)
+
+
+def _with_notes(model: Model) -> Model:
+    """The model, whose notes tell what its ``check_inertia: note`` takes; other faults are told when it is checked."""
+    bodies = model.description.sections["bodies"]
+    if "note" in (model.check_inertia, *(entry.values.get("check_inertia") for entry in bodies)):
+        with suppress(ModelError):
+            model.description.notes += model.mechanism().notes
+    return model

@@ -8,6 +8,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
@@ -162,8 +163,9 @@ def check(model: Model) -> MechanismReport:
     """
     equations = derive(model)
     equations.kinematics.mechanism.require_values()
-    require_inertia(equations.kinematics, equations.mobility, equations.tree)
-    return report(equations.kinematics, equations.mobility)
+    idle = require_inertia(equations.kinematics, equations.mobility, equations.tree)
+    found = report(equations.kinematics, equations.mobility)
+    return replace(found, notes=[*found.notes, f"kinematics only: {idle}"]) if idle else found
 
 
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
@@ -176,9 +178,14 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
         raise UsageError(f"no target {target!r}; there are: {', '.join(TARGETS)}")
     kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
     kinematics.mechanism.require_values()
-    require_inertia(kinematics, mobility, tree)
+    idle = require_inertia(kinematics, mobility, tree)
+    if idle and tree.accelerations is not None:
+        tree = METHODS["embedding"](kinematics)  # the pivots of the other are nought already as they are written
     metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
     limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
+    if idle:
+        metadata["no_inertia"] = idle
+        limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
     return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels, limits=limits)
 
 

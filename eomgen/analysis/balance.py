@@ -6,12 +6,12 @@ all virtual displacements B that the constraints allow, Q all forces of the mode
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..numeric.partitions import partition
+from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
 from .tangent import find_tangent
@@ -21,15 +21,27 @@ if TYPE_CHECKING:
 
 
 class Balance(NamedTuple):
-    """A position at rest, with k of its coordinates held or none."""
+    """A position at rest, with k of its coordinates held or none.
+
+    Rest means that the independent velocities are 0.  Nonholonomic rows A(q) v + b(q) = 0 leave more displacements
+    than velocities, and b gives the surplus ones a velocity, which vanishes in an equilibrium.
+    """
 
     x: Array  #: (n_x,) independent velocities 0
     velocities: Indices  #: (n_dof - k,) independent velocities
     B: Array  #: (n_v, n_dof - k) virtual displacements of the tree
-    a: Array  #: (n_dof - k,) accelerations of the independent velocities when let go, nothing held
+    positions: Indices  #: (n_z,) independent displacements, at least as many
+    Z: Array  #: (n_v, n_z) displacements of the tree that the holonomic rows allow
+    surplus: Indices  #: displacements, held or not, whose velocities follow from others
+    a: Array  #: (n_v,) accelerations of the tree when let go, nothing held
     forces: Array  #: (n_dof - k,) B^T Q
     tree: Array  #: (n_v,) Q of the tree
     size: float  #: largest entry of Q, scaled, to compare with
+
+    @property
+    def v(self) -> Array:
+        """(n_v,) velocities that the constraints enforce."""
+        return self.x[len(self.x) - len(self.a) :]
 
 
 def weigh(module: Module, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None) -> Balance:
@@ -47,10 +59,10 @@ def weigh(module: Module, t: float, q: Array, held: Array | None = None, preferr
     preferred : (n_dof,) indices, optional
     """
     layout = module.layout
-    scales, n_q, order = layout.scales, layout.n_q, layout.independent if preferred is None else preferred
+    scales, n_q, n_h, order = layout.scales, layout.n_q, layout.n_h, layout.independent
     rest = np.concatenate([q, np.zeros(layout.n_v)])
     J = scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
-    split = partition(J, layout.rank, order)
+    split = partition(J, layout.rank, order if preferred is None else preferred)
     rate = scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
     x = np.concatenate([q, scales.q * split.particular(-rate)])
     a = module.rhs(t, x)[n_q:]
@@ -58,12 +70,22 @@ def weigh(module: Module, t: float, q: Array, held: Array | None = None, preferr
         tree = module.mass_matrix(q, t=t) @ a
     else:  # nothing moves: no mass matters
         tree = -module.bias(t, x)
+    wider = _displacements(J[:n_h], split.independent) if n_h < layout.n_c else split
+    surplus = np.setdiff1d(wider.independent, split.independent)
     if held is not None and len(held):
-        stacked = np.vstack([J, unit_rows(held * scales.q)])
-        split = partition(stacked, rank(stacked).rank, order)
-    B = scales.q[:, None] * split.B / scales.q[split.independent]
+        holding = unit_rows(held * scales.q)
+        stacked = np.vstack([J, holding])
+        split = partition(stacked, rank(stacked).rank, order if preferred is None else preferred)
+        wider = _displacements(np.vstack([J[:n_h], holding]), split.independent) if n_h < layout.n_c else split
+    B, Z = (scales.q[:, None] * one.B / scales.q[one.independent] for one in (split, wider))
     size = float(np.abs(scales.q * tree).max(initial=0.0))
-    return Balance(x, split.independent, B, a[split.independent], B.T @ tree, tree, size)
+    return Balance(x, split.independent, B, wider.independent, Z, surplus, a, B.T @ tree, tree, size)
+
+
+def _displacements(J: Array, velocities: Indices) -> Partition:
+    """The independent displacements of scaled holonomic rows, independent velocities first."""
+    others = np.setdiff1d(np.arange(J.shape[1]), velocities)
+    return partition(J, rank(J).rank, np.concatenate([velocities, others]))
 
 
 def unit_rows(rows: Array) -> Array:
@@ -72,19 +94,19 @@ def unit_rows(rows: Array) -> Array:
 
 
 class Slopes(NamedTuple):
-    """How the accelerations at rest change."""
+    """How the accelerations of the tree at rest change, and the velocities that constraints enforce."""
 
     Z: Array  #: (n_v, n_z) independent displacements
-    by_position: Array  #: (n_dof, n_z) along them
-    by_unknown: Array  #: (n_dof, k) for unit changes of the unknowns
+    by_position: Array  #: (n_v, n_z) accelerations along them
+    rates: Array  #: (n_v, n_z) velocities along them
+    by_unknown: Array  #: (n_v, k) accelerations for unit changes of the unknowns
     motion: Array  #: (n_v, k) displacements that these take along
-    velocities: Indices  #: (n_dof,) rows
 
 
 def slopes(
     module: Module, t: float, x: Array, held: Array, held_by: Array, parameters: Sequence[int], inputs: Sequence[int]
 ) -> Slopes:
-    """Exact derivatives of the accelerations at rest by independent displacements, parameters and inputs.
+    """Exact derivatives of the accelerations and velocities at rest by displacements, parameters and inputs.
 
     Parameters
     ----------
@@ -102,10 +124,9 @@ def slopes(
     n_q, n_h, scales = layout.n_q, layout.n_h, layout.scales
     J = module.jacobian(t, x)
     tangent = find_tangent(module, t, x, J)
-    rows = n_q + tangent.velocities
     P = module.parameter_jacobian(t, x)[:, list(parameters)]
     U = module.input_jacobian(t, x)[:, list(inputs)]
-    by_unknown = np.hstack([P, U])[rows]
+    by_unknown = np.hstack([P, U])[n_q:]
     motion = np.zeros_like(by_unknown, shape=(layout.n_v, by_unknown.shape[1]))
     if len(parameters) and n_h:
         moved = assembly_jacobian(module, t, x)[:n_h, layout.n_x + layout.n_u :][:, list(parameters)]
@@ -114,8 +135,9 @@ def slopes(
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
         step = -np.linalg.lstsq(stacked, wanted, rcond=1e-10)[0]
         motion[:, : len(parameters)] = scales.q[:, None] * step
-        by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[rows]
-    return Slopes(tangent.Z, (J @ tangent.T)[rows, : tangent.Z.shape[1]], by_unknown, motion, tangent.velocities)
+        by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[n_q:]
+    along = tangent.T[:, : tangent.Z.shape[1]]
+    return Slopes(tangent.Z, (J @ along)[n_q:], along[n_q:], by_unknown, motion)
 
 
 def assembly_jacobian(module: Module, t: float, x: Array) -> Array:
@@ -123,8 +145,10 @@ def assembly_jacobian(module: Module, t: float, x: Array) -> Array:
     return module.kernels.state("assembly_jacobian")(x, t=t)
 
 
-def force_slopes(module: Module, t: float, here: Balance, gradients: object, step: float = 1e-5) -> Array:
-    """Change (n_dof - k, n_dof - k) of the forces along the virtual displacements that held coordinates leave.
+def force_slopes(
+    module: Module, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = 1e-5
+) -> tuple[Array, Array]:
+    """Changes of the forces (n_dof - k, n_z) and of the enforced velocities (n_v, n_z) along the columns of Z.
 
     Central differences at closed positions.
 
@@ -138,14 +162,15 @@ def force_slopes(module: Module, t: float, here: Balance, gradients: object, ste
     step : float
         Scaled displacement.
     """
-    assert callable(gradients)
     layout, scales = module.layout, module.layout.scales
-    columns = []
-    for k, column in zip(here.velocities, here.B.T, strict=True):
+    forces, rates = [], []
+    for k, column in zip(here.positions, here.Z.T, strict=True):
         h, sides = step * scales.q[k], []
         for sign in (1.0, -1.0):
             q = scales.move(here.x[: layout.n_q], sign * h * column / scales.q)
             q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[: layout.n_q]
-            sides.append(weigh(module, t, q, gradients(q), here.velocities).forces)
-        columns.append((sides[0] - sides[1]) / (2.0 * h))
-    return np.array(columns).reshape(len(columns), len(columns)).T
+            sides.append(weigh(module, t, q, gradients(q), here.velocities))
+        forces.append((sides[0].forces - sides[1].forces) / (2.0 * h))
+        rates.append((sides[0].v - sides[1].v) / (2.0 * h))
+    width = len(here.positions)
+    return np.array(forces).reshape(width, len(here.velocities)).T, np.array(rates).reshape(width, layout.n_v).T

@@ -12,15 +12,14 @@ from ..runtime.names import unknown
 from .balance import Balance, force_slopes, weigh
 from .linear import linearise
 from .linearisation import Linearisation
+from .newton import DIFFERENCES
 from .rounding import judge
+from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
     from .search import Search
-
-
-DIFFERENCES = 1e-8  #: relative error of slopes taken from central differences
 
 
 class Equilibrium:
@@ -106,20 +105,29 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
         pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=1e-10)[0]
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
-        A = _held_motion(search, module, here, t)
-        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": judge(A, error=DIFFERENCES)}
+        A, second = _held_motion(search, module, here, t)
+        stability = judge(A, error=DIFFERENCES) if second is None else verdict(second, A, error=DIFFERENCES)
+        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": stability}
     return Equilibrium(module, t, here.x, found)
 
 
-def _held_motion(search: Search, module: Module, here: Balance, t: float) -> Array:
-    """A of the motion with the held coordinates held."""
-    n_q = module.n_q
-    M = here.B.T @ module.mass_matrix(here.x[:n_q], t=t) @ here.B
-    K = -force_slopes(module, t, here, lambda q: search.gradients(module, q))
+def _held_motion(search: Search, module: Module, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
+    """A of the motion with the held coordinates held, and its equations of second order where it has such."""
+    n_q, s = module.n_q, module.layout.scales.q
     tree = module.mass_matrix(here.x[:n_q], t=t)
-    C = -here.B.T @ tree @ module.jacobian(t, here.x)[n_q:, n_q:] @ here.B
-    n = len(M)
-    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    M = here.B.T @ tree @ here.B
+    slopes, rates = force_slopes(module, t, here, lambda q: search.gradients(module, q))
+    damping = module.jacobian(t, here.x)[n_q:, n_q:]
+    K, C = -slopes, -here.B.T @ tree @ damping @ here.B
+    A = np.block([
+        [rates[here.positions], here.B[here.positions]],
+        [-np.linalg.solve(M, K), -np.linalg.solve(M, C)],
+    ])  # fmt: skip
+    if len(here.positions) != len(M) or np.any(here.v):
+        return A, None
+    K_error = stiffness_errors(M, A[len(M) :, : len(M)], np.zeros(0), s[here.positions], DIFFERENCES)
+    C_error = DIFFERENCES * np.abs(here.B).T @ np.abs(tree) @ np.abs(damping) @ np.abs(here.B)
+    return A, SecondOrder(M, C, K, C_error, K_error)
 
 
 def read_coordinates(module: Module, q: Array, t: float) -> dict[str, float]:

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ProjectionError, UsageError
-from ..numeric.gram import EXACT, GENTLE, gram_solver, least
-from ..numeric.projection import ACCEPTED, largest
-from ..numeric.rank_limits import STATE as RANK
+from ..limits.constraints import ACCEPTED, EXACT, GENTLE
+from ..limits.constraints import STATE as RANK
+from ..numeric.gram import gram_solver, least
+from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
 

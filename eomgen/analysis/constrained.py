@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..numeric.rank_limits import STATE as RANK
+from ..limits.constraints import STATE as RANK
 from ..numeric.scales import Array, Scales
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import STATE as RANK
 from ..numeric.partitions import partition
-from ..numeric.rank_limits import STATE as RANK
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from .constrained import States, free_motions, prepare, solve_multipliers

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
+from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import States, conditioned_motions, prepare, solve_multipliers
-from .impact_gaps import Gaps, allowance, by_velocity, check_gaps, drift
+from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
 from .tables import as_text
 
@@ -107,7 +108,13 @@ def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]
 
 
 def strike_events(
-    module: Module, t: float, x: Array, events: Sequence[Mapping[str, Any]], fired: Sequence[int], u: Array
+    module: Module,
+    t: float,
+    x: Array,
+    events: Sequence[Mapping[str, Any]],
+    fired: Sequence[int],
+    u: Array,
+    state_dependent: Sequence[int] = (),
 ) -> Array:
     """The state (n_x,) after the impacts of the model's own events, those that happened and any gap that is closed.
 
@@ -121,13 +128,16 @@ def strike_events(
     fired : sequence of int
         Events that happened.
     u : (n_u,) array
+    state_dependent : sequence of int
+        Inputs that depend on the state.
 
     Raises
     ------
     UsageError
-        A gap depends on velocities, or no impulses obey the constraints and the laws of restitution.
+        A gap depends on velocities or on such an input, or no impulses obey the constraints and the laws.
     """
     layout = module.layout
+    module = module.bind(None, u)
     kernel = module.kernels.timed("events")
     values = kernel(t, x, u=u)
     near = TOUCHING * max(1.0, layout.length)
@@ -136,6 +146,14 @@ def strike_events(
         for i, event in enumerate(events)
         if event.get("restitution") is not None and (i in fired or abs(values[i]) <= near)
     }
+    for k in state_dependent:
+        change = kernel(t, x, u=u + np.eye(layout.n_u)[k]) - values
+        for i in gaps:
+            if change[i] != 0.0:
+                raise UsageError(
+                    f"event {events[i]['name']}: the input {layout.u[k]} depends on the state, and so does its rate, "
+                    "which an impact changes; write the gap itself in coordinates"
+                )
     slopes = module.kernels.timed("event_slopes")(t, x, u=u)
     states = _one_state(module, t, x)
     q, v = states.q[:, 0], states.v[:, 0]
@@ -143,7 +161,8 @@ def strike_events(
         if np.abs(slopes[i, layout.n_q :]).max(initial=0.0) > 0.0:
             raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
     rows = np.array([by_velocity(layout, q, slopes[i, : layout.n_q]) for i in gaps])
-    rates = rows @ v + drift(lambda time: kernel(time, x, u=u), t)[[*gaps]]
+    moved = moving_inputs(layout, u)
+    rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
     names = [str(events[i]["name"]) for i in gaps]
     return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +11,12 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
+from ..runtime.signal_rates import derive, drift, moving_inputs
+from ..runtime.tapes import Formula
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
     from ..runtime.signals import Forcing
-
-MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is taken
 
 
 class Gaps:
@@ -100,7 +100,12 @@ class Gaps:
         v = x[self.layout.n_q :]
         rates = rows @ v
         if self.outputs:
-            rates += drift(lambda time: self.values(time, x), t)
+            u, each = self.inputs(t, x), Gaps(self.module, self.names)
+            if u is not None:
+                each.module = self.module.bind(None, u)
+            rates += drift(lambda time: each.values(time, x), t)
+            for i, j in self.outputs if self.layout.n_u else ():
+                rates[i] += self._pushed(t, x, j)
         if self.loops:
             q = np.ascontiguousarray(x[: self.layout.n_q])
             values = self._kernel("loop_coordinates")(
@@ -110,12 +115,37 @@ class Gaps:
                 rates[i] = values[1, j]
         return np.asarray(rates)
 
+    def _pushed(self, t: float, x: Array, output: int) -> float:
+        """What the rates of inputs add to the rate of an output; those of inputs that are held are 0."""
+        layout, n, u = self.layout, self.layout.n_x + self.layout.n_v, self.inputs(t, x)
+        q, v = np.ascontiguousarray(x[: layout.n_q]), np.ascontiguousarray(x[layout.n_q :])
+        slopes = self._kernel("output_derivatives")(q, v, np.zeros_like(v), t=t, u=u)[output, n : n + layout.n_u]
+        rates = moving_inputs(layout, self.module.u if u is None else u)
+        for index in np.flatnonzero(slopes):
+            if self.forcing is not None and index in self.forcing.varying:
+                rates[index] = _rate_of_input(self.forcing, int(index), t, x)
+        return float(slopes @ rates)
 
-def drift(values: Callable[[float], Array], t: float) -> Array:
-    """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
-    h = (t + MOMENT * max(1.0, abs(t))) - t
-    near, far = values(t + h) - values(t - h), values(t + 2.0 * h) - values(t - 2.0 * h)
-    return np.asarray((8.0 * near - far) / (12.0 * h))
+
+def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
+    """The rate of an input that varies, by its place in u.
+
+    Raises
+    ------
+    UsageError
+        It depends on the state.
+    """
+    name, value = forcing.names[index], forcing.formulas.get(index, forcing.varying[index])
+    words = f"input {name} depends on the state, and so does its rate, which an impact changes"
+    if getattr(value, "depends_on_state", False):
+        raise UsageError(words)
+    if isinstance(value, Formula) or hasattr(value, "derivative"):
+        rate = derive(name, f"{name}_dot", value)
+        return float((rate.function(forcing.parameters) if isinstance(rate, Formula) else rate)(t, x))
+    f = forcing.varying[index]
+    if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
+        raise UsageError(words)
+    return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 
 
 def by_velocity(layout: Layout, q: Array, slope: Array) -> Array:

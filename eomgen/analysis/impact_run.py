@@ -56,8 +56,21 @@ def run_with_impacts(
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
+    forcing.begin(start, end)
     run = _Run(bound, found, forcing, inputs, end, most, options)
-    return run.finish(run.travel(start, find_state(bound, initial, start)))
+    return run.finish(run.travel(start, find_state(bound, initial, start, forcing)))
+
+
+def _ending(module: Module) -> list[str]:
+    """The model's events that end a run."""
+    declared = module.layout.metadata.get("events") or []
+    for event in declared:
+        if int(event.get("terminal") or 0) > 1:
+            raise UsageError(
+                f"event {event['name']} ends a run when it has happened {event['terminal']} times, which "
+                "simulate_impacts does not count; give the gaps as events with restitution, and simulate"
+            )
+    return [str(event["name"]) for event in declared if event.get("terminal")]
 
 
 class _Run:
@@ -77,6 +90,7 @@ class _Run:
         self.options, self.restitutions = options, restitutions
         self.gaps = Gaps(module, tuple(restitutions), forcing if forcing else None)
         self.limits = allowance(module.layout, self.gaps.names, TOUCHING)
+        self.ends = _ending(module)
         self.times: list[Array] = []
         self.states: list[Array] = []
         self.samples: list[tuple[float, Trajectory]] = []  # ends, and what has dense output
@@ -153,7 +167,7 @@ class _Run:
         n = len(self.limits)
         watch = Watch(self.gaps, t, x, rates, self.limits)
         piece = self.module.simulate(
-            (t, self.end), x, None, self.inputs, events=watch.events(), dense_output=True, **self.options
+            (t, self.end), x, None, self.inputs, events=[*self.ends, *watch.events()], dense_output=True, **self.options
         )
         fired = np.array([len(times) > 0 for times in [*piece.t_events][-n:]])
         times, states = piece.t, piece.x

@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.names import unknown
-from .rounding import judge
+from .rounding import BALANCED
+from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
@@ -101,8 +102,23 @@ class Linearisation:
 
     @property
     def is_steady(self) -> bool:
-        """Whether no velocity changes, up to 1e-7."""
-        return bool((np.abs(self._scaled_drift[len(self.position_names) :]) <= STILL * self._forces).all())
+        """Whether no velocity changes, up to 1e-7.
+
+        Where forces are stiff, up to what a relative rounding of the state (100 eps) makes of them.
+        """
+        left = np.abs(self._scaled_drift[len(self.position_names) :])
+        return bool((left <= np.maximum(STILL * self._forces, self._rounding)).all())
+
+    @property
+    def _rounding(self) -> Array | float:
+        """Accelerations (n_dof,) that rounding of the state alone can make, scaled."""
+        if self.tangent is None:
+            return 0.0
+        n, layout, tangent = len(self.position_names), self.layout, self.tangent
+        s, places = layout.scales.q, layout.place_scales.q
+        v = np.abs(self.x[layout.n_q :][tangent.velocities])
+        moves = np.abs(self.A[n:, :n]) @ places[tangent.positions] + np.abs(self.A[n:, n:]) @ v
+        return np.asarray(BALANCED * moves / s[tangent.velocities])
 
     @property
     def _forces(self) -> float:
@@ -130,9 +146,40 @@ class Linearisation:
         'no freedom' where drivers and constraints hold everything.
 
         'marginal' where rounding alone could move one of them to the imaginary axis, and none is beyond it: the linear
-        equations do not decide.
+        equations do not decide.  Where the stiffness is symmetric and nothing drives the motion, the sign of the
+        stiffness decides.
         """
-        return judge(self.A, self.own)
+        if self.mass is None or self.tangent is None or self.own is None:
+            return verdict(None, self.A, self.own)
+        return verdict(self._second(), self.A, self.own)
+
+    @property
+    def stiffness_error(self) -> Array:
+        """Bounds (n_dof, n_z) for what rounding does to the stiffness."""
+        assert self.mass is not None
+        assert self.own is not None
+        assert self.tangent is not None
+        n = len(self.position_names)
+        own = np.zeros(0) if n != len(self.mass) else self.own
+        return stiffness_errors(self.mass, self.A[n:, :n], own, self.layout.place_scales.q[self.tangent.positions])
+
+    def _second(self) -> SecondOrder | None:
+        """The equations of second order, where z' = w and nothing accelerates."""
+        assert self.mass is not None
+        assert self.damping is not None
+        assert self.stiffness is not None
+        n, M, A = len(self.position_names), self.mass, self.A
+        if n != len(M) or not n or not self.is_equilibrium:
+            return None
+        assert self.tangent is not None
+        s = self.layout.scales.q[self.tangent.positions]
+        kinematic = np.hstack([A[:n, :n], A[:n, n:] - np.eye(n)]) * np.concatenate([s, s]) / s[:, None]
+        if (np.abs(kinematic) > BALANCED).any():
+            return None
+        left = np.abs(M @ self.drift[n:])  # what is not in balance turns with the axes
+        C_error = MARGIN * np.abs(M) @ np.abs(A[n:, n:])
+        K_error = self.stiffness_error + np.maximum(left, left[:, None])
+        return SecondOrder(M, self.damping, self.stiffness, C_error, K_error)
 
     def second_order(self, *names: str) -> tuple[Array, Array, Array]:
         """M, C, K of ``M z'' + C z' + K z = 0``, square.

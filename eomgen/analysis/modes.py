@@ -15,13 +15,11 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .linearisation import Linearisation
-from .rounding import ROUNDING, graded_modes
+from .stability import SYMMETRIC, symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-SYMMETRIC = 1e-9  #: relative difference up to which K counts as symmetric
 
 
 class Damped(NamedTuple):
@@ -62,24 +60,13 @@ class Modes:
         self.linear, self.name = linear, linear.name
         self.names, self.v_names = linear.velocity_names, linear.layout.v
         self.squares, self.shapes = _undamped(linear.mass, stiffness(linear))
-        still = np.abs(self.squares) <= self._uncertainty()
+        turned = np.abs(linear.A[: len(linear.position_names), len(linear.position_names) :])
+        still = np.abs(self.squares) <= uncertainty(self.squares, self.shapes, linear.stiffness_error @ turned)
         self._still = still
         self.rigid, self.diverging = int(still.sum()), int((self.squares[~still] < 0.0).sum())
         self.frequencies = np.sqrt(np.where(still, 0.0, np.maximum(self.squares, 0.0)))
         self.hertz = self.frequencies / (2.0 * np.pi)
         self.motions = linear.tangent.B @ self.shapes
-
-    def _uncertainty(self) -> Array:
-        """What rounding can do to each square: to the slopes of forces, to the forces behind them, to the shapes."""
-        linear, eps = self.linear, float(np.finfo(float).eps)
-        assert linear.mass is not None
-        n_z = len(linear.position_names)
-        size = np.abs(linear.mass) @ np.abs(linear.A[n_z:, :n_z]) @ np.abs(linear.A[:n_z, n_z:])
-        if linear.own is not None:
-            size = size + np.diag(linear.mass.diagonal() * linear.own)
-        shapes = np.abs(self.shapes) + eps * np.abs(self.shapes).sum(axis=1, keepdims=True)
-        bound = 5.0 * ROUNDING * np.einsum("ik,ij,jk->k", shapes, size, shapes)
-        return np.asarray(np.maximum(bound, ROUNDING * eps * np.abs(self.squares).max(initial=0.0)))
 
     @cached_property
     def damped(self) -> list[Damped]:
@@ -133,9 +120,8 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     inverse = np.linalg.inv(factor)
     reduced = inverse @ K @ inverse.T
     if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):
-        vectors = np.linalg.eigh(0.5 * (reduced + reduced.T))[1]
-        squares, vectors = graded_modes(M, K, inverse.T @ vectors)
-        vectors = factor.T @ vectors
+        squares, shapes = symmetric_modes(M, K)
+        vectors = factor.T @ shapes
     else:
         values, complexes = np.linalg.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):

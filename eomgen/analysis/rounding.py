@@ -17,9 +17,9 @@ from ..numeric.scales import Array, Indices
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-ROUNDING = 10.0 * float(
-    np.finfo(float).eps
-)  #: relative error of the entries of a matrix that is exact but for rounding
+EPS = float(np.finfo(float).eps)
+ROUNDING = 10.0 * EPS  #: relative error of the entries of a matrix that is exact but for rounding
+BALANCED = 100.0 * EPS  #: what rounding leaves of a balance, relative to what a unit displacement does to it
 ROUNDS = 30  #: of balancing, at most
 WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
 SWEEPS = 12  #: of Jacobi's method, at most
@@ -42,7 +42,8 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
     """
     if not A.size:
         return "no freedom"
-    balanced = _balance(A, own)
+    scale = _balance(A, own)
+    balanced = A * scale / scale[:, None]
     values = np.linalg.eigvals(balanced)
     far = error * float(np.linalg.norm(balanced, 2))
     zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
@@ -60,7 +61,7 @@ def _reaches_axis(A: Array, value: complex, far: float) -> bool:
 
 
 def _balance(A: Array, own: Array | None) -> Array:
-    """A similar matrix whose rows and columns are of like size; forces of the model keep rows from being blown up."""
+    """Units of the states that make rows and columns alike; forces of the model keep rows from being blown up."""
     sizes = np.abs(A)
     if own is not None and len(own) and len(A) >= 2 * len(own):
         n = len(own)
@@ -81,7 +82,7 @@ def _balance(A: Array, own: Array | None) -> Array:
                 worst = max(worst, f, 1.0 / f)
         if worst <= 2.0:
             break
-    return np.asarray(A * d / d[:, None])
+    return d
 
 
 def own_accelerations(module: Module, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
@@ -116,12 +117,11 @@ def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
     S = shapes / np.sqrt(np.einsum("ik,ij,jk->k", shapes, M, shapes))
     T = S.T @ K @ S
     T = 0.5 * (T + T.T)
-    eps = float(np.finfo(float).eps)
     for _ in range(SWEEPS):
         turned = False
         for i in range(len(T)):
             for j in range(i):
-                if abs(T[i, j]) <= eps * np.sqrt(abs(T[i, i] * T[j, j])) + 1e-300:
+                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + 1e-300:
                     continue
                 angle = 0.5 * np.arctan2(2.0 * T[i, j], T[i, i] - T[j, j])
                 if T[i, i] < T[j, j]:  # the smaller of both turns
@@ -132,7 +132,7 @@ def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
                 T[[i, j]] = turn.T @ T[[i, j]]
                 S[:, [i, j]] = S[:, [i, j]] @ turn
                 T[i, j] = T[j, i] = 0.0
-                turned = turned or abs(s) > eps
+                turned = turned or abs(s) > EPS
         if not turned:
             break
     order = np.argsort(T.diagonal())

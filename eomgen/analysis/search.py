@@ -2,37 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, EquilibriumError, EvaluationError, UsageError
-from ..numeric.scales import Array
+from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
+from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
-from .balance import assembly_jacobian, force_slopes, slopes, weigh
+from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
+from .creeping import creep
+from .newton import DIFFERENCES, RANK, Linear, marquardt, newton
 from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-STEPS = 200  #: steps at most
-LONGEST = 0.5  #: largest scaled step of a coordinate
-REST = 1e-10  #: scaled residual that counts as balance, relative to the largest force met
-STIFFEST = 1e12  #: largest damping of a step
-SMALL = 1e-12  #: scaled step at which Newton's iteration has arrived
+REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
+MOVING = 1e-9  #: scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it
 
 
-class _Point(NamedTuple):
+class Point(NamedTuple):
     """One iterate."""
 
     q: Array
     unknowns: Array
     module: Module
-    residual: Array  #: (m,) accelerations, or forces where coordinates are held by supports; scaled
-    size: float
+    here: Balance
 
 
 class Held(NamedTuple):
@@ -45,7 +43,7 @@ class Held(NamedTuple):
 
 
 class Search:
-    """Newton's iteration with Levenberg's damping for one model, time and set of held coordinates."""
+    """The equations of balance for one model, time and set of held coordinates, and the ways to solve them."""
 
     def __init__(self, module: Module, t: float, held: Mapping[str, float], unknowns: Sequence[str]) -> None:
         layout = module.layout
@@ -89,46 +87,64 @@ class Search:
         rows = [held.gradient for held in self.held_rows(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
 
-    def at(self, q: Array, values: Array, closed: bool = False) -> _Point:
+    def at(self, q: Array, values: Array, preferred: Indices | None = None) -> Point:
         """The iterate near q on the constraints."""
         module = self.bound(values)
-        if not closed:
-            initial = Initial(module.kernels, self.t)
-            if self.layout.n_h:
-                q = initial.close(q, self.held, restarts=0).q
-            elif self.held:
-                q = initial.with_values(q, self.held)
-        scales = self.layout.scales
-        here = weigh(module, self.t, q, self.gradients(module, q) if self.supported else None)
-        s = scales.q[here.velocities]
-        if self.supported:
-            return _Point(q, values, module, s * here.forces / max(here.size, 1e-300), here.size)
-        return _Point(q, values, module, here.a / s, here.size)
+        initial = Initial(module.kernels, self.t)
+        if self.layout.n_h:
+            q = initial.close(q, self.held, restarts=0).q
+        elif self.held:
+            q = initial.with_values(q, self.held)
+        held = self.gradients(module, q) if self.supported else None
+        return Point(q, values, module, weigh(module, self.t, q, held, preferred))
 
-    def jacobian(self, point: _Point) -> tuple[Array, Array, Array]:
-        """Residual's derivative by scaled variables, and what these move: displacements (n_v, k), unknowns (j, k)."""
-        module, t, scales = point.module, self.t, self.layout.scales
-        held = self.gradients(module, point.q)
-        here = weigh(module, t, point.q, held if self.supported else None)
+    def residual(self, here: Balance, like: Balance) -> Array:
+        """What must vanish, at the independent velocities and surplus displacements of another place."""
+        s = self.layout.scales.q
+        forces = s[here.velocities] * here.forces if self.supported else (here.a / s)[like.velocities]
+        return np.concatenate([forces, (here.v / s)[like.surplus]])
+
+    def linearise(self, point: Point) -> Linear:
+        """The equations near an iterate, by displacements of length 1 that are at right angles (scaled)."""
+        here, s = point.here, self.layout.scales.q
         if self.supported:
-            s = scales.q[here.velocities]
-            K = force_slopes(module, t, here, lambda q: self.gradients(module, q))
-            return s[:, None] * K * s / max(here.size, 1e-300), here.B * s, np.zeros((0, len(s)))
-        held_by = self._held_by_parameters(module, here.x)
-        found = slopes(module, t, here.x, held, held_by, self.parameters, self.inputs)
-        Z, by_position = found.Z, found.by_position
+            K, rates = force_slopes(point.module, self.t, here, lambda q: self.gradients(point.module, q))
+            basis, inverse = _orthonormal(here.Z / s[:, None])
+            J = np.vstack([s[here.velocities, None] * K, (rates / s[:, None])[here.surplus]]) @ inverse
+            sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.bias(self.t, here.x))
+            sizes = np.concatenate([sizes, np.zeros(len(here.surplus))])
+            flow: Array | None = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
+            return Linear(J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow)
+        held = self.gradients(point.module, point.q)
+        held_by = self._held_by_parameters(point.module, here.x)
+        found = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
+        basis, inverse = _orthonormal(found.Z / s[:, None])
         if len(held):  # only displacements that leave the held coordinates alone
-            split = np.linalg.svd(held @ Z)
+            split = np.linalg.svd(held * s @ basis)
             free = split[2][len(held) :].T
-            Z, by_position = Z @ free, by_position @ free
-        units = np.linalg.norm(Z / scales.q[:, None], axis=0)
-        units = 1.0 / np.maximum(units, 1e-300)
+            basis, inverse = basis @ free, inverse @ free
         weights = np.maximum(np.abs(point.unknowns), 1e-3 * np.maximum(1.0, np.abs(point.unknowns).max(initial=0.0)))
-        rows = scales.q[found.velocities, None]
-        J = np.hstack([by_position * units, found.by_unknown * weights]) / rows
-        moved = np.hstack([Z * units, found.motion * weights])
-        changed = np.hstack([np.zeros((len(weights), Z.shape[1])), np.diag(weights)])
-        return J, moved, changed
+        unknown_rates = np.zeros((len(s), len(weights)))
+        J = np.vstack([
+            (np.hstack([found.by_position @ inverse, found.by_unknown * weights]) / s[:, None])[here.velocities],
+            (np.hstack([found.rates @ inverse, unknown_rates]) / s[:, None])[here.surplus],
+        ])  # fmt: skip
+        moved = np.hstack([basis, found.motion * weights / s[:, None]])
+        changed = np.hstack([np.zeros((len(weights), basis.shape[1])), np.diag(weights)])
+        flow = (found.by_position + found.rates) @ inverse / s[:, None]
+        return Linear(J, moved, changed, self._sizes(point, J), RANK, flow)
+
+    def _sizes(self, point: Point, J: Array) -> Array:
+        """Sizes of the terms in each row: a unit displacement, and the forces of the model, each without the others."""
+        here, n = point.here, len(point.here.velocities)
+        if not n:
+            return np.asarray(np.abs(J).sum(axis=1))
+        mass = self.mass(point)
+        spread = np.abs(np.linalg.inv(mass)) @ np.abs(mass)
+        s = self.layout.scales.q[here.velocities]
+        own = own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
+        rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
+        return np.concatenate([rows + own, np.abs(J[n:]).sum(axis=1)])
 
     def _held_by_parameters(self, module: Module, x: Array) -> Array:
         """Derivatives (k, n_p) of the held coordinates by the parameters, scaled; only cut joints have some."""
@@ -142,111 +158,96 @@ class Search:
                     rows[k] = every[layout.loops.index(row.name)] / row.scale
         return rows
 
-    def run(self, q: Array) -> tuple[_Point, int]:
-        """From a position: Newton's iteration; where it stalls, downhill along the forces first."""
-        start = self.at(q, self.initial_unknowns())
-        point, steps, found = self._newton(start)
-        if found:
-            return point, steps
-        if not self.names:
-            lower, more = self._descend(start)
-            lowest, again, found = self._newton(lower)
-            if found:
-                return lowest, steps + more + again
-        raise self._failure(point)
+    def drive(self, here: Balance) -> Array:
+        """What pulls at the scaled displacements of the tree: accelerations and enforced velocities, or forces."""
+        s = self.layout.scales.q
+        return np.asarray(s * here.tree if self.supported else (here.a + here.v) / s)
 
-    def _newton(self, point: _Point) -> tuple[_Point, int, bool]:
-        """The last iterate, the number of steps, and whether it is balanced."""
-        residual, damping = float(np.abs(point.residual).max(initial=0.0)), 0.0
-        own = self._own(point)
-        for step in range(STEPS):
-            size = float(np.linalg.norm(point.residual))
-            J, moved, changed = self.jacobian(point)
-            first = max(residual, min(1.0, max(own, float(np.abs(J).max(initial=0.0)))))
-            newton = np.linalg.lstsq(J, -point.residual, rcond=1e-12)[0] if J.size else np.zeros(J.shape[1])
-            left = float(np.linalg.norm(point.residual + J @ newton))
-            arrived = float(np.abs(newton).max(initial=0.0)) <= SMALL and left <= 1e-6 * first
-            if size == 0.0 or arrived:
-                return point, step, True
-            there = None
-            while damping <= STIFFEST:
-                change = newton if damping <= 0.0 else _damped(J, point.residual, damping)
-                longest = float(np.abs(moved @ change / self.layout.scales.q).max(initial=0.0))
-                change = change * min(1.0, LONGEST / longest) if longest > LONGEST else change
-                there = self._try(point, moved @ change, changed @ change)
-                if there is not None and np.linalg.norm(there.residual) < size:
-                    break
-                there = None
-                if size <= REST * first:  # rounding: nothing nearer exists
-                    return point, step, True
-                damping = 1e-6 if damping <= 0.0 else 10.0 * damping
-            if there is None:
-                return point, step, False
-            point, damping = there, 0.0 if damping <= 1e-5 else 0.1 * damping
-        return point, STEPS, False
-
-    def _own(self, point: _Point) -> float:
-        """Size of the accelerations that the model's forces make without each other, or of their share, scaled."""
+    def metric(self, point: Point, basis: Array) -> Array:
+        """The metric in which the drive is the gradient of a potential, if there is one."""
         if self.supported:
-            return 1.0
-        here = weigh(point.module, self.t, point.q)
-        mass = self._mass(point, here.B)
-        return float(own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass).max(initial=0.0))
+            return np.eye(basis.shape[1])
+        s = self.layout.scales.q
+        return np.asarray(basis.T @ (s[:, None] * point.module.mass_matrix(point.q, t=self.t) * s) @ basis)
 
-    def _descend(self, point: _Point) -> tuple[_Point, int]:
-        """Along the accelerations at rest in steps of equal length, shorter at each turn, until they no longer lead on.
-
-        This goes down the potential where there is one, and ends near a minimum of it.
-        """
-        length, before = 0.1, None
-        for step in range(STEPS):
-            here = weigh(
-                point.module, self.t, point.q, self.gradients(point.module, point.q) if self.supported else None
-            )
-            displacement = here.B @ np.linalg.solve(self._mass(point, here.B), here.forces)
-            scaled = displacement / self.layout.scales.q
-            size = float(np.linalg.norm(scaled))
-            if size == 0.0 or length < 1e-4:
-                return point, step
-            direction = scaled / size
-            if before is not None and direction @ before < 0.0:
-                length *= 0.5
-            before = direction
-            there = self._try(point, length * direction * self.layout.scales.q, np.zeros(0))
-            if there is None:
-                length *= 0.5
-            else:
-                point = there
-        return point, STEPS
-
-    def _mass(self, point: _Point, B: Array) -> Array:
+    def mass(self, point: Point) -> Array:
+        """Mass matrix of the independent velocities."""
+        B = point.here.B
         return np.asarray(B.T @ point.module.mass_matrix(point.q, t=self.t) @ B)
 
-    def _try(self, point: _Point, displacement: Array, change: Array) -> _Point | None:
-        try:
-            q = self.layout.scales.move(point.q, displacement / self.layout.scales.q)
-            return self.at(q, point.unknowns + change)
-        except (AssemblyError, EvaluationError, UsageError):
-            return None
+    def rounded(self, point: Point) -> float:
+        """Scaled size of the numbers that the position is made of, at least 1."""
+        s, q = self.layout.scales, self.layout.space
+        sizes = np.abs(point.q) / s.q if q is None else np.abs(point.q[q.plain_q]) / s.q[q.plain_v]
+        return max(1.0, float(sizes.max(initial=0.0)))
 
-    def _failure(self, point: _Point) -> EquilibriumError:
-        held = self.gradients(point.module, point.q) if self.supported else None
-        here = weigh(point.module, self.t, point.q, held)
-        names = [self.layout.freedoms[k] for k in here.velocities]
+    def step(self, point: Point, displacement: Array, change: Array) -> Point | None:
+        """The iterate a scaled displacement (n_v,) and a change of the unknowns away; None where there is none."""
+        try:
+            q = self.layout.scales.move(point.q, displacement)
+            there = self.at(q, point.unknowns + change, point.here.velocities)
+        except (AssemblyError, EvaluationError, PartitionError, UsageError):
+            return None
+        finite = np.isfinite(there.here.a).all() and np.isfinite(there.here.tree).all()
+        return there if finite else None
+
+    def run(self, q: Array) -> tuple[Point, int]:
+        """From a position: each way in turn until one leads to balance.
+
+        Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
+        leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
+        Marquardt find.
+
+        Raises
+        ------
+        EquilibriumError
+        """
+        start = self.at(q, self.initial_unknowns())
+        first, steps, found = newton(self, start, reach=REACH)
+        if found:
+            return first, steps
+        ways: list[Callable[[], tuple[Point, int, bool]]] = [
+            lambda: newton(self, start),
+            lambda: newton(self, start, plain=True),
+            lambda: marquardt(self, start),
+        ]
+        if not self.names:
+            ways.insert(0, lambda: creep(self, start))
+        for way in ways:
+            point, more, found = way()
+            steps += more
+            if not found:
+                point, more, found = newton(self, point)
+                steps += more
+            if found:
+                return point, steps
+        raise self._failure(first)
+
+    def _failure(self, point: Point) -> EquilibriumError:
+        here, layout = point.here, self.layout
+        names = [layout.freedoms[k] for k in here.velocities]
         left = dict(zip(names, here.forces.tolist(), strict=True))
-        scaled = np.abs(here.forces * self.layout.scales.q[here.velocities])
+        where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
+        head = f"no equilibrium of {layout.name!r} found from this guess: "
+        rates = np.abs(here.v / layout.scales.q)[here.surplus]
+        if rates.size and rates.max() > MOVING:
+            worst = int(here.surplus[rates.argmax()])
+            return EquilibriumError(
+                f"{head}nonholonomic constraints move {layout.freedoms[worst]} at a rate of {here.v[worst]:.6g} even "
+                f"where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
+                "side vanish somewhere",
+                left,
+            )
+        scaled = np.abs(here.forces * layout.scales.q[here.velocities])
         worst = int(scaled.argmax())
-        where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(self.layout.q, point.q, strict=True))
         return EquilibriumError(
-            f"no equilibrium of {self.layout.name!r} found from this guess: the generalized force along "
-            f"{names[worst]} is still {here.forces[worst]:.6g} at {where}; give another guess, or hold a coordinate "
-            "that nothing balances",
+            f"{head}the generalized force along {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
+            "another guess, or hold a coordinate that nothing balances",
             left,
         )
 
 
-def _damped(J: Array, residual: Array, damping: float) -> Array:
-    """Levenberg's step."""
-    H = J.T @ J
-    H.flat[:: len(H) + 1] += damping * max(float(H.diagonal().max(initial=0.0)), 1e-300)
-    return np.asarray(np.linalg.solve(H, -J.T @ residual))
+def _orthonormal(Z: Array) -> tuple[Array, Array]:
+    """Z R^-1 with columns of length 1 at right angles, and R^-1."""
+    basis, R = np.linalg.qr(Z)
+    return basis, np.linalg.inv(R)

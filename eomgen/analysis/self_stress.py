@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..numeric.rank_limits import BALANCE as RANK
+from ..limits.constraints import BALANCE as RANK
 from ..numeric.scales import Array
 from .constrained import States
 from .reactions import GROUND, SEEN, Geometry, along_free, free_of, shift, transmitted

@@ -7,113 +7,30 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
-from ..numeric.scales import Array
+from ..numeric.scales import Array, Indices
 from ..runtime.analyses import require_projection, require_velocities
-from ..runtime.integrate import choose_solver, integrate
+from ..runtime.events import Events, warn_of_unknown
+from ..runtime.input_slopes import Slopes
+from ..runtime.integrate import Solution, choose_solver, integrate
 from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
 from ..runtime.simulate import DEFAULTS, find_span, ordered_times
-from ..runtime.storage import table_path
-from .linear import output_derivatives
-from .start import Columns, held_names, keep_consistent, split_columns, start_sensitivity
+from .saltation import Saltation
+from .sensitivity_result import Sensitivities
+from .start import held_names, keep_consistent, split_columns, start_sensitivity
+from .variations import Variational
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
     from ..runtime.trajectory import Trajectory
-
-
-class Sensitivities:
-    """A trajectory and its derivatives: ``s["theta", "k"]`` is d theta / d k over time, (n_t,).
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-    t : (n_t,) array
-    names : tuple of str
-        What is differentiated by: parameters, inputs (a constant added to them), initial values.
-    dx : (n_x, k, n_t) array
-        Derivatives of the states, along the constraints.
-    dy : (n_y, k, n_t) array
-        Derivatives of the outputs.
-    held : tuple of str
-        Coordinates and rates that keep their initial values when something else changes.
-    """
-
-    def __init__(
-        self, trajectory: Trajectory, names: tuple[str, ...], dx: Array, dy: Array, held: Sequence[str]
-    ) -> None:
-        self.trajectory, self.t, self.names = trajectory, trajectory.t, names
-        self.dx, self.dy, self.held = dx, dy, tuple(held)
-        self._rows: dict[str, Array] = dict(zip(trajectory.metadata["y_names"], dy, strict=True))
-        self._rows |= dict(zip(trajectory.x_names, dx, strict=True))
-
-    def __getitem__(self, key: tuple[str, str]) -> Array:
-        if not (isinstance(key, tuple) and len(key) == 2):
-            raise UsageError(f"ask for sensitivities[state or output, parameter], not {key!r}")
-        what, name = key
-        if what not in self._rows:
-            raise unknown("state or output", what, self._rows)
-        if name not in self.names:
-            raise unknown("parameter that was differentiated by", name, self.names)
-        return np.asarray(self._rows[what][self.names.index(name)])
-
-    def save(self, path: str | Path) -> Path:
-        """Write all derivatives: t, names, x_names, y_names, dx and dy to ``.npz`` (added if there is no ending), or
-        columns ``d(theta)/d(k)`` to ``.csv``.
-
-        Returns
-        -------
-        Path
-            The file written.
-        """
-        target = table_path(path, "sensitivities are")
-        if target.suffix == ".npz":
-            x_names, y_names = self.trajectory.x_names, self.trajectory.metadata["y_names"]
-            np.savez(target, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)
-            return target
-        columns = {f"d({row})/d({name})": self[row, name] for row in self._rows for name in self.names}
-        table = np.column_stack([self.t, *columns.values()])
-        np.savetxt(target, table, delimiter=",", header=",".join(["t", *columns]), comments="", fmt="%.17g")
-        return target
-
-    def __repr__(self) -> str:
-        return f"<Sensitivities of {self.trajectory.name} to {', '.join(self.names)}: {len(self.t)} points>"
-
-
-class _Coupled:
-    """x' = f and S' = J S + df/dp as one system, columns of S in units of what they are taken by."""
-
-    def __init__(self, module: Module, forcing: Forcing, columns: Columns, weights: Array) -> None:
-        self.module, self.forcing, self.columns, self.weights = module, forcing, columns, weights
-        kernels = module.kernels
-        self.rhs, self.tangent = kernels.timed("rhs", nan=True), kernels.timed("jacobian", nan=True)
-        self.by_p, self.by_u = kernels.timed("parameter_jacobian", nan=True), kernels.timed("input_jacobian", nan=True)
-
-    def slopes(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
-        """x' and S', S without weights."""
-        columns, u = self.columns, self.forcing(t, x)
-        J = self.tangent(t, x, u=u)
-        extra = self.forcing.jacobian(t, x, self.module.rhs)
-        S_dot = (J if extra is None else J + extra) @ S
-        empty = np.zeros((len(x), 0))
-        P = self.by_p(t, x, u=u) if columns.parameters else empty
-        U = self.by_u(t, x, u=u) if columns.inputs else empty
-        return self.rhs(t, x, u=u), S_dot + columns.spread(P, U)
-
-    def __call__(self, t: float, z: Array) -> Array:
-        """z' of z = [x; S * weights]."""
-        n = self.module.n_x
-        x_dot, S_dot = self.slopes(t, z[:n], z[n:].reshape(n, -1) / self.weights)
-        return np.concatenate([x_dot, (S_dot * self.weights).ravel()])
 
 
 def differentiate_run(
@@ -129,6 +46,7 @@ def differentiate_run(
     rtol: float = 1e-9,
     atol: float = 1e-11,
     t_eval: ArrayLike | None = None,
+    events: Any = None,
     **options: Any,
 ) -> Sensitivities:
     """See :meth:`~..runtime.analyses.Analyses.sensitivities`."""
@@ -150,21 +68,27 @@ def differentiate_run(
         x0 = bound.project(x0, t=start)
     held = held_names(bound, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
-    S0 = start_sensitivity(bound.bind(u=forcing(start, x0)), start, x0, held, columns)
-    weights = _weights(bound, columns)
-    run = _Coupled(bound, forcing, columns, weights)
+    run = Variational(bound, forcing, columns)
+    watched = Events(layout, events)
+    options = {"rtol": rtol, "atol": atol, **options}
+    alone = None
+    if watched:
+        alone = bound.simulate((start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
+    S0 = start_sensitivity(bound.bind(u=forcing(start, x0)), start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
     times = None if t_eval is None else ordered_times(t_eval, start, stop)
-    z0 = np.concatenate([x0, (S0 * weights).ravel()])
-    settings = {"rtol": rtol, "atol": atol, **options}
-    nodes = [start, *forcing.corners(start, stop), stop]
+    z0 = run.joined(x0, S0)
+    corners = forcing.corners(start, stop)
+    salts = Saltation(run, watched, (start, stop), (rtol, atol), corners)
     fail, title = bound.kernels.fail, solver.__name__
     longest = float(options.get("max_step", np.inf))
     pace = Pace(start, stop, z0, layout.n_q, longest, lambda t, z: fail.trouble(z[: layout.n_x], t) is not None)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
-            solution = integrate(run, nodes, z0, solver, times, [], False, settings, pace)
+            solution = integrate(
+                run, [start, *corners, stop], z0, solver, times, salts.watched, False, options, pace, salts.reset
+            )
     except Crawling as crawl:
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())
         raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
@@ -172,36 +96,59 @@ def differentiate_run(
         failure = run.rhs.failure or run.tangent.failure
         cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)
         raise SimulationError(f"{title} stopped: {solution.message} {cause or ''}".strip()) from cause
+    warn_of_unknown([event.name for event in salts.watched if not event.known])
+    if solution.status == 1:
+        _note_end(salts, solution)
     n, k = layout.n_x, len(columns.names)
-    raw = solution.x[n:].reshape(n, k, -1) / weights[:, None]
-    trajectory = record(bound, forcing, solution._replace(x=solution.x[:n]), title, settings)
+    kept = _distinct(solution)
+    t_events, x_events = [np.empty(0)] * len(watched), [np.empty((n, 0))] * len(watched)
+    for (i, _), event_times, found in zip(salts.listed, solution.t_events, solution.x_events, strict=True):
+        t_events[i], x_events[i] = event_times, found[:n]
+    states = solution._replace(t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events)
+    raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
+    trajectory = record(bound, forcing, states, title, options, watched.names)
+    if alone is not None:
+        _require_same(trajectory, alone)
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
-        x, here = trajectory.x[:, j], bound.bind(u=forcing(float(time), trajectory.x[:, j]))
-        dx[..., j] = keep_consistent(here, float(time), x, raw[..., j], columns)
+        t, x = float(time), trajectory.x[:, j]
+        here = bound.bind(u=forcing(t, x))
+        dx[..., j] = keep_consistent(here, t, x, raw[..., j], columns, _inputs(run, t, x))
         if layout.n_y:
-            dy[..., j] = _outputs(here, run, float(time), x, dx[..., j])
-    return Sensitivities(trajectory, columns.names, dx, dy, held)
+            dy[..., j] = run.outputs(t, x, dx[..., j])
+    return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
 
 
-def _outputs(module: Module, run: _Coupled, t: float, x: Array, S: Array) -> Array:
-    """Derivatives (n_y, k) of the outputs."""
-    layout = module.layout
-    n_q, n_x, n_v, n_u = layout.n_q, layout.n_x, layout.n_v, layout.n_u
-    x_dot, S_dot = run.slopes(t, x, S)
-    Y = output_derivatives(module, t, x, x_dot[n_q:])
-    own = run.columns.spread(Y[:, n_x + n_v + n_u :], Y[:, n_x + n_v : n_x + n_v + n_u])
-    return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + own)
+def _require_same(found: Trajectory, alone: Trajectory) -> None:
+    """Refuse a run that passes over events which the run by itself finds.
+
+    Raises
+    ------
+    SimulationError
+    """
+    for name, ours, theirs in zip(found.t_events.names, found.t_events, alone.t_events, strict=True):
+        if len(ours) != len(theirs):
+            raise SimulationError(
+                f"event {name} is found {len(theirs)} times by simulate and {len(ours)} times together with the "
+                "derivatives: it comes and goes within one step of the solver; give max_step"
+            )
 
 
-def _weights(module: Module, columns: Columns) -> Array:
-    """Sizes of what is differentiated by, so that one tolerance fits all columns."""
-    weights = np.ones(len(columns.names))
-    for column, index in columns.parameters:
-        weights[column] = abs(module.p[index]) or 1.0
-    for column, index in columns.inputs:
-        weights[column] = abs(module.u[index]) or 1.0
-    return weights
+def _inputs(run: Variational, t: float, x: Array) -> Slopes | None:
+    return run.inputs(t, x) if run.forcing else None
+
+
+def _note_end(salts: Saltation, solution: Solution) -> None:
+    """Note the event that ended the run, the last one that can."""
+    ending = [k for k, event in enumerate(salts.watched) if event.terminal and len(solution.t_events[k])]
+    last = max(ending, key=lambda k: abs(float(solution.t_events[k][-1] - solution.ends[0])))
+    salts.stop(float(solution.t_events[last][-1]), solution.x_events[last][:, -1], last)
+
+
+def _distinct(solution: Solution) -> Indices:
+    """Points other than those that repeat the one before, as where an event changes nothing."""
+    same = (np.diff(solution.t) == 0.0) & (np.diff(solution.x, axis=1) == 0.0).all(axis=0)
+    return np.flatnonzero(np.concatenate([[True], ~same]))
 
 
 def _checked(module: Module, hold: Sequence[str]) -> list[str]:

@@ -18,6 +18,7 @@ from ..runtime.initial import Initial
 from .balance import assembly_jacobian
 
 if TYPE_CHECKING:
+    from ..runtime.input_slopes import Slopes
     from ..runtime.layout import Layout
     from ..runtime.module import Module
 
@@ -93,8 +94,20 @@ def held_names(module: Module, t: float, x: Array, given: Mapping[str, float] | 
     return found
 
 
-def start_sensitivity(module: Module, t: float, x: Array, held: Sequence[str], columns: Columns) -> Array:
-    """dx0 (n_x, k) of an assembled state.
+def assembly_rows(module: Module, t: float, x: Array, inputs: Slopes | None) -> Array:
+    """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
+    layout, E = module.layout, assembly_jacobian(module, t, x)
+    if inputs is not None:
+        by_u = E[:, layout.n_x : layout.n_x + layout.n_u]
+        by_x, by_p = E[:, : layout.n_x], E[:, layout.n_x + layout.n_u :]
+        E = np.hstack([by_x + by_u @ inputs.by_x, by_u, by_p + by_u @ inputs.by_p])
+    return E
+
+
+def start_sensitivity(
+    module: Module, t: float, x: Array, held: Sequence[str], columns: Columns, inputs: Slopes | None = None
+) -> Array:
+    """dx0 (n_x, k) of an assembled state, with the derivatives of the inputs there.
 
     Raises
     ------
@@ -104,7 +117,7 @@ def start_sensitivity(module: Module, t: float, x: Array, held: Sequence[str], c
     layout, scales = module.layout, module.layout.scales
     n_q, n_v, n_x, n_h, n_c = layout.n_q, layout.n_v, layout.n_x, layout.n_h, layout.n_c
     count = len(columns.names)
-    E = assembly_jacobian(module, t, x)
+    E = assembly_rows(module, t, x, inputs)
     other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
     initial = Initial(module.kernels, t)
     wanted = {name: np.zeros(count) for name in held}
@@ -161,13 +174,23 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     return np.asarray(found)
 
 
-def keep_consistent(module: Module, t: float, x: Array, S: Array, columns: Columns) -> Array:
-    """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them."""
+def keep_consistent(
+    module: Module,
+    t: float,
+    x: Array,
+    S: Array,
+    columns: Columns,
+    inputs: Slopes | None = None,
+) -> Array:
+    """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them.
+
+    ``inputs`` are the derivatives of the inputs there.
+    """
     layout, scales = module.layout, module.layout.scales
     n_q, n_x, n_h, n_c = layout.n_q, layout.n_x, layout.n_h, layout.n_c
     if not n_c:
         return S
-    E = assembly_jacobian(module, t, x)
+    E = assembly_rows(module, t, x, inputs)
     other = columns.spread(E[:, n_x + layout.n_u :], E[:, n_x : n_x + layout.n_u])
     N = scales.rates(x[:n_q], np.eye(layout.n_v))
     dq, dv = S[:n_q], S[n_q:]

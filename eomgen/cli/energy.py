@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -32,16 +31,14 @@ class EnergyBalance(NamedTuple):
     power_balance: float | None  #: max |E - E(0) - work so far| / max T
 
 
-def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping[str, float]) -> EnergyBalance | None:
+def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalance | None:
     """Hold the energy of a run against the work done on it.
 
     Parameters
     ----------
     equations : Equations
     trajectory : Trajectory
-        With dense output; inputs constant.
-    inputs : mapping of str to float
-        Their values during the run.
+        With dense output.
 
     Returns
     -------
@@ -52,7 +49,7 @@ def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping
         return None
     T, _, energy = trajectory.energies
     largest = float(np.abs(T).max())
-    work = _work(equations.kinematics, trajectory, inputs)
+    work = _work(equations.kinematics, trajectory)
     balance = None
     if work is not None and largest:
         balance = float(np.abs(energy - energy[0] - work).max()) / largest
@@ -65,13 +62,14 @@ def balance_energy(equations: Equations, trajectory: Trajectory, inputs: Mapping
     )
 
 
-def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, float]) -> NDArray[np.float64] | None:
+def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64] | None:
     """Work done up to each time (n_t,), by Gauss's quadrature of the power over each step; None if not known."""
     if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
         return None  # constraints that move do work of their own
-    values = {**trajectory.metadata["parameters"], **inputs}
-    graph = kinematics.graph
-    power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in inputs.items()})[0]
+    values = dict(trajectory.metadata["parameters"])
+    graph, names = kinematics.graph, kinematics.input_names
+    held = {u: float(trajectory[u][0]) for u in names if not np.ptp(trajectory[u])}
+    power = substitute([_power(kinematics)], {graph.symbol(u): graph.constant(value) for u, value in held.items()})[0]
     if power.is_zero:
         return np.zeros(len(trajectory.t))
     if _without_twin(power):
@@ -80,7 +78,7 @@ def _work(kinematics: Kinematics, trajectory: Trajectory, inputs: Mapping[str, f
     start, step = trajectory.t[:-1, None], np.diff(trajectory.t)[:, None]
     times = (start + step * (nodes + 1.0) / 2.0).ravel()
     between = trajectory.at(times)
-    values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True))}
+    values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True)), **{u: between[u] for u in names}}
     watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
     return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
 

@@ -154,13 +154,34 @@ _ROBOT = (
         help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
     ),
     click.option("--symbolic", is_flag=True, help="Robots: masses and inertias become parameters."),
+    click.option(
+        "--check-inertia",
+        type=click.Choice(["error", "note", "off"]),
+        help="Masses and inertias that no body can have, and motions without inertia: refuse, note, or take them.",
+    ),
+    click.option(
+        "--limits",
+        type=click.Choice(["note", "off"]),
+        help="Robots: note which limits of joints are data only, or not.",
+    ),
     click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
 )
 
 
 def robot_options(verb: Callable[..., Any]) -> Callable[..., Any]:
     """Options of robot files, handed to the verb as one mapping ``robot``."""
-    keys = ("floating", "lock", "mimic", "rotation", "actuate", "friction", "symbolic", "assets")
+    keys = (
+        "floating",
+        "lock",
+        "mimic",
+        "rotation",
+        "actuate",
+        "friction",
+        "symbolic",
+        "check_inertia",
+        "limits",
+        "assets",
+    )
 
     @functools.wraps(verb)
     def wrapped(*args: Any, **kwargs: Any) -> Any:

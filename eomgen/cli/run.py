@@ -115,9 +115,8 @@ def run(
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     from .energy import balance_energy, uncounted_functions
 
-    values = dict(zip(module.u_names, module.u.tolist(), strict=True)) | inputs
     with after_integration():
-        energy = balance_energy(equations, trajectory, values)
+        energy = balance_energy(equations, trajectory)
         files = _write(equations, trajectory, out, plot)
         result = to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files}
     if as_json:
@@ -203,7 +202,7 @@ def _energy_rows(energy: EnergyBalance | None, uncounted: Sequence[str]) -> list
     if energy is None:
         return [("energy", "not known: the equations have no kinetic_energy")]
     change = f"{energy.initial:.9g} J to {energy.final:.9g} J"
-    if energy.work:
+    if energy.work is not None and energy.power_balance not in (None, energy.drift):
         return [
             ("energy", f"{change}; work of forces and inputs {energy.work:.9g} J"),
             ("power balance", f"{energy.power_balance:.1e} of the largest kinetic energy"),

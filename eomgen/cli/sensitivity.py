@@ -33,16 +33,24 @@ def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Pat
         found.save(out)
     rows = dict.fromkeys((*module.x_names, *module.y_names))
     final = {row: {name: finite(found[row, name][-1]) for name in found.names} for row in rows}
+    events = [
+        {"event": e.name, "t": e.t, "by": {name: finite(x) for name, x in zip(found.names, e.dt, strict=True)}}
+        for e in found.events
+    ]
     if as_json:
         end_time = float(found.t[-1])
         print_json(
             work.heading(end_time) | {"names": found.names, "held": found.held, "steps": len(found.t) - 1} |
-            {"final": final, "files": [] if out is None else [str(out)]}
+            {"final": final, "events": events, "files": [] if out is None else [str(out)]}
         )  # fmt: skip
         return
     print_heading(f"derivatives at t = {found.t[-1]:g} s, by")
     lines = [[row, *("-" if x is None else f"{x:.6g}" for x in values.values())] for row, values in final.items()]
     print_table(["", *found.names], lines, right=range(1, len(found.names) + 1))
+    if events:
+        print_heading("times of events, by")
+        shown = [[f"{e.name}, t = {e.t:.6g} s", *(f"{x:.6g}" for x in e.dt)] for e in found.events]
+        print_table(["", *found.names], shown, right=range(1, len(found.names) + 1))
     click.echo(f"held at the start: {', '.join(found.held)}")
     if out is not None:
         click.echo(f"wrote {out}")

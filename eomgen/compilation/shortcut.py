@@ -25,7 +25,7 @@ from .options import Options
 from .processor import lane_width
 
 #: What sources, layer and flags follow from, apart from the program and the templates: of eomgen.
-WRITERS = ("graph", "program", "emit", "compilation", "numeric", "layer.py")
+WRITERS = ("graph", "program", "emit", "compilation", "limits", "numeric", "layer.py")
 
 
 class Shortcut:

@@ -27,6 +27,7 @@ from .description import GROUND_NAME, Description, Entry, Faults, items
 from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
+from .input_rates import add_rates
 from .joint_data import check_display
 from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
@@ -86,6 +87,7 @@ def build(description: Description) -> Mechanism:
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
     events = build_events(reader, sections["events"])
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
     initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
     guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
     independent = _independent(reader, values.get("independent", ()))
@@ -95,7 +97,7 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    check_bodies(bodies, numbers, faults)
+    inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
@@ -124,6 +126,8 @@ def build(description: Description) -> Mechanism:
         constraints=constraints,
         lines=dict(description.lines),
         doc=doc,
+        check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        notes=inertia_notes,
     )
 
 
@@ -186,7 +190,7 @@ def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
         for marker in check_names(_marker_entries(reader, entry), "marker", faults):
             label = f"{entry.name}.{marker.name}"
             reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
-    check = reader.flag("check_inertia", reader.description.values.get("check_inertia", True))
+    check = reader.check_word("check_inertia", reader.description.values.get("check_inertia", True))
     return tuple(read_body(reader, entry, check) for entry in usable)
 
 

@@ -44,10 +44,10 @@ def _equation(e: Element) -> Equation | None:
     rates = {n for n in used if names.kinds.get(n) == "velocity"} | {n for n, q in places.items() if q.level == 1}
     for name in sorted(used):
         kind = names.kinds.get(name)
-        if kind in ("input", "acceleration") or (name in places and places[name].level == 2):
+        if kind == "acceleration" or (name in places and places[name].level == 2):
             what = kind or "acceleration"
             e.faults.add(
-                path, f"the {what} {name!r} cannot stand here", "a constraint knows t, coordinates, velocities"
+                path, f"the {what} {name!r} cannot stand here", "a constraint knows t, inputs, coordinates, velocities"
             )
         if name in (f"{energy}()" for energy in ENERGIES):
             e.faults.add(path, f"the energy {name!r} cannot stand here", "a constraint is an equation of the motion")

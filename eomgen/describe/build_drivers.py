@@ -54,15 +54,12 @@ def _on_two_bodies(e: Element, key: str, a: Marker, b: Marker) -> bool:
 
 
 def _value(e: Element) -> Expr:
-    """The motion: an expression of t, parameters and functions that are smooth enough."""
+    """The motion: an expression of t, parameters, inputs and functions that are smooth enough."""
     value, path, names = e.law("value"), f"{e.path}.value", e.reader.names
     for name in sorted(symbols_of([value])):
         kind = names.kinds.get(name)
-        if kind == "input":
-            remedy = "an input has no known rate; give an expression or a table of t, or a parameter"
-            e.faults.add(path, f"the input {name!r} cannot stand here", remedy)
-        elif kind not in (None, "time", "parameter"):
-            remedy = "a driver moves by t and parameters; a coupling relates coordinates"
+        if kind not in (None, "time", "parameter", "input"):
+            remedy = "a driver moves by t, parameters and inputs; a coupling relates coordinates"
             e.faults.add(path, f"the {kind} {name!r} cannot stand here", remedy)
     graph = e.reader.graph
     called = {graph.nodes[i][0] for i in reachable(graph, [value.id])} & graph.calls.keys()

@@ -8,11 +8,14 @@ from ..errors import ExpressionError, ModelError, Problem
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
+from ..graph.rounding import with_bounds
 from ..graph.substitute import substitute, symbols_of
+from ..limits.constraints import GIVEN as SMALL
+from ..limits.rounding import ROUNDED
+from .input_names import rate_of
 from .sympy_face import lower_sympy, name_of
 from .sympy_forms import Forms
 
-SMALL = 1e-9  #: part of a row's length that others may leave of it while it still counts as dependent
 TRIES = 5
 
 
@@ -48,7 +51,8 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     except ExpressionError:  # the check of the model tells what is wrong
         return list(range(len(forms.motion))), False
     along = {names[name_of(x)]: rate for x, rate in zip(forms.q, slopes, strict=True)}
-    rows = [*jvp(configuration, along | {graph.symbol("t"): graph.one}), *motion]
+    along |= {graph.symbol(f): graph.symbol(rate_of(f)) for f in functions} | {graph.symbol("t"): graph.one}
+    rows = [*jvp(configuration, along), *motion]
     v = [names[name_of(x)] for x in forms.v]
     entries = jacobian(rows, v)
     constant = substitute(rows, dict.fromkeys(v, graph.zero))
@@ -56,9 +60,9 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     random = np.random.default_rng(0)
     for _ in range(TRIES):  # a place may lie outside the domain of a root
         values = {name: float(random.uniform(0.3, 1.2)) for name in sorted(used)}
-        matrix = np.zeros((len(rows), len(v)))
-        for place, value in zip(entries, evaluate(list(entries.values()), values), strict=True):
-            matrix[place] = value
+        matrix, rounding = np.zeros((len(rows), len(v))), np.zeros((len(rows), len(v)))
+        for place, value, bound in zip(entries, *with_bounds(list(entries.values()), values), strict=True):
+            matrix[place], rounding[place] = value, ROUNDED * bound
         right = np.array(evaluate(constant, values), dtype=float)
         if np.isfinite(matrix).all() and np.isfinite(right).all():
             break
@@ -66,12 +70,12 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
         return list(range(len(motion))), False
     basis = np.empty((0, len(v)))
     fresh: list[bool] = []
-    for row in matrix:
+    for row, noise in zip(matrix, rounding, strict=True):
         length = np.linalg.norm(row)
         left = row - basis.T @ (basis @ row)
         left -= basis.T @ (basis @ left)
         size = np.linalg.norm(left)
-        fresh.append(bool(size > SMALL * length))
+        fresh.append(bool(size > SMALL * length and size > np.linalg.norm(noise)))
         if fresh[-1]:
             basis = np.vstack([basis, left / size])
     h = len(configuration)

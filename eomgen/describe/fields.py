@@ -40,6 +40,7 @@ KINDS = {
     "axis": "x, y, z, -x, -y, -z or three numbers",
     "choice": "one of the listed words",
     "flag": "true or false",
+    "check": "true or false, error, note or off",
     "joints": "a list of two joints, or coordinates of joints",
     "two": "a list of two numbers or expressions",
     "factors": "a mapping of coordinates to numbers or expressions",
@@ -168,7 +169,7 @@ BODY: Fields = {
     "axes": Field("vector", "roll, pitch, yaw (rad) of the axes of inertia or principal in the body"),
     "solids": Field("solids", "solids of uniform density, from which mass, com and inertia follow", default=()),
     "points": Field("points", "point masses, added to the rest", default=()),
-    "check_inertia": Field("flag", "whether mass and inertia must be those of a possible body (the model's own)"),
+    "check_inertia": Field("check", "what becomes of a mass and inertia that no body can have (the model's own)"),
     "display": Field("display", "shapes to draw, in body axes; data only", default=()),
 }
 POINT: Fields = {
@@ -269,7 +270,7 @@ MODEL: Fields = {
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
     "simulation": Field("table", "defaults of a simulation"),
-    "check_inertia": Field("flag", "whether bodies must have a possible mass and inertia", default=True),
+    "check_inertia": Field("check", "what becomes of masses and inertias that no body can have", default=True),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.

@@ -96,7 +96,7 @@ CONSTRAINT: dict[str, Fields] = {
         "marker": Field("marker", "a marker of which one coordinate is driven"),
         "axis": Field("axis", "along which the marker's place counts, in the axes of on", default="x"),
         "on": Field("marker", "from where the marker's place counts", default="ground"),
-        "value": Field("expression", "motion over time: t, parameters, functions", required=True, level=MOTION),
+        "value": Field("expression", "motion over time: t, parameters, inputs, functions", required=True, level=MOTION),
     },
 }
 #: Types of which exactly one of these keys must be given.

@@ -27,8 +27,8 @@ OWN = ("mass", "com", "first_moment", "inertia", "principal")
 POINTS = ("com", "origin")  #: words for the point an inertia is about
 
 
-def read_body(reader: Reader, entry: Entry, check: bool) -> Body:
-    """One body; ``check`` says whether its inertia is judged unless the body says otherwise."""
+def read_body(reader: Reader, entry: Entry, check: str) -> Body:
+    """One body; ``check`` says what becomes of an impossible inertia unless the body says otherwise."""
     path, values = entry.path, {k: v for k, v in entry.values.items() if v is not None}
     graph, faults = reader.graph, reader.faults
     for pair in EXCLUSIVE:
@@ -38,7 +38,7 @@ def read_body(reader: Reader, entry: Entry, check: bool) -> Body:
         if key in values and not ("inertia" in values or "principal" in values):
             faults.add(f"{path}.{key}", "there is no inertia that it belongs to", "give inertia or principal too")
     if "check_inertia" in values:
-        check = reader.flag(f"{path}.check_inertia", values["check_inertia"])
+        check = reader.check_word(f"{path}.check_inertia", values["check_inertia"])
     parts = read_parts(reader, path, values)
     own = [key for key in OWN if key in values]
     if "solids" in values and own:
@@ -49,12 +49,12 @@ def read_body(reader: Reader, entry: Entry, check: bool) -> Body:
     if "solids" in values or not own:
         o = vec.zero(graph)
         whole = combine(graph, parts) if parts else MassProperties(graph.zero, o, (o, o, o))
-        return Body(entry.name, whole.mass, whole.com, whole.inertia, checked=check)
+        return Body(entry.name, whole.mass, whole.com, whole.inertia, check=check)
     return _own(reader, entry.name, path, values, parts, check)
 
 
 def _own(
-    reader: Reader, name: str, path: str, values: Mapping[str, Any], points: list[MassProperties], check: bool
+    reader: Reader, name: str, path: str, values: Mapping[str, Any], points: list[MassProperties], check: str
 ) -> Body:
     """A body with a mass, a centre of mass and an inertia of its own, and points."""
     graph = reader.graph
@@ -89,7 +89,7 @@ def _own(
         moment = None if moment is None else vec.add(moment, vec.scale(p.mass, p.com))
         at_origin = None if at_origin is None else add_tensors(at_origin, shift_tensor(p.mass, p.com))
     whole = combine(graph, [MassProperties(mass, com, tensor), *points])
-    return Body(name, whole.mass, whole.com, whole.inertia, moment, at_origin, checked=check, plane=axis)
+    return Body(name, whole.mass, whole.com, whole.inertia, moment, at_origin, check=check, plane=axis)
 
 
 def _tensor(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[Mat3, Mat3]:

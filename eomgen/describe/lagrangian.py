@@ -8,8 +8,9 @@ from typing import Any
 from ..errors import ModelError, Problem
 from .description import Description, items
 from .expressions import names_in
+from .input_names import split_rate
 from .scope import RATES
-from .sympy_face import free_names, function_names, is_sympy, name_of
+from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of
 
 
 def describe_lagrangian(
@@ -76,17 +77,26 @@ def describe_lagrangian(
     values = {name_of(symbol): value for symbol, value in (parameters or {}).items()}
     driven = {name_of(symbol): value for symbol, value in (inputs or {}).items()}
     known = {q + rate for q in names for rate in RATES} | set(driven)
+    stems = {split_rate(source)[0] for source in driven}
+    others = [name for name in _symbols(given, rates=True) if name not in {*known, *values}]
+    rates = [name for name in others if split_rate(name)[0] in stems]
+    known |= set(rates)
     for parameter in [*values, *(p for p in _symbols(given) if p not in values)]:
         if parameter not in known:
             value = values.get(parameter)
             description.add("parameters", parameter, {} if value is None else {"value": value})
     for source, value in driven.items():
         description.add("inputs", source, {} if value is None else {"value": value})
+    for rate in rates:
+        description.add("inputs", rate, {})
     return description
 
 
-def _symbols(given: Mapping[str, Any]) -> list[str]:
-    """Plain symbols of everything given; functions of time are coordinates or faults, never parameters."""
+def _symbols(given: Mapping[str, Any], rates: bool = False) -> list[str]:
+    """Plain symbols of everything given; functions of time are coordinates or faults, never parameters.
+
+    With ``rates`` also derivatives of functions of time.
+    """
     parts: list[Any] = [given["expression"], given.get("dissipation")]
     forces = given.get("forces", ())
     parts += list(forces.values()) if isinstance(forces, Mapping) else items(forces) or []
@@ -96,4 +106,6 @@ def _symbols(given: Mapping[str, Any]) -> list[str]:
     parts = [part for part in parts if is_sympy(part)]
     if parts:
         found |= set(free_names(parts)) - set(function_names(parts))
+    if rates:
+        found |= set(derivative_names(parts))
     return sorted(found - {"t"})

@@ -60,8 +60,13 @@ class Body:
     inertia: Mat3
     moment: Vec3 | None = None
     inertia_origin: Mat3 | None = None
-    checked: bool = True  #: whether mass and inertia must be those of a possible body
+    check: str = "error"  #: what becomes of a mass and inertia that no body can have: error, note or off
     plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
+
+    @property
+    def checked(self) -> bool:
+        """Whether mass and inertia must be those of a possible body."""
+        return self.check == "error"
 
 
 @dataclass(frozen=True)
@@ -208,6 +213,8 @@ class Mechanism:
     constraints: tuple[Constraint, ...] = ()
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
+    check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
 
     @property
     def bare(self) -> bool:

@@ -42,8 +42,9 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         Acceleration of gravity in ground axes (m/s^2).
     doc : str, optional
         One sentence about the model.
-    check_inertia : bool, optional
-        False lets bodies have masses and inertias that no rigid body can have.
+    check_inertia : {'error', 'note', 'off'} or bool, optional
+        What becomes of masses and inertias that no rigid body can have, and of motions without inertia: by default
+        (``error``, True) they are refused; ``note`` takes them and says so in :attr:`notes`, ``off`` (False) is silent.
 
     Examples
     --------
@@ -57,7 +58,9 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
     ('theta',)
     """
 
-    def __init__(self, name: str, gravity: Vector = (0, 0, 0), doc: str = "", *, check_inertia: bool = True) -> None:
+    def __init__(
+        self, name: str, gravity: Vector = (0, 0, 0), doc: str = "", *, check_inertia: bool | str = True
+    ) -> None:
         values: dict[str, Any] = {"name": name, "gravity": gravity}
         if doc:
             values["doc"] = doc
@@ -291,7 +294,7 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What an import left out or changed, one sentence each."""
+        """What an import left out or changed, and what was only to be noted, one sentence each."""
         return tuple(self._description.notes)
 
     @property

@@ -29,7 +29,7 @@ class BodyMethods:
         axes: Sequence[Any] | None = None,
         solids: Sequence[Mapping[str, Any]] | None = None,
         points: Sequence[Mapping[str, Any]] | None = None,
-        check_inertia: bool | None = None,
+        check_inertia: bool | str | None = None,
         display: Sequence[Mapping[str, Any]] | None = None,
     ) -> BodyHandle:
         """Add a rigid body.
@@ -61,8 +61,9 @@ class BodyMethods:
             box, cylinder, tube, sphere, rod, cone, ellipsoid and mesh (an STL file); ``"subtract": True`` makes a hole.
         points : sequence of mappings, optional
             Point masses to add: ``{"mass": m, "at": (x, y, z)}``.
-        check_inertia : bool, optional
-            False takes a mass and inertia that no rigid body can have; the model's own setting unless given.
+        check_inertia : {'error', 'note', 'off'} or bool, optional
+            Whether a mass and inertia that no rigid body can have is refused, noted (``note``) or taken in silence
+            (``off``, False); the model's own setting unless given.
         display : sequence of mappings, optional
             Shapes to draw, as in the model file: ``shape``, its sizes, ``at``, ``rpy``; data only.
 
@@ -87,10 +88,11 @@ class BodyMethods:
         return BodyHandle(self, name, self._description.add("bodies", name, values))  # type: ignore[arg-type]
 
     @property
-    def check_inertia(self) -> bool:
-        """Whether bodies must have a mass and inertia that a rigid body can have."""
-        return bool(self._description.values.get("check_inertia", True))
+    def check_inertia(self) -> bool | str:
+        """What becomes of a mass and inertia that no rigid body can have: error (True), note or off (False)."""
+        given: bool | str = self._description.values.get("check_inertia", True)
+        return given
 
     @check_inertia.setter
-    def check_inertia(self, check: bool) -> None:
+    def check_inertia(self, check: bool | str) -> None:
         self._description.values["check_inertia"] = check

@@ -62,7 +62,7 @@ _C_KEYWORDS = frozenset(
 )
 #: Packages that an exported package imports, or the like, and its own parts.
 _NEEDED = frozenset(("numpy", "scipy", "pandas", "matplotlib", "sympy", "cython", "setuptools", "eomgen"))
-_NEEDED |= {"errors", "numeric", "runtime"}
+_NEEDED |= {"errors", "limits", "numeric", "runtime"}
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 

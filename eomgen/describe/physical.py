@@ -6,35 +6,64 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..frames import GROUND
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
-from ..numeric.inertia import SWITCH, fault_of_inertia
+from ..limits.inertia import COMPUTED
+from ..numeric.inertia import SWITCH, fault_of_inertia, inertia_scales
 from .description import Faults
-from .mechanism import Body
+from .mechanism import Body, JointSpec
 
 
-def check_bodies(bodies: Sequence[Body], values: Mapping[str, float], faults: Faults) -> None:
-    """Note masses and inertias that no body can have, as far as the declared values of parameters tell."""
-    for body in bodies:
+def check_bodies(
+    bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float], faults: Faults
+) -> tuple[str, ...]:
+    """Note masses and inertias that no body can have, as far as the declared values of parameters tell.
+
+    Returns
+    -------
+    tuple of str
+        The same of bodies where they are taken with a note.
+    """
+    notes: list[str] = []
+    masses = [_numbers([body.mass], values) for body in bodies]
+    tensors = [_numbers([entry for row in body.inertia for entry in row], values) for body in bodies]
+    scales = inertia_scales(
+        [0.0 if mass is None else mass[0] for mass in masses],
+        [np.reshape(tensor or np.zeros(9), (3, 3)) for tensor in tensors],
+        _longest(bodies, joints, values),
+    )
+    for body, mass, tensor, scale in zip(bodies, masses, tensors, scales, strict=True):
         path = f"bodies.{body.name}"
-        if not body.checked:
+        if body.check == "off":
             continue
-        mass = _numbers([body.mass], values)
+        found: list[tuple[str, str, str]] = []
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"
-            faults.add(f"{path}.mass", f"is {mass[0]:g}{how}", f"a mass is 0 or positive; {SWITCH}")
-        entries = [entry for row in body.inertia for entry in row]
-        tensor = _numbers(entries, values)
-        if faults.under(f"{path}.inertia"):
-            continue
-        if not is_symmetric(body.inertia, tensor):
-            faults.add(f"{path}.inertia", *ASYMMETRIC)
-        elif tensor is not None:
-            fault = fault_of_inertia(tensor, None if body.plane is None else _numbers(body.plane, values))
-            if fault:
-                faults.add(f"{path}.inertia", *fault)
+            found.append((f"{path}.mass", f"is {mass[0]:g}{how}", f"a mass is 0 or positive; {SWITCH}"))
+        if not faults.under(f"{path}.inertia"):
+            if not is_symmetric(body.inertia, tensor, COMPUTED * scale):
+                found.append((f"{path}.inertia", *ASYMMETRIC))
+            elif tensor is not None:
+                plane = None if body.plane is None else _numbers(body.plane, values)
+                if fault := fault_of_inertia(tensor, plane, scale):
+                    found.append((f"{path}.inertia", *fault))
+        for place, message, remedy in found:
+            if body.check == "error":
+                faults.add(place, message, remedy)
+            else:
+                notes.append(f"{place}: {message}; taken as it is")
+    return tuple(notes)
+
+
+def _longest(bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float]) -> float:
+    """The longest distance of a centre of mass or of a joint from a body's origin (m), of those that are known."""
+    points = [body.com for body in bodies]
+    points += [m.frame.position for spec in joints for m in (spec.predecessor, spec.successor) if m.body != GROUND]
+    known = [_numbers(point, values) for point in points]
+    return max((float(np.linalg.norm(point)) for point in known if point is not None), default=0.0)
 
 
 def _numbers(expressions: Sequence[Expr], values: Mapping[str, float]) -> list[float] | None:
@@ -47,14 +76,18 @@ def _numbers(expressions: Sequence[Expr], values: Mapping[str, float]) -> list[f
 ASYMMETRIC = ("the tensor is not symmetric", "entries [i][j] and [j][i] must be equal")
 
 
-def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None) -> bool:
-    """Whether a tensor equals its mirror image: at its values if they are known, else wherever one looks."""
+def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed: float = 0.0) -> bool:
+    """Whether a tensor equals its mirror image: at its values if they are known, else wherever one looks.
+
+    ``computed`` is what rounding may leave of its entries (kg m^2).
+    """
     pairs = [(inertia[i][j], inertia[j][i]) for i, j in ((0, 1), (0, 2), (1, 2))]
     if all(a == b for a, b in pairs):
         return True
     if tensor is not None:
         full = np.reshape(tensor, (3, 3))
-        return bool(np.allclose(full, full.T, rtol=1e-9, atol=1e-12 * float(np.max(np.abs(full), initial=0.0))))
+        atol = max(1e-12 * float(np.max(np.abs(full), initial=0.0)), computed)
+        return bool(np.allclose(full, full.T, rtol=1e-9, atol=atol))
     # written differently above and below the diagonal: equal if they agree wherever one looks
     flat = [x for pair in pairs for x in pair]
     names = sorted(symbols_of(flat))

@@ -18,6 +18,7 @@ from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
+from ..numeric.inertia import word_of_check
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
@@ -127,6 +128,13 @@ class Reader:
             return value
         self.wrong(path, value, "flag")
         return True
+
+    def check_word(self, path: str, value: Any) -> str:
+        """What becomes of an impossible inertia: error, note or off; true and false mean error and off."""
+        word = word_of_check(value)
+        if word is None:
+            self.wrong(path, value, "check")
+        return word or "error"
 
     def choice(self, path: str, value: Any, field: Field) -> str:
         """One of the words of a field; the default when it is another."""

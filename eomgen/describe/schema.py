@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..joints import JOINTS
+from ..numeric.inertia import CHECKS
 from .fields import (
     AXES,
     BODY,
@@ -104,6 +105,7 @@ _KINDS: dict[str, Schema] = {
     "markers": _ref("markers"),
     "marker": _ref("marker"),
     "flag": {"type": "boolean"},
+    "check": {"enum": [True, False, *CHECKS]},
     "times": {"anyOf": [{"type": "boolean"}, {"type": "integer", "minimum": 1}]},
     "sign": {"enum": [1, -1, 0]},
     "file": {"type": "string"},

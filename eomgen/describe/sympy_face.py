@@ -114,3 +114,14 @@ def function_names(expressions: list[Any]) -> list[str]:
         if is_sympy(expression):
             found |= {name for f in expression.atoms(AppliedUndef) if (name := function_name(f))}
     return sorted(found)
+
+
+def derivative_names(expressions: list[Any]) -> list[str]:
+    """Names of all derivatives of functions of time in SymPy expressions, sorted."""
+    import sympy
+
+    found: set[str] = set()
+    for expression in expressions:
+        if is_sympy(expression):
+            found |= {name for f in expression.atoms(sympy.Derivative) if (name := function_name(f))}
+    return sorted(found)

@@ -31,6 +31,8 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     from sympy.core.function import AppliedUndef
     from sympy.printing.str import StrPrinter
 
+    from ..graph.sympy_lower import shortened
+
     class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
         """SymPy's text with the names of functions that a model file uses."""
 
@@ -48,7 +50,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 
         def _print_Heaviside(self, e: Any) -> str:
             if 2 * e.args[1] != 1:
-                raise UsageError(f"{e} cannot be written as a text: heaviside is 1/2 at 0")
+                raise UsageError(f"{shortened(e)} cannot be written as a text: heaviside is 1/2 at 0")
             return f"heaviside({self._print(e.args[0])})"
 
         def _print_Exp1(self, e: Any) -> str:
@@ -69,7 +71,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
         def _print_Piecewise(self, e: Any) -> str:
             *pieces, last = e.args
             if last.cond != True:  # noqa: E712 - SymPy's own true
-                raise UsageError(f"{e} leaves cases without a value; end the Piecewise with (expression, True)")
+                raise UsageError(
+                    f"{shortened(e)} leaves cases without a value; end the Piecewise with (expression, True)"
+                )
             text = self._print(last.expr)
             for piece in reversed(pieces):
                 text = f"where({self._print(piece.cond)}, {self._print(piece.expr)}, {text})"
@@ -96,7 +100,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             wanted = dict(e.variable_count)
             orders = [wanted.get(x, 0) for x in e.expr.args]
             if sum(orders) != sum(wanted.values()) or any(set(wanted) & x.free_symbols - {x} for x in e.expr.args):
-                raise UsageError(f"{e} cannot be written as a text: write its chain rule out")
+                raise UsageError(f"{shortened(e)} cannot be written as a text: write its chain rule out")
             call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
             return f"diff({', '.join([call, *map(str, orders)])})"
 
@@ -118,5 +122,5 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     try:
         parse(text, graph, resolve, locate)
     except ExpressionError as error:
-        raise UsageError(f"{expression} cannot be written as a text: {error}") from None
+        raise UsageError(f"{shortened(expression)} cannot be written as a text: {shortened(error)}") from None
     return text

@@ -14,6 +14,7 @@ from .description import SECTIONS, Description, items
 from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
 from .write_equations import with_intermediates
+from .write_markers import with_named_markers
 from .yaml_nodes import scalar
 
 Names = frozenset[Any]  # of declared functions
@@ -27,7 +28,7 @@ def yaml_text(description: Description) -> str:
     Parameters
     ----------
     description : Description
-        SymPy expressions in it are written as text.
+        SymPy expressions in it are written as text; unnamed markers whose motion they use get names.
 
     Returns
     -------
@@ -39,6 +40,7 @@ def yaml_text(description: Description) -> str:
     UsageError
         An expression or value has no form in a model file.
     """
+    description = with_named_markers(description)
     lines = [f"# {' '.join(note.split())}" for note in description.notes]
     functions = frozenset(entry.name for entry in description.sections["functions"])
     for key in MODEL:
@@ -92,7 +94,9 @@ def _value(value: Any, functions: Names) -> str:
             return _value(listed, functions)
         if is_sympy(value):
             return _sympy(value, functions)
-        raise UsageError(f"{value!r} cannot be written to a model file")
+        from ..graph.sympy_lower import shortened
+
+        raise UsageError(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):
         return _sympy(value, functions)
     if isinstance(value, str):

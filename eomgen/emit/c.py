@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
 from ..program.loops import LARGE
 from ..program.series import NoSeriesError
@@ -81,6 +82,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     results = {k.name: k.result for k in KERNELS}
     numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
     others = [i for i in range(sizes.n_v) if i not in program.preferred]
+    drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
     roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]
     return {
         "name": program.name,
@@ -97,7 +99,8 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "rank": sizes.n_v - sizes.n_dof,
         "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
         "blocks": printed if program.hoisted else printed[1:],
-        "drivers": [read_template(f"c/drivers/{file}.c") for file in driver_files(program)],
+        "drivers": drivers,
+        "limits": definitions("".join(drivers)),
         "areas": areas,
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -127,7 +128,7 @@ def run_block(
     watch : callable, optional
         Told now and then how many runs have ended.
     """
-    x0, failed, words = assemble_states(module, cases, plan.span[0])
+    x0, failed, words = assemble_states(module, cases, plan.span[0], partial(forcing_of, module, cases, plan))
     told = dict(zip(np.flatnonzero(failed).tolist(), words, strict=True))
     core: Any = eager(module.core)
     run = _run_compiled if plan.method in getattr(core, "methods", ()) and hasattr(core, "ensemble") else _run_python
@@ -137,7 +138,7 @@ def run_block(
     found = run(module, x0[:, good].T if some else x0.T, rows, plan, threads, watch)
     block = _spread(found, good, cases.count, plan.span[0]) if some else found
     block.status[failed] = UNASSEMBLED
-    project(module, cases, block, plan.t_eval)
+    project(module, cases, block, plan)
     return Block(**{**vars(block), "words": {**block.words, **told}})
 
 
@@ -148,6 +149,7 @@ def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
 def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
     core: Any = eager(module.core)
     forcing = find_forcing(module, plan)
+    forcing.attach(module)
     nodes = [plan.span[0], *forcing.corners(*plan.span, every_jump=True), plan.span[1]]
     settings = stepper_options(module.n_x, abs(plan.span[1] - plan.span[0]), plan.options)
     ensemble = core.ensemble(
@@ -163,6 +165,14 @@ def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Pl
 def find_forcing(module: Module, plan: Plan) -> Forcing:
     """The inputs of all runs; those that are constant count as 0 here."""
     return Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
+
+
+def forcing_of(module: Module, cases: Cases, plan: Plan, k: int) -> Forcing:
+    """The inputs of run k."""
+    forcing = find_forcing(module, plan)
+    forcing.attach(module.bind(**cases.column(k)))
+    forcing.begin(*plan.span)
+    return forcing
 
 
 def inputs_at(module: Module, cases: Cases, plan: Plan, t: Array, x: Array) -> Array:
@@ -288,21 +298,22 @@ def _spread(found: Block, good: Integers, count: int, start: float) -> Block:
     return Block(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
 
 
-def project(module: Module, cases: Cases, block: Block, t_eval: Array | None) -> None:
+def project(module: Module, cases: Cases, block: Block, plan: Plan) -> None:
     """Bring the stored states onto the constraints, as ``simulate`` does; a state that cannot be becomes NaN."""
     if not module.n_rows and not module.layout.space:
         return
-    _project_columns(module, cases, block, block.x[:, None, :], block.t[None])
-    if block.samples is not None and t_eval is not None:
-        times = np.repeat(t_eval[:, None], cases.count, axis=1)
-        _project_columns(module, cases, block, block.samples, times)
+    _project_columns(module, cases, block, plan, block.x[:, None, :], block.t[None])
+    if block.samples is not None and plan.t_eval is not None:
+        times = np.repeat(plan.t_eval[:, None], cases.count, axis=1)
+        _project_columns(module, cases, block, plan, block.samples, times)
     if block.notes is not None:
-        _project_columns(module, cases, block, block.notes[2:], block.notes[1])
+        _project_columns(module, cases, block, plan, block.notes[2:], block.notes[1])
 
 
-def _project_columns(module: Module, cases: Cases, block: Block, states: Array, times: Array) -> None:
+def _project_columns(module: Module, cases: Cases, block: Block, plan: Plan, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
-    if cases.alike:
+    led = find_forcing(module, plan).constrained
+    if cases.alike and not led:
         good = np.isfinite(states).all(axis=0)
         with suppress(EomgenError):  # some cannot be: find out which
             states[:, good] = module.project(states[:, good], t=times[good], **cases.column(0))
@@ -311,7 +322,10 @@ def _project_columns(module: Module, cases: Cases, block: Block, states: Array, 
         good = np.isfinite(states[:, :, k]).all(axis=0)
         if good.any():
             try:
-                states[:, good, k] = module.project(states[:, good, k], t=times[good, k], **cases.column(k))
+                given = cases.column(k)
+                if led:
+                    given["u"] = forcing_of(module, cases, plan, k).sample(times[good, k], states[:, good, k])
+                states[:, good, k] = module.project(states[:, good, k], t=times[good, k], **given)
             except EomgenError as error:
                 block.status[k], block.words[k] = FAILED, str(error)
                 states[:, :, k] = np.nan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,11 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
+from ..runtime.simulate import find_state
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
+    from ..runtime.signals import Forcing
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -111,7 +113,9 @@ def collect_cases(
     return Cases(k, p, u, states, values)
 
 
-def assemble_states(module: Module, cases: Cases, t: float) -> tuple[Array, Mask, list[str]]:
+def assemble_states(
+    module: Module, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, Mask, list[str]]:
     """The initial states of all runs, on the constraints.
 
     Parameters
@@ -120,6 +124,8 @@ def assemble_states(module: Module, cases: Cases, t: float) -> tuple[Array, Mask
     cases : Cases
     t : float
         Time of the start (s).
+    forcing_of : callable
+        The inputs of a run by its number.
 
     Returns
     -------
@@ -134,6 +140,8 @@ def assemble_states(module: Module, cases: Cases, t: float) -> tuple[Array, Mask
     words: list[str] = []
     if cases.states is not None and free:
         return np.array(cases.states), failed, words
+    if forcing_of(0).constrained:
+        return _assemble_each(module, cases, lambda k: _assemble_led(module, cases, k, t, forcing_of(k)))
     varying = cases.p.ndim > 1 or cases.u.ndim > 1 or any(np.ndim(x) for x in cases.values.values())
     if cases.states is None and (not varying or _is_free(module, cases, free)):
         scalars = {name: float(x) for name, x in cases.values.items() if not np.ndim(x)}
@@ -145,14 +153,26 @@ def assemble_states(module: Module, cases: Cases, t: float) -> tuple[Array, Mask
     if cases.states is not None and cases.alike:
         with suppress(EomgenError):  # some cannot be: find out which
             return module.project(cases.states, t=t, **cases.column(0)), failed, words
-    x = np.full((module.n_x, cases.count), np.nan)
+    return _assemble_each(module, cases, lambda k: _assemble_one(module, cases, k, t))
+
+
+def _assemble_each(module: Module, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:
+    x, words = np.full((module.n_x, cases.count), np.nan), []
+    failed: Mask = np.zeros(cases.count, dtype=bool)
     for k in range(cases.count):
         try:
-            x[:, k] = _assemble_one(module, cases, k, t)
+            x[:, k] = assemble(k)
         except EomgenError as error:
             failed[k] = True
             words.append(str(error))
     return x, failed, words
+
+
+def _assemble_led(module: Module, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
+    """The state of one run whose constraints depend on inputs that vary."""
+    values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
+    given = values if cases.states is None else cases.states[:, k]
+    return find_state(module.bind(**cases.column(k)), given, t, forcing)
 
 
 def _assemble_one(module: Module, cases: Cases, k: int, t: float) -> Array:

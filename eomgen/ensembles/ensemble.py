@@ -165,8 +165,11 @@ class Ensemble:
             initial: Any = cases.states[:, k]
         else:
             initial = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
-        declared = set(self._module.metadata.get("signals", {})) - set(self._plan.constants)
+        declared = set(self._module.metadata.get("signals", {}))
         constants = dict(zip(self._module.u_names, column["u"].tolist(), strict=True))
+        rates = self._module.layout.input_rates
+        declared |= {rate for name in self._plan.inputs for rate, _ in rates.get(name, ())}
+        declared -= set(self._plan.constants)
         inputs = {name: value for name, value in constants.items() if name not in declared} | self._plan.inputs
         watched = {} if self._plan.events is None else {"events": self._plan.events}
         return {"initial": initial, "parameters": column["p"], "inputs": inputs, **watched}

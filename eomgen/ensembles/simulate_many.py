@@ -17,6 +17,7 @@ from ..runtime.compiled import can_run
 from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
+from ..runtime.signal_rates import fill_rates
 from ..runtime.signals import Forcing, Signal
 from ..runtime.simulate import DEFAULTS, check_count, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
@@ -28,6 +29,7 @@ from .reductions import GRAIN, Reduction, choose_reduction
 from .store import stored_length
 
 if TYPE_CHECKING:
+    from ..runtime.layout import Layout
     from ..runtime.module import Module
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
@@ -115,7 +117,7 @@ def simulate_many(
         dask.distributed is not installed.
     """
     check_names("option of simulate_many", options, OPTIONS)
-    tables, constants = _separate(inputs)
+    tables, constants = _separate(module.layout, inputs)
     cases = collect_cases(module, initial, parameters, constants, count)
     reduction = choose_reduction(reduce)
     named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
@@ -200,8 +202,8 @@ def _plan(
     return plan
 
 
-def _separate(inputs: Any) -> tuple[dict[str, Any], Any]:
-    """Inputs that are tables over time, and the others."""
+def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
+    """Inputs that are tables over time, and the others with their rates, which are 0."""
     if not isinstance(inputs, Mapping):
         return {}, inputs
     tables = {
@@ -214,7 +216,9 @@ def _separate(inputs: Any) -> tuple[dict[str, Any], Any]:
                 f"input {name} of simulate_many must be a number, (k,) numbers or a table (times, values), "
                 "a Signal or an expression as text, not a function"
             )
-    return tables, {name: x for name, x in inputs.items() if name not in tables} or None
+    rest = {name: x for name, x in inputs.items() if name not in tables}
+    still = fill_rates(layout, inputs, lambda name, rate, value: 0.0)
+    return tables, {**rest, **{rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}} or None
 
 
 def _positive(what: str, given: Any, default: int) -> int:

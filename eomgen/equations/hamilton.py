@@ -49,7 +49,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         rates = [s + f for s, f in zip(_turned(kinematics, slopes, momenta), forces, strict=True)]
     else:
         accelerations, pivots, rates = _canonical(kinematics, (kinetic, potential), momenta, mass, forces)
-    drift = jvp(momenta, kinematics.flow | {kinematics.t: graph.one})
+    drift = jvp(momenta, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momenta)
     return TreeEquations(
         method="hamilton",
@@ -105,7 +105,7 @@ def _canonical(
         hamiltonian = hamiltonian + 0.5 * (a * b)
     slopes = [-s for s in gradient(hamiltonian, list(kinematics.q))]
     rates = [s + f for s, f in zip(_turned(kinematics, slopes, p), forces, strict=True)]
-    along = kinematics.flow | dict(zip(p, rates, strict=True)) | {kinematics.t: graph.one}
+    along = kinematics.flow | dict(zip(p, rates, strict=True)) | kinematics.clock
     accelerations = jvp(velocities, along)  # of dH/dp, which the velocities are
     here = dict(zip(p, momenta, strict=True))
     found = substitute([*accelerations, *rates], here)

@@ -22,7 +22,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     q, v = list(kinematics.q), list(kinematics.v)
     kinetic, potential = form_energies(kinematics)
     momentum = gradient(kinetic, v)
-    drift = jvp(momentum, kinematics.flow | {kinematics.t: graph.one})
+    drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
     slope = gradient(kinetic - potential, q)
     if kinematics.balls:

@@ -4,36 +4,81 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import EvaluationError, ModelError, PartitionError
+from ..describe.mechanism import Mechanism
+from ..errors import EvaluationError, ModelError, PartitionError, Problem
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
 from ..kinematics.mobility import ConstraintFunctions, Mobility
+from ..limits.inertia import LEAST
+from ..limits.rounding import TINY
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
 from .equations import TreeEquations
 from .idle import IdleMotion
 
-LEAST = 1e-12  #: smallest eigenvalue of the mass matrix with its diagonal scaled to 1
+REMEDY = "give the body it moves a mass or an inertia; for kinematics alone, check_inertia: note"
+SHOWN = 8  #: bodies that a message names
 
 
-def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> None:
-    """Refuse a degree of freedom that moves no mass at any configuration tried.
+def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> str:
+    """Refuse a degree of freedom that moves no mass at any configuration tried, unless the model is one without mass.
 
-    The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
-    as Euler angles make it, a run that gets there says so.  Each coordinate is measured by its own inertia, so that a
-    small mechanism beside a large one is as sound as alone.
+    Kinematics needs no masses: a mechanism without any mass, inertia and force element is taken for what it is, and so
+    is any model whose ``check_inertia`` is ``note`` or ``off``.
+
+    Returns
+    -------
+    str
+        What has no inertia, for the calls that need it; empty where all motions have.
 
     Raises
     ------
     ModelError
         Names the coordinates that move nothing.
     """
+    problems = find_idle(kinematics, mobility, tree)
+    if not problems:
+        return ""
+    mechanism = kinematics.mechanism
+    if mechanism.check_inertia == "error" and not is_kinematic(mechanism):
+        raise ModelError(problems)
+    return f"{problems[0].path}: {problems[0].message}{_massless(kinematics)}"
+
+
+def is_kinematic(mechanism: Mechanism) -> bool:
+    """Whether bodies are there, and nothing has a mass or an inertia and nothing pushes: motion is all it can tell."""
+    heavy = [x for b in mechanism.bodies for x in (b.mass, *(entry for row in b.inertia for entry in row))]
+    heavy += [spec.armature for spec in mechanism.joints if spec.armature is not None]
+    return bool(mechanism.bodies) and not mechanism.forces and all(x.is_zero for x in heavy)
+
+
+def _massless(kinematics: Kinematics) -> str:
+    """The bodies that have neither mass nor inertia, in words."""
+    mechanism = kinematics.mechanism
+    names = [
+        body.name
+        for body in mechanism.bodies
+        if body.mass.is_zero and all(entry.is_zero for row in body.inertia for entry in row)
+    ]
+    if not names:
+        return ""
+    shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+    return f"; bodies without mass and inertia: {shown}"
+
+
+def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> list[Problem]:
+    """The motions that move no mass at any configuration tried, as faults of the model.
+
+    The embedded mass matrix must be positive definite somewhere; where it is singular at single configurations only,
+    as Euler angles make it, a run that gets there says so.  Each coordinate is measured by its own inertia, so that a
+    small mechanism beside a large one is as sound as alone.
+    """
     m, names = kinematics.mechanism, kinematics.freedoms
     numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
     functions = ConstraintFunctions(kinematics, numbers)
     n, r = len(names), mobility.rank
     if n == r:
-        return
+        return []
     if tree.pivots:
         moved = compile_evaluator(list(tree.pivots), (*kinematics.names, *numbers, "t"))
         for sample in mobility.samples:
@@ -43,7 +88,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
                 if (j := kinematics.parent[k]) >= 0:
                     sizes[j] = max(sizes[j], sizes[k])
             if safely_positive(pivots, sizes):
-                return
+                return []
     mass = compile_evaluator([x for row in tree.mass_matrix for x in row], (*kinematics.names, *numbers, "t"))
     scales = functions.scales.q
     independent = [names.index(name) for name in mobility.independent]
@@ -60,10 +105,10 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
         embedded = B.T @ M @ B
         sizes, modes = np.linalg.eigh(correlated(embedded))
         if sizes[0] > LEAST:
-            return
+            return []
         if worst is None:  # the reference is what the message speaks of
-            unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), 1e-300))
-            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=1e-300))
+            unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), TINY))
+            alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=TINY))
             motion = B @ (modes[:, 0] * unit / unit.max())
             idle = None
             if not alone.size:
@@ -74,7 +119,7 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
         raise EvaluationError("the mass matrix is not finite at the initial configuration", 0.0, mobility.q_reference)
     size, motion, idle = worst
     if idle is not None:
-        raise ModelError([idle.problem(kinematics)])
+        return [idle.problem(kinematics)]
     problems = []
     for j in np.argsort(-motion):
         if motion[j] > 0.3 * motion.max():
@@ -83,5 +128,5 @@ def require_inertia(kinematics: Kinematics, mobility: Mobility, tree: TreeEquati
             path = f"joints.{spec.name}" if spec else f"{section}.{names[j]}"
             what = "negative inertia" if size < -LEAST else "no inertia"
             message = f"coordinate {names[j]!r} has {what} behind it: a motion along it moves no mass"
-            problems.append(m.problem(path, message, "give the body it moves a mass or an inertia"))
-    raise ModelError(problems)
+            problems.append(m.problem(path, message, REMEDY))
+    return problems

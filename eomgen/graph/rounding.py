@@ -12,15 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ..limits.rounding import ROUNDED
 from .core import Expr, Graph
 from .evaluate import Evaluator
 from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
 
-EPS = float(np.finfo(float).eps)
-#: A value within so many times its bound is rounding.  The numbers of a description are rounded before they come here:
-#: the entries of a turned frame come from three angles by up to nine products.
-ROUNDED = 64.0 * EPS
 TRIES = 3  #: random points at which an identity is tried
 
 #: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.

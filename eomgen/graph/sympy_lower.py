@@ -93,16 +93,17 @@ def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str
 
 
 def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
-    lines = [f"{_short(part)}: {why}" for part, why in walk.faults]
+    lines = [f"{shortened(part)}: {why}" for part, why in walk.faults]
     unresolved = sorted(walk.unresolved, key=str)
     if unresolved:
-        names = ", ".join(_short(x) for x in unresolved)
+        names = ", ".join(shortened(x) for x in unresolved)
         lines.append(f"no meaning for {names}; " + (f"known are {', '.join(allowed)}" if allowed else "declare them"))
     first = walk.faults[0][0] if walk.faults else unresolved[0]
     return LoweringError(first, "\n".join(lines), unresolved)
 
 
-def _short(expression: Any) -> str:
+def shortened(expression: Any) -> str:
+    """An expression as messages show it: at most 120 characters."""
     try:
         text = str(expression)
     except RecursionError:  # SymPy prints recursively
@@ -250,7 +251,7 @@ def _pieces(part: Any) -> Sequence[Any]:
         flat += [pair.expr, pair.cond]
     last = part.args[-1]
     raise _Fault(
-        f"the last piece ({_short(last.expr)} if {_short(last.cond)}) leaves the other cases without a value; "
+        f"the last piece ({shortened(last.expr)} if {shortened(last.cond)}) leaves the other cases without a value; "
         "end the Piecewise with (expression, True)"
     )
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits.constraints import CHOSEN
 from ..numeric import conditioning
 
 Array = NDArray[np.float64]
 LARGEST = 120  #: coordinates up to which every one is judged
-USELESS = 1e-8  #: a conditioning below this counts as 0
 
 
 def rate_candidates(J: Array, chosen: Sequence[int]) -> dict[int, float]:
@@ -39,4 +39,4 @@ def rate_candidates(J: Array, chosen: Sequence[int]) -> dict[int, float]:
             swaps = ([k if i == old else i for i in chosen] for old in chosen)
             found[k] = max(conditioning(J, columns) for columns in swaps)
     ordered = sorted(found.items(), key=lambda item: -round(item[1], 6))
-    return {k: value for k, value in ordered if value > USELESS}
+    return {k: value for k, value in ordered if value > CHOSEN}

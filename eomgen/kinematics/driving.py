@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..constraints import Driver
 from ..errors import AssemblyError, ModelError
 from ..graph.substitute import symbols_of
+from ..limits.constraints import CONTRADICTION
 from ..numeric import Assembly, rank
 
 if TYPE_CHECKING:
@@ -24,7 +25,6 @@ Array = NDArray[np.float64]
 FIRST = 1e-3  #: part of the span in the first step of a walk
 STEPS = 16  #: at most
 MOVE = 0.3  #: largest scaled motion in one step, so that the branch is kept
-TOLERANCE = 1e-8  #: scaled residual that counts as a contradiction
 
 
 def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
@@ -169,7 +169,7 @@ def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int,
         if len(_needed(functions, drivers, here)[0]) > len(kept):
             break  # the first position was singular; elsewhere all of them count
         C = functions.scales.residual(functions.position(here)[0])
-        if np.abs(C[spare]).max() > TOLERANCE:
+        if np.abs(C[spare]).max() > CONTRADICTION:
             raise _contradiction(functions, drivers, spare, here, t)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cached_property
 
+from ..describe.input_rates import clock
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
@@ -110,6 +111,11 @@ class Kinematics:
         return dict(zip(self.q, self.rates, strict=True))
 
     @cached_property
+    def clock(self) -> dict[Expr, Expr]:
+        """The rates of all that is prescribed, t' = 1 and those of the inputs, as the direction of a derivative."""
+        return clock(self.graph, self.mechanism.inputs)
+
+    @cached_property
     def freedoms(self) -> tuple[str, ...]:
         """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
         if self.mechanism.given is not None:
@@ -129,9 +135,9 @@ class Kinematics:
         return tuple(self.rates.index(v) if v in self.rates else -1 for v in self.v)
 
     def total_derivative(self, expressions: Sequence[Expr]) -> list[Expr]:
-        """d/dt along q' = N v, v' = a, t' = 1."""
+        """d/dt along q' = N v, v' = a, t' = 1, and the rates of the inputs."""
         along = self.flow | dict(zip(self.v, self.a, strict=True))
-        return jvp(list(expressions), along | {self.t: self.graph.one})
+        return jvp(list(expressions), along | self.clock)
 
     def resolve(self, expressions: Sequence[Expr]) -> list[Expr]:
         """Replace coordinates of cut joints and marker quantities by what they are in terms of the tree."""
@@ -149,7 +155,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
     t = graph.symbol("t")
     rates = layout.rates(graph, q, v)
-    state = State(q, v, a, t, rates, not layout.given)
+    state = State(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
     links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
@@ -220,7 +226,7 @@ def _loop_coordinates(
     state: State,
 ) -> LoopCoordinates:
     names, kinds, values = measured
-    along = {symbol: rate for symbol, rate in state.along.items() if symbol != state.t}
+    along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.clock}
     rates = jvp(values, along)
     entries = state.slopes(values, rates)
     zero = graph.zero

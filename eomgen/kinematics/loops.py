@@ -9,8 +9,9 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
-from ..graph.rounding import ROUNDED, vanishing
+from ..graph.rounding import vanishing
 from ..graph.substitute import substitute, symbols_of
+from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .state import State
 from .tree import Poses
@@ -113,7 +114,7 @@ def differentiate_constraints(
     values = [r.expression for r in kept if r.level == "position"]
     nonholonomic = [r.expression for r in kept if r.level != "position"]
     open_conditions = [(joint, e) for joint, e in aligned if e.value is None or e.value <= 0]
-    along = dict(zip(state.q, state.rates, strict=True)) | {state.t: graph.one}
+    along = {**dict(zip(state.q, state.rates, strict=True)), **state.clock}
     velocity = jvp(values, along)
     entries = state.slopes(values, velocity)
     m = len(values)
@@ -128,7 +129,7 @@ def differentiate_constraints(
         written=tuple(r.written for r in kept),
         values=tuple(values),
         jacobian=tuple(tuple(entries.get((i, j), zero) for j in range(len(state.v))) for i in range(len(kept))),
-        time_derivative=(*jvp(values, {state.t: graph.one, **dict(still)}), *substitute(nonholonomic, at_rest)),
+        time_derivative=(*jvp(values, {**state.clock, **dict(still)}), *substitute(nonholonomic, at_rest)),
         velocity=(*velocity, *nonholonomic),
         gamma=tuple(jvp([*velocity, *nonholonomic], along | at_rest)),
         slopes=tuple(tuple(slopes.get((i, j), zero) for j in range(len(state.q))) for i in range(m)) if slopes else (),

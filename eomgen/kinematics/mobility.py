@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import AssemblyError, ModelError
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
+from ..limits.constraints import CHOSEN
 from ..numeric import (
     Assembly,
     Scales,
@@ -355,7 +356,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     chosen = _choose(kinematics, jacobians, r, wanted)
     quality = conditioning(jacobians[0], chosen)
     at_change_point = ranks[0] < r  # where nothing can be said of a choice: the samples may lie on other branches
-    if wanted and not at_change_point and max(conditioning(J, chosen) for J in jacobians) < 1e-8:
+    if wanted and not at_change_point and max(conditioning(J, chosen) for J in jacobians) < CHOSEN:
         message = f"{', '.join(wanted)} cannot move the mechanism on their own at the initial configuration"
         better = [names[j] for j in choose_independent(jacobians, r)]
         raise ModelError([kinematics.mechanism.problem("independent", message, f"{', '.join(better)} can")])

@@ -15,7 +15,7 @@ CORNERS = {"abs": "abs", "sign": "sign", "min": "min", "max": "max", "select": "
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
     """Locked and overconstrained mechanisms, change points, badly chosen independent coordinates."""
-    notes = []
+    notes = list(kinematics.mechanism.notes)
     if kinematics.constraints.labels and mobility.n_dof == 0 and not mobility.driven:
         held = _few([*dict.fromkeys(label.partition(".")[0] for label in kinematics.constraints.labels)])
         notes.append(

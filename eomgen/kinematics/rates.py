@@ -33,7 +33,7 @@ class JointRates:
 def joint_rates(kinematics: Kinematics) -> list[JointRates]:
     """The rates of every link, in tree order."""
     graph, links, v = kinematics.graph, kinematics.links, kinematics.v
-    along: Mapping[Expr, Expr] = kinematics.flow | {kinematics.t: graph.one}
+    along: Mapping[Expr, Expr] = kinematics.flow | kinematics.clock
     columns = [x for link in links for angular, _ in link.columns for x in angular]
     flows = jvp([*columns, *(x for link in links for x in link.position)], along)
     slides = flows[len(columns) :]

@@ -17,15 +17,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.rounding import ROUNDED, is_rounding, terms_of, with_bounds
+from ..graph.rounding import is_rounding, terms_of, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
 SMALL = 1e-3  #: a gap whose gradient is below this part of its kind's size is of a loop that small
 LEAST = 1e-3  #: gradients at the initial values that are this part of those beside them vanish there by chance
-TINY = 1e-150  #: stands for the size of a row whose factors are all 0
 
 
 class Length(NamedTuple):
@@ -59,9 +59,9 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
             usual = _length_at([kinematics.length_scale], numbers[0]).value
         first, second = (_length_at(gradient, known) for known in numbers)
         largest = max(first.value, second.value)
-        if written and largest <= TINY:
+        if written and largest <= TINY_ROOT:
             found[i] = graph.constant(max(first.terms, second.terms) or 1.0)
-        elif written or TINY < largest < SMALL * usual:
+        elif written or TINY_ROOT < largest < SMALL * usual:
             place = places[first.value < LEAST * second.value]
             found[i] = _length(substitute(gradient, place))
     return tuple(found)
@@ -92,7 +92,7 @@ def _length(gradient: Sequence[Expr]) -> Expr:
     for x in gradient[1:]:
         total = total + x * x
     graph = total.graph
-    return graph.apply("max", graph.apply("sqrt", total), graph.constant(TINY))
+    return graph.apply("max", graph.apply("sqrt", total), graph.constant(TINY_ROOT))
 
 
 def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:

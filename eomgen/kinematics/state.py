@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 from ..describe.mechanism import Mechanism
@@ -65,13 +65,14 @@ class State:
     a: tuple[Expr, ...]
     t: Expr
     rates: tuple[Expr, ...]
+    clock: Mapping[Expr, Expr]  #: t' = 1, and the rates of the inputs
     in_order: bool = True  #: whether velocities are rates of coordinates, or angular velocities: not so if given
 
     @cached_property
     def along(self) -> dict[Expr, Expr]:
-        """The direction of d/dt: q' = N v, v' = a, t' = 1."""
+        """The direction of d/dt: q' = N v, v' = a, t' = 1, and the rates of the inputs."""
         flow = dict(zip(self.q, self.rates, strict=True)) | dict(zip(self.v, self.a, strict=True))
-        return flow | {self.t: self.t.graph.one}
+        return {**flow, **self.clock}
 
     def slopes(self, values: Sequence[Expr], rates: Sequence[Expr]) -> dict[tuple[int, int], Expr]:
         """Derivatives by v of the rates of functions of q: df/dq N."""

@@ -8,11 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError
+from ..limits.constraints import CONTRADICTION, GIVEN
 from .ranks import rank
 from .scales import Array, Indices, Scales
-
-CUT = 1e-9  #: singular values below this part of the largest count as zero
-ACCEPTED = 1e-8  #: largest scaled residual of velocities, relative to the largest scaled velocity (or 1)
 
 
 class VelocityEquations(NamedTuple):
@@ -80,21 +78,21 @@ def assemble_velocity(
         row_scales = np.concatenate([row_scales, equations.scales])
         offset = np.concatenate([C_t, equations.y_t - equations.values])
         all_labels += list(equations.names)
-    inverse = np.linalg.pinv(J[:, free], rcond=CUT)
+    inverse = np.linalg.pinv(J[:, free], rcond=GIVEN)
     for _ in range(2):
         e = J @ (v / scales.q) + offset / row_scales
         v[free] -= scales.q[free] * (inverse @ e)
     e = J @ (v / scales.q) + offset / row_scales
     worst = float(np.abs(e).max()) if e.size else 0.0
     speed = max([1.0, *np.abs(v / scales.q), *np.abs(offset / row_scales)])
-    if worst <= ACCEPTED * speed:
+    if worst <= CONTRADICTION * speed:
         return Rates(v, worst)
     velocity_names = names or [f"v[{i}]" for i in range(len(v))]
     given = [f"{velocity_names[i]} = {v[i]:.6g}" for i in held]
     if equations is not None:
         given += [f"{name} = {value:.6g}" for name, value in zip(equations.names, equations.values, strict=True)]
     gaps = e * row_scales
-    order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= ACCEPTED * speed]
+    order = [i for i in np.argsort(-np.abs(e), kind="stable")[:3] if not abs(e[i]) <= CONTRADICTION * speed]
     dof = len(v) - rank(scales.jacobian(C_q)).rank
     where = ", ".join(f"{all_labels[i]} {abs(gaps[i]):.3g}/s" for i in order)
     what = f"the given velocities {', '.join(given)}" if given else "the driven constraints"

@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .gram import TIKHONOV
-from .projection import ACCEPTED, SETTLED, largest, within
+from ..limits.constraints import ACCEPTED, AT_ONCE, EXACT, SETTLED, TIKHONOV
+from .projection import largest, within
 from .scales import Array, Position, Scales
 
-EXACT = 1e-14  #: scaled residual at which to stop at once
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
 LONGEST = 0.5  #: largest scaled step
@@ -67,13 +66,13 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
     q : (n,) array
         The last point.
     residual : float
-        Largest scaled residual there; closed when it is not above 1e-10, which rows at their rounding count as.
+        Largest scaled residual there; closed when it is not above ACCEPTED, which rows at their rounding count as.
     """
     e, J = system.evaluate(q)
     long = system.scales.long
     for _ in range(steps):
         size = largest(e)
-        if size <= EXACT or not np.isfinite(size):
+        if size <= AT_ONCE or not np.isfinite(size):
             break
         steepness = np.sqrt((J * J).sum(axis=1))
         weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
@@ -83,7 +82,7 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         K, f = J * weights[:, None] * unit, e * weights
         G = K @ K.T
         top = float(G.diagonal().max())
-        if top == 0.0 or largest(K.T @ f) <= 1e-15 * top:
+        if top == 0.0 or largest(K.T @ f) <= EXACT * top:
             break  # nothing that may move makes a difference
         G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
         dz = -K.T @ np.linalg.solve(G, f)

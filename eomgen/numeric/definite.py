@@ -1,20 +1,15 @@
 """Stage numeric: a mass matrix -> whether it is safely positive definite, whatever the sizes of its coordinates.
 
-What a pivot is lost in is the rounding of its own diagonal entry: a watch beside a crane is as sound as either alone.
-So each is measured by its own size; only what rounding leaves of a zero, whose square is far below any inertia beside
-it, is measured by the largest.
+Each pivot is compared with its own diagonal entry, whose rounding it carries, so that scales do not interact.  Only
+what rounding leaves of a zero, far below any inertia beside it, is compared with the largest entry.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..limits.inertia import NOTHING, SINGULAR, STILL
 from .scales import Array
-
-SINGULAR = 1e-13  #: smallest pivot, relative to its own diagonal entry
-NOTHING = 1e-22  #: smallest pivot, relative to the largest diagonal entry: the square of what rounding leaves of a zero
-#: Least inertia of the only freedom, relative to that of all it moves: 1e-13 squared, the rounding of a dead centre.
-STILL = 1e-26
 
 
 def safely_positive(pivots: Array, sizes: Array) -> bool:

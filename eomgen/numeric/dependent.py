@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from .gram import EXACT
+from ..limits.constraints import ACCEPTED, EXACT, SETTLED
 from .partitions import Partition, partition
-from .projection import ACCEPTED, DAMPING, SETTLED, largest, within
+from .projection import DAMPING, largest, within
 from .scales import Array, Indices, Position, Rate, Scales
 
 STEPS = 50  #: Newton steps at most

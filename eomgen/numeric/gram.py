@@ -20,15 +20,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import ProjectionError
+from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV
+from ..limits.rounding import SUMMED
 from .space import Array
 
-TIKHONOV = 1e-12  #: least term, relative to the largest diagonal entry of J J^T: a hundred times the rounding of that
-GENTLE = 1e-8  #: the term to begin with: no noise of C is blown up by more than 5e3
 PASSES = 50  #: at most
-FAST = 0.01  #: a pass that leaves less than this part needs no smaller term
-BELOW = 1e-4  #: the next term, relative to the square of the singular value of what is left
-EXACT = 1e-15  #: rounding of scaled constraints
-ROUNDED = 4.0 * float(np.finfo(float).eps)  #: of each product in a sum
 
 
 def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
@@ -91,7 +87,7 @@ def least(J: Array, y: Array, x: Array, noise: float, order: int = 1) -> Array:
     size = float(np.sqrt((J * J).sum(axis=1).max()))
     for _ in range(PASSES):
         e = y - J @ x
-        if not (np.abs(e) > ROUNDED * (np.abs(J) @ np.abs(x) + np.abs(y))).any():
+        if not (np.abs(e) > SUMMED * (np.abs(J) @ np.abs(x) + np.abs(y))).any():
             break
         z = solve(e)
         length = float(np.abs(e).max())

@@ -12,14 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-#: A moment may exceed the sum of the other two by this part of it before it counts as wrong: published inertias of real
-#: machines, measured or rounded, exceed it by up to a tenth (PUMA 560, link 3).
-TRIANGLE = 0.1
-#: A moment may be negative by this part of the largest one, from rounding.
-ROUNDING = 1e-6
+from ..limits.inertia import COMPUTED, DIGITS, TRIANGLE
+
+#: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
+CHECKS = ("error", "note", "off")
 
 
-SWITCH = "check_inertia: false takes it as it is"
+SWITCH = "check_inertia: note takes it as it is (also of load, and --check-inertia)"
 SHIFTED = f"an inertia about another point is at least m d^2; {SWITCH}"
 NEGATIVE = (
     "check the products: xy, xz, yz bear the tensor's own sign (minus the integral of x y dm), and the point it is "
@@ -31,7 +30,42 @@ EXCESS = (
 )
 
 
-def fault_of_inertia(tensor: ArrayLike, plane: Sequence[float] | None = None) -> tuple[str, str] | None:
+def word_of_check(value: object) -> str | None:
+    """The word that a value of ``check_inertia`` means, true being ``error`` and false ``off``; None for no such."""
+    if isinstance(value, bool):
+        return "error" if value else "off"
+    return value if isinstance(value, str) and value in CHECKS else None
+
+
+def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length: float) -> list[float]:
+    """m l^2 of each body, which what rounding leaves of its inertia is judged by.
+
+    Parameters
+    ----------
+    masses : sequence of float
+        kg; a body without mass counts with the largest of all, a mechanism without mass by its largest moment.
+    tensors : sequence of (3, 3) arrays
+        kg m^2.
+    length : float
+        The mechanism's longest distance (m) of a centre of mass or of a joint from a body's origin: the programs that
+        compute inertias shift them over such distances.  If it is 0, the largest radius of gyration takes its place.
+
+    Returns
+    -------
+    list of float
+        kg m^2.
+    """
+    heaviest = max((abs(m) for m in masses), default=0.0)
+    if heaviest == 0.0:
+        return [max((float(np.abs(tensor).max()) for tensor in tensors), default=0.0)] * len(masses)
+    sizes = [abs(m) or heaviest for m in masses]
+    square = length**2 or max(abs(float(np.trace(tensor))) / m for m, tensor in zip(sizes, tensors, strict=True))
+    return [m * square for m in sizes]
+
+
+def fault_of_inertia(
+    tensor: ArrayLike, plane: Sequence[float] | None = None, scale: float = 0.0
+) -> tuple[str, str] | None:
     """What is wrong with an inertia about the centre of mass.
 
     Parameters
@@ -40,6 +74,8 @@ def fault_of_inertia(tensor: ArrayLike, plane: Sequence[float] | None = None) ->
         Symmetric, kg m^2.
     plane : three numbers, optional
         The axis of a body that moves in a plane only, of which one moment was given: only that moment is judged.
+    scale : float, optional
+        m l^2 (kg m^2) of :func:`inertia_scales`; moments below its rounding say nothing.
 
     Returns
     -------
@@ -48,16 +84,17 @@ def fault_of_inertia(tensor: ArrayLike, plane: Sequence[float] | None = None) ->
         that moves in a plane.
     """
     full = np.asarray(tensor, dtype=float).reshape(3, 3)
+    computed = COMPUTED * scale
     if plane is not None:
         n = np.asarray(plane, dtype=float)
         moment, size = float(n @ full @ n), float(np.abs(full).max())
-        if moment < -ROUNDING * size:
+        if moment < -max(DIGITS * size, computed):
             return f"the moment about the centre of mass is {moment:.6g}", SHIFTED
         return None
     a, b, c = np.linalg.eigvalsh(full)
     size = max(abs(a), abs(c))
-    if a < -ROUNDING * size:
+    if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a:.6g}", NEGATIVE
-    if b > 1e-9 * size and c > (1 + TRIANGLE) * (a + b):
+    if b > max(1e-9 * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
         return f"principal moments {a:.6g}, {b:.6g}, {c:.6g}: one exceeds the sum of the others", EXCESS
     return None

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import PartitionError
-from .rank_limits import CHOSEN as STRICT
-from .rank_limits import STATE as RANK
+from ..limits.constraints import CHOSEN as STRICT
+from ..limits.constraints import STATE as RANK
 from .scales import Array, Indices
 
 PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best

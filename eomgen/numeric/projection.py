@@ -13,15 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from .gram import EXACT, GENTLE, gram_solver, least, smaller, weakness
+from ..limits.constraints import ACCEPTED, EXACT, GENTLE, HINDERED, NEAR, SETTLED, SHORT
+from .gram import gram_solver, least, smaller, weakness
 from .scales import Array, GivenRates, Position, Rate, Scales
 
 STEPS = 25  #: Newton steps at most
-HINDERED = 0.1  #: part of the scaled residual that a step may leave because of the Tikhonov term
-NEAR = 0.01  #: residuals below this part of the square of a singular value are steps far shorter than it
-SHORT = 1e-8  #: scaled Newton step whose square is nothing
-SETTLED = 1e-12  #: scaled residual at which to stop when it no longer falls
-ACCEPTED = 1e-10  #: largest scaled residual of a projected state
 DAMPING = 0.5  #: largest scaled Newton step
 
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.constraints import STRUCTURE as TOLERANCE
 from .partitions import PREFERENCE
-from .rank_limits import STRUCTURE as TOLERANCE
 from .scales import Array, Indices
 
 ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..limits.rounding import ROUNDED
 from .given_rates import GivenRates
 from .space import Array, Indices, Space
 
@@ -16,9 +17,6 @@ __all__ = ["Array", "GivenRates", "Indices", "Position", "Rate", "Scales", "Spac
 Position: TypeAlias = Callable[[Array], tuple[Array, Array]]
 #: q (n,) -> C_t (m,)
 Rate: TypeAlias = Callable[[Array], Array]
-
-
-ROUNDED = 64.0 * float(np.finfo(float).eps)  #: of a coordinate, and of what it goes into
 
 
 class Scales(NamedTuple):

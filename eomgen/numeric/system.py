@@ -15,17 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError, UnsolvedError
+from ..limits.systems import BALANCED, FAINT, LEFT, PIVOT, RELAXATION, ROUNDED, WEAKEST
 from .scales import Array, Indices
 
-RELAXATION = 1e-10  #: subtracted from the balanced K at the places of constraints
-PIVOT = 1e-14  #: the balanced, relaxed K counts as singular where it answers more than 1 / PIVOT times what is asked
 STEPS = 30
 BALANCES = 40  #: of rows and columns in turn, at most
-BALANCED = 2.0  #: a largest entry up to this factor from 1 is balanced
-LEFT = 1e-11  #: most that may be left of an equation, relative to the sum of its terms
-ROUNDED = 1e-14  #: the same relative to the largest sum of terms of any equation (balanced)
-FAINT = 1e-15  #: the same of constraints, over the square of the singular value of weak ones: see :mod:`.gram`
-WEAKEST = 1e-13  #: such a square, at least
 
 
 class Pattern:
@@ -121,7 +115,7 @@ class Balanced:
                 break
             before = size
             z = z + self._step(defect)
-        # a step leaves 1e-10 / (s^2 + 1e-10) along constraints of singular value s
+        # a step leaves RELAXATION / (s^2 + RELAXATION) along constraints of singular value s
         weak = max(WEAKEST, RELAXATION * (before / size - 1.0)) if size else 1.0
         limit = np.full((len(r), 1), LEFT)
         limit[self.constraints] = max(LEFT, FAINT / weak)

@@ -181,6 +181,7 @@ class BlockMaker:
             "multiplier_rates": tuple(f"rate({l})" for l in terms.multipliers),
             "correction_rates": tuple(f"rate(correction[{i}])" for i in range(self.sizes.n_h)),
             "cj": ("cj",),
+            "impulses": tuple(f"impulse[{i}]" for i in range(len(terms.events))),
             "dq": tuple(f"d({q})" for q in terms.q),
             "dv": tuple(f"d({v})" for v in terms.v),
             "du": tuple(f"d({u})" for u in terms.u),
@@ -217,6 +218,8 @@ class BlockMaker:
             "events": lambda: terms.events,
             "resets": lambda: terms.resets,
             "event_slopes": self._event_slopes,
+            "event_derivatives": lambda: self._by_everything([*terms.events, *terms.resets]),
+            "strike_derivatives": lambda: self._by_everything(self._strike),
             "assembly_jacobian": self._assembly_jacobian,
             "output_derivatives": self._output_derivatives,
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
@@ -386,6 +389,31 @@ class BlockMaker:
 
     def _event_slopes(self) -> list[Expr]:
         return self._derivatives(self.terms.events, (*self.terms.q, *self.terms.v))
+
+    @property
+    def _strike(self) -> list[Expr]:
+        """What rules velocities at an instant, a their change: impulses l of constraints and g of gaps with normals n,
+        or the least scaled change; constraints and the events' rates of (q, v)."""
+        terms, zero = self.terms, self.terms.graph.zero
+        v, a = self._symbols(terms.v), self._symbols(terms.a)
+        rates = jvp(terms.events, dict(zip(self._symbols(terms.q), terms.rates or v, strict=True)))
+        time = terms.graph.symbol(terms.t)
+        drift = jvp(terms.events, {time: terms.graph.one})
+        normals = jacobian(rates, v)
+        change = jvp(terms.inverse_dynamics, {x: x for x in a})
+        least = [x / (s * s) for x, s in zip(a, terms.coordinate_scales, strict=True)]
+        for row, l in zip(terms.constraint_jacobian, self._symbols(terms.multipliers), strict=True):
+            change = [x + c * l for x, c in zip(change, row, strict=True)]
+            least = [x + c * l for x, c in zip(least, row, strict=True)]
+        for i, g in enumerate(self._symbols(self.port("impulses").symbols)):
+            change = [x - normals.get((i, k), zero) * g for k, x in enumerate(change)]
+        moved = [x + y for x, y in zip(rates, drift, strict=True)]
+        return [*change, *least, *terms.velocity_constraints, *moved]
+
+    def _by_everything(self, rows: Sequence[Expr]) -> list[Expr]:
+        """Derivatives by coordinates, velocities, time, inputs and parameters."""
+        terms = self.terms
+        return self._derivatives(rows, (*terms.q, *terms.v, terms.t, *terms.u, *terms.p))
 
     def _output_derivatives(self) -> list[Expr]:
         terms = self.terms

@@ -153,8 +153,15 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_m=len(terms.canonical) // 2,
         n_events=len(terms.events),
         n_resets=len(terms.resets),
+        n_strike=_strike_rows(terms),
         n_dae=len(terms.q) + terms.n_v + terms.n_c + len(terms.constraints),
     )
+
+
+def _strike_rows(terms: SystemTerms) -> int:
+    """Rows of ``strike_derivatives``: of models whose events change velocities that impulses or constraints rule."""
+    ruled = terms.impacts or (terms.resets and terms.constraint_jacobian)
+    return 2 * terms.n_v + terms.n_c + len(terms.events) if ruled and not terms.given_rates else 0
 
 
 def _select(kernels: Sequence[str] | None) -> list[Kernel]:

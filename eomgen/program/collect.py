@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from ..describe.input_names import chains, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -12,8 +13,9 @@ from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.differentiate import gradient
 from ..graph.evaluate import compile_evaluator
-from ..graph.substitute import substitute
+from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
 from ..kinematics import Kinematics
 from ..kinematics.loads import drives_cut_joint
@@ -78,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         turned=equations.turned,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
         canonical=equations.canonical,
         slopes=partial(ForceSlopes, kinematics) if can_differentiate(kinematics) else None,
@@ -243,7 +246,9 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
             if m.events
             else {}
         ),
-        **({"signals": signals} if (signals := _signals(kinematics, equations)) else {}),
+        **_signals(kinematics, equations),
+        **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
+        **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,
@@ -255,12 +260,41 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
 
 
 def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]:
-    """Inputs over time as tapes, by name."""
-    places = {name: ("x", k) for k, name in enumerate((*kinematics.names, *kinematics.velocity_names))}
-    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    """Inputs over time as tapes, by name, and their derivatives by t, x and p that do not vanish."""
     given = {u.name: u.signal for u in kinematics.mechanism.inputs if u.signal is not None}
-    found = zip(given, resolved(list(given.values()), kinematics, equations), strict=True)
-    return {name: list(record_tape([x], places.__getitem__)) for name, x in found}
+    if not given:
+        return {}
+    states = (*kinematics.names, *kinematics.velocity_names)
+    places = {name: ("x", k) for k, name in enumerate(states)}
+    places |= {name: ("p", k) for k, name in enumerate(kinematics.parameter_names)} | {"t": ("t", 0)}
+    known = [kinematics.graph.symbol(name) for name in ("t", *states, *kinematics.parameter_names)]
+    found = dict(zip(given, resolved(list(given.values()), kinematics, equations), strict=True))
+    slopes: dict[str, Any] = {}
+    for name, x in found.items():
+        kept = {k: slope for k, slope in enumerate(gradient(x, known)) if not slope.is_zero}
+        slopes[name] = [list(kept), list(record_tape(list(kept.values()), places.__getitem__))]
+    return {
+        "signals": {name: list(record_tape([x], places.__getitem__)) for name, x in found.items()},
+        "signal_slopes": slopes,
+    }
+
+
+def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
+    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order."""
+    found = chains(kinematics.input_names)
+    rates = {rate for of in found.values() for rate in of}
+    return {
+        name: [(rate, split_rate(rate)[1] - split_rate(name)[1]) for rate in of]
+        for name, of in found.items()
+        if name not in rates
+    }
+
+
+def _constraint_inputs(kinematics: Kinematics) -> list[str]:
+    """Inputs on which the constraints depend."""
+    c = kinematics.constraints
+    used = symbols_of([*c.values, *c.velocity])
+    return [name for name in kinematics.input_names if name in used]
 
 
 def _system(equations: TreeEquations) -> dict[str, Any] | None:

@@ -10,12 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..graph.core import Expr
+from ..limits.inertia import NOTHING, SINGULAR
 from ..records import dataclass
-
-#: A pivot at most this part of its own diagonal entry means that no inertia is behind some motion.
-SINGULAR = 1e-13
-#: The same of the largest diagonal entry: the square of what rounding leaves of a zero.
-NOTHING = 1e-22
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class Sizes:
     n_m: int = 0  #: momenta: n_v by method hamilton, else 0
     n_events: int = 0
     n_resets: int = 0  #: states that events give new values
+    n_strike: int = 0  #: rows of what velocities obey where an event changes them, 0 where they just change
     n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
@@ -64,6 +65,9 @@ CENTROIDAL = "com (3), its Jacobian (3 x n_v), linear and angular momentum (6), 
 #: y, then y', of which only the rates of q and v are there
 DAE = ("q", "v", "multipliers", "corrections", "q_rate", "a", "multiplier_rates", "correction_rates")
 
+#: velocities, their change, impulses of the constraint rows and of the gaps
+STRIKE = ("q", "v", "a", "multipliers", "impulses")
+
 KERNELS: tuple[Kernel, ...] = (
     Kernel("rhs", ("q", "v"), lambda s: (s.n_x,), "x' = [q'; v'], after projecting x onto the constraints"),
     Kernel("jacobian", ("q", "v"), lambda s: (s.n_x, s.n_x), "dx'/dx of the complete rhs, row-major"),
@@ -85,6 +89,20 @@ KERNELS: tuple[Kernel, ...] = (
         "resets", ("q", "v"), lambda s: (s.n_resets,), "new values of states after events, in the order of `resets`"
     ),
     Kernel("event_slopes", ("q", "v"), lambda s: (s.n_events, s.n_x), "d(events)/dx, row-major", late=True),
+    Kernel(
+        "event_derivatives",
+        ("q", "v"),
+        lambda s: ((s.n_events + s.n_resets), s.n_x + 1 + s.n_u + s.n_p) if s.n_events else (0, 0),
+        "[events, resets] by [q, v, t, u, p]",
+        late=True,
+    ),
+    Kernel(
+        "strike_derivatives",
+        STRIKE,
+        lambda s: (s.n_strike, s.n_x + 1 + s.n_u + s.n_p),
+        "[M a + C_q^T l - n^T g, a/s^2 + C_q^T l, C_q v + C_t, rates of events] by [q, v, t, u, p]",
+        late=True,
+    ),
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
     ),

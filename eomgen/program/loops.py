@@ -13,8 +13,9 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..numeric.definite import STILL
-from ..numeric.gram import GENTLE, TIKHONOV
+from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, VANISHED
+from ..limits.inertia import STILL
+from ..limits.rounding import ROW
 from .factor import exceeding
 from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
@@ -23,13 +24,9 @@ from .triangular import DiagonalBlock, diagonal_blocks
 #: Linear corrections with GENTLE of velocities, whose errors gamma squares, and of accelerations; where weak rows keep
 #: something, drivers take more.
 PASSES = 5, 4
-LEFT = 1e-12  #: most that the last pass may leave, relative to all of what was corrected
 NOTHING = 1e-100  #: what is this small need not be told from 0
 LARGE = 8  #: velocities above which configurations of lost rank are passed here too, pivoting being slow
 SPREAD = 100.0  #: dependent coordinates may move at most so many times as fast as independent ones (scaled)
-LOST = 1e-5  #: least square of the sine between a column and those before it
-VANISHED = 1e-20  #: the same of large mechanisms
-ROUNDED = 2.0**-51  #: of the terms of a constraint row, what rounding may leave of their sum
 
 
 def largest(values: Sequence[Expr]) -> Expr:
@@ -135,7 +132,7 @@ class LoopBlocks:
     def _closed(self) -> Expr:
         """Whether no row is farther off than its own sum is rounded: its step would be noise, large near lost rank."""
         graph = self.terms.graph
-        beyond = [graph.apply("abs", row) - ROUNDED * total_magnitude(summands(row)) for row in self.terms.constraints]
+        beyond = [graph.apply("abs", row) - ROW * total_magnitude(summands(row)) for row in self.terms.constraints]
         return graph.apply("lt", largest(beyond), graph.zero)
 
     # -- velocity and acceleration --------------------------------------------------------------------------------

@@ -12,10 +12,11 @@ from ..joints import JOINTS
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .names import Names, clean_model_name
 from .placement import Inertia, Placement, numbers
-from .robot import Joint, Options, Robot
+from .robot import Drive, Joint, Options, Range, Robot
 from .ties import Sum, Tie, describe_tie
 from .tree import GROUND, Bodies, Body, build_bodies, find_tied
 
+SHOWN = 8  #: joints that a note names
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
 
@@ -40,6 +41,9 @@ class _Writer:
             values={"name": clean_model_name(robot.name), "gravity": gravity}, lines={"": (robot.file, 1)}
         )
         self.out.notes = list(robot.notes)
+        check = "note" if found.massless and options.check_inertia == "error" else options.check_inertia
+        if check != "error":
+            self.out.values["check_inertia"] = check
         self.names = Names()
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
@@ -59,6 +63,7 @@ class _Writer:
         self._loops()
         self._mimics()
         self._drives()
+        self._note_data()
         for section, names in self.names.renamed.items():
             self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
         self.out.renamed = self.names.renamed
@@ -219,20 +224,77 @@ class _Writer:
                 self._add("constraints", self.names.link(tie.name), values, tie.place)
 
     def _drives(self) -> None:
-        for k, drive in enumerate(self.robot.drives):
-            parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
-            fixed = sum(c * self.options.locked.get(joint, 0.0) for joint, c in drive.parts)
-            b0, b1, b2 = drive.bias
-            terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
-            name = f"tendon_{k}"
-            if drive.name:
-                name = self.names.symbol(drive.name)
-                self._add("inputs", name, {"value": 0.0}, drive.place)
-                terms.insert(0, (drive.gain, name))
-            law = " + ".join([f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x])
-            for q, c in parts if law else ():
+        laws = [self._law(k, drive) for k, drive in enumerate(self.robot.drives)]
+        totals: dict[str, str] = {}  # of the drives along a tendon
+        for drive, (_, law) in zip(self.robot.drives, laws, strict=True):
+            if drive.total and law:
+                totals[drive.tendon] = f"{totals[drive.tendon]} + {law}" if drive.tendon in totals else law
+        cut: dict[str, list[str]] = {}  # pushes along joints whose sum is cut
+        for drive, (name, law) in zip(self.robot.drives, laws, strict=True):
+            if drive.total and law:
+                law = _scaled(law, totals[drive.tendon], drive.total)
+            if drive.force and law:
+                law = _cut(law, drive.force)
+            for joint, c in drive.parts if law else ():
+                q = self.joints.get(joint)
+                if q is None or not c:
+                    continue
+                if drive.name and self.robot.joints[joint].clamp:
+                    cut.setdefault(joint, []).append(f"({c!r})*({law})")
+                    continue
                 force = self.names.made(f"{name}_drive")
                 self._add("forces", force, {"type": "actuator", "joint": q, "value": f"({c!r})*({law})"}, drive.place)
+        for joint, pushes in cut.items():
+            q, given = self.joints[joint], self.robot.joints[joint]
+            assert given.clamp is not None
+            law = _cut(" + ".join(pushes), given.clamp)
+            force = self.names.made(f"{q}_drives")
+            self._add("forces", force, {"type": "actuator", "joint": q, "value": law}, given.place)
+
+    def _law(self, k: int, drive: Drive) -> tuple[str, str]:
+        """Name of a drive and its force, empty if there is none."""
+        parts = [(self.joints[joint], c) for joint, c in drive.parts if joint in self.joints and c]
+        fixed = sum(c * self.options.locked.get(joint, 0.0) for joint, c in drive.parts)
+        b0, b1, b2 = drive.bias
+        terms = [(b1 * c, q) for q, c in parts] + [(b2 * c, f"{q}_dot") for q, c in parts]
+        name = f"tendon_{k}"
+        if drive.name:
+            name = self.names.symbol(drive.name)
+            self._add("inputs", name, {"value": 0.0}, drive.place)
+            terms.insert(0, (drive.gain, _cut(name, drive.control) if drive.control else name))
+        return name, " + ".join(
+            [f"({x!r})*{what}" for x, what in terms if x] + [repr(x) for x in [b0 + b1 * fixed] if x]
+        )
+
+    def _note_data(self) -> None:
+        """Say of which joints limits and dry friction are data that do not act."""
+        moving = [body.joint for body in self.found.bodies.values() if body.joint is not None]
+        limited = [j for j in moving if any(key != "effort" or j.clamp is None for key in j.limits)]
+        if limited and self.options.limits != "off":
+            names = self._few(limited)
+            self.out.notes.append(f"limits of joints are data, nothing stops there ({names}); limits='off' is silent")
+        rubbing = [j for j in moving if j.dry_friction]
+        if rubbing and not self.options.smoothing:
+            names = self._few(rubbing)
+            self.out.notes.append(f"dry friction of joints is data and does not act ({names}); friction=0.01 lets it")
+
+    def _few(self, joints: list[Joint]) -> str:
+        names = [self.joints[joint.name] for joint in joints]
+        return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
+
+
+def _cut(law: str, bounds: Range) -> str:
+    """A force or control cut to a range."""
+    low, high = bounds
+    return f"min(max({law}, {low!r}), {high!r})"
+
+
+def _scaled(law: str, total: str, bounds: Range) -> str:
+    """One of several forces, scaled as all are so that their total stays in a range."""
+    low, high = bounds
+    if law == total:
+        return _cut(law, bounds)
+    return f"({law})*where(({total}) > {high!r}, {high!r}/({total}), where(({total}) < {low!r}, {low!r}/({total}), 1))"
 
 
 def _axis(axis: tuple[float, float, float]) -> Any:

@@ -9,12 +9,14 @@ from typing import Any
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, UsageError
+from ..numeric.inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
 from .robot import Options
 from .urdf import read_urdf
 from .xml_text import read_xml
 
 MIMIC = ("independent", "coupling")
+LIMITS = ("note", "off")
 ROTATIONS = ("euler_angles", "euler_parameters")
 
 
@@ -69,9 +71,15 @@ def make_options(given: dict[str, Any]) -> Options:
     for key in given:
         if key not in known:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
-    for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS)):
+    for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
         if key in given and given[key] not in allowed:
-            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}")
+            hint = "; stops do not act yet, limits are data" if given[key] == "stop" else ""
+            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}{hint}")
+    if "check_inertia" in given:
+        word = word_of_check(given["check_inertia"])
+        if word is None:
+            raise UsageError(f"check_inertia={given['check_inertia']!r}: allowed: {', '.join(CHECKS)}, True, False")
+        given = {**given, "check_inertia": word}
     friction = given.get("friction", False)
     if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
         raise UsageError(f"friction={friction!r}: True, or the velocity (rad/s or m/s) below which it is smoothed")

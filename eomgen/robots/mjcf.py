@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingDependencyError, ModelError, UsageError
+from .constructs import notes_of
 from .mjcf_actuators import read_actuators
+from .mjcf_constructs import find_mjcf
 from .mjcf_equalities import read_equalities
 from .mjcf_fields import NOTED
 from .mjcf_files import Lines, scan_files
@@ -38,7 +40,7 @@ def read_mjcf(root: Element, options: Options) -> Robot:
     """
     if options.floating:
         raise UsageError(f"{root.file}: an MJCF file says itself which bodies float; leave floating out")
-    lines = scan_files(root, options.assets)
+    lines, met = scan_files(root, options.assets)
     try:
         import mujoco
     except ImportError:
@@ -56,6 +58,7 @@ def read_mjcf(root: Element, options: Options) -> Robot:
     finally:
         mujoco.set_mju_user_warning(before)
     robot = _Reader(compiled, root, lines).read()
+    robot.notes += notes_of(find_mjcf, met)
     robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in warnings]
     return robot
 
@@ -146,8 +149,10 @@ class _Reader:
         limits: dict[str, float] = {}
         if m.jnt_limited[j] and not self.off("LIMIT", "CONSTRAINT"):
             limits |= dict(zip(("lower", "upper"), numbers(m.jnt_range[j]), strict=True))
+        clamp = None
         if m.jnt_actfrclimited[j]:
-            limits["effort"] = float(np.abs(m.jnt_actfrcrange[j]).max())
+            clamp = float(m.jnt_actfrcrange[j][0]), float(m.jnt_actfrcrange[j][1])
+            limits["effort"] = max(map(abs, clamp))
         return replace(
             joint,
             outer=joint.outer @ back,
@@ -159,13 +164,34 @@ class _Reader:
             stiffness=0.0 if self.off("SPRING") else float(m.jnt_stiffness[j]),
             rest=float(m.qpos_spring[start]),
             initial=q0,
+            clamp=clamp,
         )
 
     # -- what has no counterpart ----------------------------------------------------------------------------------
+    def _touching(self) -> bool:
+        """Whether two geoms of bodies that move against each other may touch."""
+        m = self.m
+        if self.off("CONTACT", "CONSTRAINT"):
+            return False
+        if m.npair:
+            return True
+        kinds = np.unique(np.stack([m.body_weldid[m.geom_bodyid], m.geom_contype, m.geom_conaffinity], 1), axis=0)
+        carrier = m.body_weldid[m.body_parentid[m.body_weldid]]  # of each body: the one its own moves on
+        for k, (body, kind, met) in enumerate(kinds):
+            others, kinds_there, met_there = kinds[k + 1 :].T
+            apart = others != body
+            if not self.off("FILTERPARENT"):  # what moves on another does not touch it, but for the world
+                apart &= ((carrier[others] != body) | (body == 0)) & ((carrier[body] != others) | (others == 0))
+            if (apart & (((kind & met_there) | (kinds_there & met)) != 0)).any():
+                return True
+        return False
+
     def _note_the_rest(self) -> None:
         m, notes = self.m, self.robot.notes
         if m.opt.density or m.opt.viscosity:
             notes.append("left out: the forces of the medium (density, viscosity)")
+        if self._touching():
+            notes.append("left out: contact of geoms")
         if m.body_gravcomp.any():
             notes.append("left out: gravity compensation of bodies (gravcomp)")
         if getattr(m, "nflex", 0):

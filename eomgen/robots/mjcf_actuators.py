@@ -1,12 +1,14 @@
 """Robots, MJCF's actuators and fixed tendons: those that act on joints of one degree -> drives.
 
-A drive of length L = sum c_j q_j has the force f = gain u + b0 + b1 L + b2 L', and pushes c_j f along q_j.
+A drive of length L = sum c_j q_j has the force f = gain u + b0 + b1 L + b2 L', and pushes c_j f along q_j.  As in
+MuJoCo u is cut to ctrlrange, the forces along a tendon are scaled where their sum leaves the tendon's actuatorfrcrange,
+f is cut to forcerange, and what all drives together do along a joint to the joint's actuatorfrcrange.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .robot import Drive, Place
 
@@ -41,12 +43,29 @@ def read_actuators(reader: _Reader) -> None:
             continue
         affine = m.actuator_biastype[k] == _AFFINE_BIAS
         b0, b1, b2 = (float(b) if affine else 0.0 for b in m.actuator_biasprm[k][:3])
-        robot.drives.append(Drive(name, parts, float(m.actuator_gainprm[k][0]), (b0, b1, b2), place))
+        drive = Drive(name, parts, float(m.actuator_gainprm[k][0]), (b0, b1, b2), place)
+        robot.drives.append(replace(drive, **_ranges(reader, k)))
     if left:
         robot.notes.append(f"left out: actuators that do not push along joints by a linear law ({', '.join(left)})")
     if idle:
         robot.notes.append(f"left out: actuators that the file disables ({', '.join(idle)})")
     _tendons(reader)
+
+
+def _ranges(reader: _Reader, k: int) -> dict[str, Any]:
+    """What the control and the force of an actuator are cut to."""
+    m = reader.m
+    control, output = (getattr(m, key, range(m.nu))[k] for key in ("actuator_ctrladr", "actuator_outadr"))
+    found: dict[str, Any] = {}
+    if m.actuator_ctrllimited[control] and not reader.off("CLAMPCTRL"):
+        found["control"] = tuple(map(float, m.actuator_ctrlrange[control]))
+    if m.actuator_forcelimited[output]:
+        found["force"] = tuple(map(float, m.actuator_forcerange[output]))
+    tendon = m.actuator_trnid[k][0]
+    if m.actuator_trntype[k] == _TENDON and m.tendon_actfrclimited[tendon]:
+        found["tendon"] = str(tendon)
+        found["total"] = tuple(map(float, m.tendon_actfrcrange[tendon]))
+    return found
 
 
 def _actuated(reader: _Reader, k: int) -> Parts:

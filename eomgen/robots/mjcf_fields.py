@@ -6,7 +6,7 @@ A field that is not in these tables is one that a later MuJoCo has and nobody he
 from __future__ import annotations
 
 #: Field of MjModel (or of its opt) -> what becomes of it: ``read`` into the model; ``noted`` where it is not zero;
-#: ``data`` and ``unused`` by what docs/robots.md says (limits, clamps; contact); ``derived`` by MuJoCo from others, or
+#: ``data`` and ``unused`` by what docs/robots.md says (limits; contact); ``derived`` by MuJoCo from others, or
 #: an address; ``solver`` of its soft constraints and steps; ``screen`` and ``user`` for show and for the user.
 JOINT_FIELDS = {
     "jnt_type": "read",
@@ -17,7 +17,7 @@ JOINT_FIELDS = {
     "jnt_group": "screen",
     "jnt_plasticadr": "derived",
     "jnt_limited": "data",
-    "jnt_actfrclimited": "data",
+    "jnt_actfrclimited": "read",
     "jnt_actgravcomp": "noted",
     "jnt_solref": "solver",
     "jnt_solimp": "solver",
@@ -27,7 +27,7 @@ JOINT_FIELDS = {
     "jnt_stiffnesspoly": "noted",
     "jnt_springyield": "noted",
     "jnt_range": "data",
-    "jnt_actfrcrange": "data",
+    "jnt_actfrcrange": "read",
     "jnt_margin": "solver",
     "jnt_user": "user",
     "dof_bodyid": "derived",
@@ -57,14 +57,14 @@ TENDON_FIELDS = {
     "tendon_treenum": "derived",
     "tendon_treeid": "derived",
     "tendon_limited": "noted",
-    "tendon_actfrclimited": "data",
+    "tendon_actfrclimited": "read",
     "tendon_width": "screen",
     "tendon_solref_lim": "solver",
     "tendon_solimp_lim": "solver",
     "tendon_solref_fri": "solver",
     "tendon_solimp_fri": "solver",
     "tendon_range": "noted",
-    "tendon_actfrcrange": "data",
+    "tendon_actfrcrange": "read",
     "tendon_margin": "solver",
     "tendon_stiffness": "read",
     "tendon_stiffnesspoly": "noted",
@@ -111,10 +111,10 @@ ACTUATOR_FIELDS = {
     "actuator_group": "read",
     "actuator_user": "user",
     "actuator_plugin": "read",
-    "actuator_forcelimited": "data",
-    "actuator_forcerange": "data",
-    "actuator_ctrllimited": "data",
-    "actuator_ctrlrange": "data",
+    "actuator_forcelimited": "read",
+    "actuator_forcerange": "read",
+    "actuator_ctrllimited": "read",
+    "actuator_ctrlrange": "read",
     "actuator_gear": "read",
     "actuator_acc0": "derived",
     "actuator_length0": "derived",
@@ -161,7 +161,7 @@ FLAGS = {
     "SPRING": "read",
     "DAMPER": "read",
     "GRAVITY": "read",
-    "CLAMPCTRL": "unused",
+    "CLAMPCTRL": "read",
     "WARMSTART": "solver",
     "FILTERPARENT": "unused",
     "ACTUATION": "read",

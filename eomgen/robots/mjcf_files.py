@@ -7,9 +7,12 @@ one of them is looked up first: it must lie inside one folder, and those in XML 
 from __future__ import annotations
 
 import os
+from collections import Counter
 from pathlib import Path
 
 from ..errors import ModelError, Problem
+from .constructs import Met, count_all, is_whole
+from .mjcf_constructs import find_mjcf, path_of
 from .xml_text import Element, read_xml
 
 FILES = 200  #: XML files that a model may be made of
@@ -21,7 +24,7 @@ _SIZES = ("width", "height", "nrow", "ncol")
 Lines = dict[tuple[str, str], tuple[str, int]]
 
 
-def scan_files(root: Element, folder: str | None) -> Lines:
+def scan_files(root: Element, folder: str | None) -> tuple[Lines, Met]:
     """Check every file that a model names.
 
     Parameters
@@ -33,8 +36,10 @@ def scan_files(root: Element, folder: str | None) -> Lines:
 
     Returns
     -------
-    dict
+    lines : dict
         (tag, name) -> file and line of the named elements of all its XML files.
+    met : Counter
+        Elements and attributes of all of them, by their paths in the table of constructs.
 
     Raises
     ------
@@ -47,7 +52,7 @@ def scan_files(root: Element, folder: str | None) -> Lines:
     scan.assets()
     if scan.problems:
         raise ModelError(scan.problems)
-    return scan.lines
+    return scan.lines, scan.met
 
 
 class _Scan:
@@ -58,6 +63,7 @@ class _Scan:
         self.allowed = self.main if folder is None else Path(folder).resolve()
         self.seen: set[Path] = {Path(root.file).resolve()}
         self.lines: Lines = {}
+        self.met: Met = Counter()
         self.problems: list[Problem] = []
         self.named: list[Element] = []  # elements that name a file
         self.made = self.bodies = 0  # bodies by copying; all bodies
@@ -71,15 +77,28 @@ class _Scan:
     def _inside(self, path: Path) -> bool:
         return path == self.allowed or self.allowed in path.parents
 
-    def elements(self, root: Element, copies: int = 1) -> None:
-        """Take in the elements of one XML file, of which MuJoCo makes this many copies."""
-        waiting = [(root, copies)]
-        while waiting:
-            element, above = waiting.pop()
-            made = self._element(element, above)
-            waiting += [(child, made) for child in reversed(element.children)]
+    def elements(self, root: Element, copies: int = 1, inside: str | None = None) -> None:
+        """Take in the elements of one XML file, of which MuJoCo makes this many copies.
 
-    def _element(self, element: Element, copies: int) -> int:
+        ``inside`` is the tag of the element in which an included file stands.
+        """
+        waiting: list[tuple[Element, int, str | None]] = [(root, copies, "")]
+        while waiting:
+            element, above, parent = waiting.pop()
+            here = element.tag
+            if element is root and inside is not None:
+                here = inside  # what is in it stands where the include stands
+            elif parent is not None:
+                path = path_of(parent, element.tag)
+                self.met.update(count_all([(path, element.attributes)]))
+                row = find_mjcf(path)
+                if row is None or is_whole(row):
+                    here = ""
+            made = self._element(element, above, parent)
+            below = here if parent is not None and here else None
+            waiting += [(child, made, below) for child in reversed(element.children)]
+
+    def _element(self, element: Element, copies: int, parent: str | None) -> int:
         """Take in one element; returns the number of copies of what it holds."""
         given = element.attributes
         if "name" in given:
@@ -103,7 +122,7 @@ class _Scan:
                 self.problems.append(element.problem(f"{element.tag}.{key}", message, f"at most {PIXELS:,}"))
         if element.tag == "include" or (element.tag == "model" and "file" in given):
             before = self.bodies
-            self._include(element, copies)
+            self._include(element, copies, parent)
             if element.tag == "model":
                 self.models[given.get("name", Path(given["file"]).stem)] = self.bodies - before
         elif any(key.startswith("file") for key in given):
@@ -128,7 +147,7 @@ class _Scan:
             total *= max(1, _whole(part))
         return total
 
-    def _include(self, element: Element, copies: int) -> None:
+    def _include(self, element: Element, copies: int, parent: str | None) -> None:
         name = element.attributes.get("file", "")
         places = [(self.main / name), (Path(element.file).resolve().parent / name)]
         path = next((p.resolve() for p in places if p.is_file()), places[0].resolve())
@@ -140,7 +159,8 @@ class _Scan:
         if len(self.seen) > FILES:
             raise ModelError([element.problem("include", "too many files", f"at most {FILES}")])
         try:
-            self.elements(read_xml(os.fspath(path)), copies if element.tag == "include" else 1)
+            included = element.tag == "include"
+            self.elements(read_xml(os.fspath(path)), copies if included else 1, parent if included else None)
         except OSError as error:
             message = f"{name!r} cannot be read: {error.strerror}"
             self.problems.append(element.problem(element.tag, message, "the path starts at the model's folder"))

@@ -12,6 +12,7 @@ from .placement import IDENTITY, NOTHING, Inertia, Placement
 from .ties import Tie
 
 Place = tuple[str, int]  # file, line
+Range = tuple[float, float]  # lowest and highest value
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,11 @@ class Options:
         data only.
     snap : float
         Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
+    check_inertia : {'error', 'note', 'off'} or bool
+        What becomes of masses and inertias that no body can have, and of joints that move no mass: refused, noted, or
+        taken in silence.  A robot without any mass is one for kinematics, which is noted.
+    limits : {'note', 'off'}
+        Whether a note says which limits of joints are data only.
     assets : str, optional
         Folder within which an MJCF file may read other files; its own folder by default.
     """
@@ -56,6 +62,8 @@ class Options:
     friction: Any = False
     snap: float = 1e-11
     assets: str | None = None
+    check_inertia: Any = "error"
+    limits: str = "note"
 
     @property
     def smoothing(self) -> float:
@@ -114,6 +122,7 @@ class Joint:
     mimic: Mimic | None = None
     initial: float = 0.0
     start: Placement | None = None  #: of a free joint
+    clamp: Range | None = None  #: range of what all drives together do along it
 
 
 @dataclass(frozen=True)
@@ -131,7 +140,9 @@ class Loop:
 class Drive:
     """A drive along L = sum c_j q_j: the force f = gain u + b0 + b1 L + b2 L' pushes c_j f along q_j.
 
-    ``parts`` holds joints and their c_j; without a name there is no input u.
+    ``parts`` holds joints and their c_j; without a name there is no input u.  ``control`` and ``force`` are the ranges
+    to which u and f are cut; ``tendon`` is the name of the tendon whose drives have a total force in ``total``: beyond
+    it each is scaled by the same factor, before ``force`` cuts it.
     """
 
     name: str
@@ -139,6 +150,10 @@ class Drive:
     gain: float
     bias: tuple[float, float, float]
     place: Place
+    control: Range | None = None
+    force: Range | None = None
+    tendon: str = ""
+    total: Range | None = None
 
 
 @dataclass

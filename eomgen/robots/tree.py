@@ -11,7 +11,7 @@ import numpy as np
 
 from ..describe.names import nearest
 from ..errors import ModelError
-from ..numeric.inertia import fault_of_inertia
+from ..numeric.inertia import fault_of_inertia, inertia_scales
 from .placement import IDENTITY, Inertia, Placement, about, moved, sum_inertias
 from .robot import Joint, Link, Options, Robot
 
@@ -37,6 +37,7 @@ class Bodies:
 
     bodies: dict[str, Body]
     home: dict[str, tuple[str, Placement]]  #: link -> body and frame in it
+    massless: bool = False  #: nothing that moves has a mass: a robot for kinematics
 
 
 def build_bodies(robot: Robot, options: Options) -> Bodies:
@@ -54,7 +55,8 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
         if options.mimic != "independent":
             _check_mimic(robot, joint)
     if robot.problems:
-        _check_inertias(robot)
+        if options.check_inertia == "error":
+            _check_inertias(robot)
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     carried: dict[str, list[Joint]] = {}
     for joint in robot.joints.values():
@@ -89,7 +91,7 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
             "give it joints; the base of a URDF robot floats with floating=True, or --floating",
             (robot.file, 1),
         )
-    _check_masses(robot, found)
+    _check_masses(robot, found, options.check_inertia)
     if robot.problems:
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     return found
@@ -190,15 +192,24 @@ def _check_inertias(robot: Robot) -> None:
     sound = [joint for joint in robot.joints.values() if joint.place[1] not in faulty]
     welded = {end for joint in sound if joint.type == "weld" for end in (joint.parent, joint.child)}
     moved_links = {joint.child for joint in robot.joints.values()}
-    for link in robot.links.values():
-        fault = fault_of_inertia(link.inertia.tensor)
+    places = [link.inertia.com for link in robot.links.values()]
+    places += [joint.outer.position for joint in robot.joints.values()]
+    inertias = [link.inertia for link in robot.links.values()]
+    longest = max((float(np.linalg.norm(place)) for place in places), default=0.0)
+    scales = inertia_scales([i.mass for i in inertias], [i.tensor for i in inertias], longest)
+    for link, scale in zip(robot.links.values(), scales, strict=True):
+        fault = fault_of_inertia(link.inertia.tensor, scale=scale)
         if fault and link.name in moved_links - welded and link.place[1] not in faulty:
             robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
 
 
-def _check_masses(robot: Robot, found: Bodies) -> None:
-    """Note joints of one degree that move nothing, which no force could accelerate by a finite amount."""
+def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
+    """Note joints that move nothing, which no force could accelerate by a finite amount; with ``check`` as a fault.
+
+    A robot without any mass is no slip of the pen: it is one for kinematics, and a note says so.
+    """
     heavy: set[str] = set()
+    idle: list[Joint] = []
     for body in reversed(found.bodies.values()):  # children come after their parents
         inertia = body.inertia()
         if not inertia.is_nothing:
@@ -208,6 +219,18 @@ def _check_masses(robot: Robot, found: Bodies) -> None:
         if body.name in heavy:
             heavy.add(found.home[body.joint.parent][0] if body.joint.parent else GROUND)
         elif body.joint.type != "weld" and not body.joint.armature:
-            message = f"the link {body.joint.child!r} that it moves has no mass, nor has any link on it"
-            remedy = f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{body.joint.name!r}: 0}}"
-            robot.problem(f"joint.{body.joint.name}", message, remedy, body.joint.place)
+            idle.append(body.joint)
+    moving = [body for body in found.bodies.values() if body.joint is not None]
+    found.massless = bool(moving) and all(b.inertia().is_nothing and not b.joint.armature for b in moving if b.joint)
+    if found.massless and check == "error":
+        robot.notes.append("for kinematics only: no link that moves has mass or inertia")
+    elif check == "note" and idle:
+        names = ", ".join(joint.name for joint in reversed(idle))
+        robot.notes.append(f"for kinematics only: joints that move nothing with mass or inertia ({names})")
+    for joint in idle if check == "error" and not found.massless else ():
+        message = f"the link {joint.child!r} that it moves has no mass, nor has any link on it"
+        remedy = (
+            f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
+            "kinematics alone, check_inertia='note' (--check-inertia note)"
+        )
+        robot.problem(f"joint.{joint.name}", message, remedy, joint.place)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from ..errors import ModelError
 from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
 from .robot import Joint, Link, Mimic, Options, Robot
+from .urdf_constructs import note_urdf
 from .xml_text import Element
 
 #: Type of a joint in URDF -> eomgen's.
@@ -27,8 +27,6 @@ TYPES = {
     "floating": "free",
     "planar": "planar",
 }
-#: Elements of a robot without meaning for its motion.
-IGNORED = ("material", "gazebo", "transmission", "ros2_control", "sensor", "mujoco", "drake:collision_filter_group")
 LINKS = 5000  #: links of a robot
 
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.ASCII)
@@ -54,16 +52,12 @@ class _Reader:
             raise ModelError([problem])
         if len(self.root.children) > 20 * LINKS:
             raise ModelError([self.root.problem("robot", "has too many elements", f"at most {20 * LINKS:,}")])
-        skipped: Counter[str] = Counter()
         for element in self.root.children:
             if element.tag == "link":
                 self._link(element)
             elif element.tag == "joint":
                 self._joint(element)
-            elif element.tag not in IGNORED:
-                skipped[element.tag] += 1
-        if skipped:
-            robot.notes.append(f"left out: {', '.join(f'{n} <{tag}>' for tag, n in skipped.items())}")
+        robot.notes += note_urdf(self.root)
         if not robot.links:
             robot.problems.append(self.root.problem("robot", "has no links", "a URDF file has <link> elements"))
         if len(robot.links) > LINKS:

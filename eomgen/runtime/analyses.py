@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..analysis.balanced import Equilibrium
     from ..analysis.linearisation import Linearisation
     from ..analysis.modes import Modes
-    from ..analysis.sensitivities import Sensitivities
+    from ..analysis.sensitivity_result import Sensitivities
     from ..numeric.scales import Array
     from .kernels import Kernels
     from .layout import Layout

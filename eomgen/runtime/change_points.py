@@ -6,12 +6,14 @@ Between stored states the run is followed by Runge-Kutta's method in short steps
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..numeric.rank_limits import PASSED as SINGULAR
+from ..limits.constraints import PASSED as SINGULAR
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -36,10 +38,10 @@ class ChangePoint(NamedTuple):
         return f"t = {self.time:.6g} s, {freedoms} at {shown}{more}"
 
 
-def singular_values(module: Module, t: Array, x: Array) -> Array:
+def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
     """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
     layout = module.layout
-    C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, rows="all"), -1, 0)
+    C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
     J = module.kernels.sizes[0].jacobian(C_q)
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values / np.maximum(values[:, :1], 1e-300))
@@ -64,14 +66,15 @@ def find_change_points(module: Module, t: Array, x: Array, u: Array) -> list[Cha
     rank = module.layout.rank
     if not rank or len(t) < 2:
         return []
-    least = singular_values(module, t, x)[:, rank - 1]
+    led = bool(module.layout.constraint_inputs)
+    least = singular_values(module, t, x, u if led else None)[:, rank - 1]
     padded = np.concatenate([[np.inf], least, [np.inf]])
     dips = np.flatnonzero((least <= padded[:-2]) & (least <= padded[2:]) & (least < DIP * least.max()))
     found: list[ChangePoint] = []
     for k in dips.tolist():
         first, last = max(k - 1, 0), min(k + 1, len(t) - 1)
         times, states = _follow(module, t[first : last + 1], x[:, first], u[:, first : last + 1])
-        point = _closest(module, times, states)
+        point = _closest(module, times, states, partial(_between, t, u) if led else None)
         if point is not None and not (found and abs(point.time - found[-1].time) <= 1e-9 + 1e-6 * abs(point.time)):
             found.append(point)
     return found
@@ -102,12 +105,20 @@ def _follow(module: Module, t: Array, x: Array, u: Array) -> tuple[Array, Array]
     return times, np.array(states).T
 
 
-def _closest(module: Module, times: Array, states: Array) -> ChangePoint | None:
+def _between(t: Array, u: Array, times: Array) -> Array:
+    """Inputs (n_u, k) at times (k,) between those stored."""
+    order = np.argsort(t, kind="stable")
+    return np.array([np.interp(times, t[order], row[order]) for row in u])
+
+
+def _closest(
+    module: Module, times: Array, states: Array, inputs: Callable[[Array], Array] | None
+) -> ChangePoint | None:
     """The state nearest to a loss of rank, if it is one."""
     rank = module.layout.rank
     n = module.n_q
     for _ in range(LEVELS):
-        values = singular_values(module, times, states)
+        values = singular_values(module, times, states, inputs and inputs(times))
         k = int(np.argmin(values[:, rank - 1]))
         first, last = max(k - 1, 0), min(k + 1, len(times) - 1)
         if np.unique(times[first : last + 1]).size < last - first + 1:
@@ -118,7 +129,7 @@ def _closest(module: Module, times: Array, states: Array) -> ChangePoint | None:
             times[first : last + 1], states[:, first : last + 1], between
         )  # fmt: skip
         times = between
-    values = singular_values(module, times, states)
+    values = singular_values(module, times, states, inputs and inputs(times))
     k = int(np.argmin(values[:, rank - 1]))
     if values[k, rank - 1] > SINGULAR:
         return None

@@ -103,13 +103,13 @@ class Dae:
         Rates of multipliers and corrections, which F does not hold, are 0.
         """
         module, layout = self._module, self._layout
-        x = module.x0(t=t) if x is None else module.project(x, t=t)
+        x = module.x0(t=t, u=u) if x is None else module.project(x, t=t, u=u)
         rates = module.rhs(t, x, u=u)
         y, yp = np.zeros(self.n_y), np.zeros(self.n_y)
         y[: layout.n_x], yp[: layout.n_x] = x, rates
         if len(layout.rows):
             q, v, a = x[: layout.n_q], x[layout.n_q :], rates[layout.n_q :]
-            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))[layout.rows]
+            J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, u=u, rows="all"))[layout.rows]
             force = layout.scales.q * module.inverse_dynamics(q, v, a, t=t, u=u)
             l = np.linalg.lstsq(J.T, -force, rcond=None)[0]
             y[layout.n_x : layout.n_x + len(l)] = l / layout.scales.c[layout.rows]
@@ -123,6 +123,7 @@ class Dae:
         inputs: Mapping[str, Any] | None = None,
         *,
         t_eval: Sequence[float] | Array | None = None,
+        events: Any = None,
         rtol: float = 1e-8,
         atol: float = 1e-10,
         **options: Any,
@@ -135,6 +136,9 @@ class Dae:
             As for ``Module.simulate``; an input is a number, a table or a function of t and x.
         t_eval : times in order, optional
             IDA's own steps by default.
+        events : optional
+            As for ``Module.simulate``; IDA's root finding locates them, a reset or an impact starts it anew with
+            consistent values, a terminal event ends the run.
         rtol, atol : float, optional
             Tolerances of coordinates and velocities; multipliers and corrections are not controlled.
         **options
@@ -151,8 +155,10 @@ class Dae:
             scikit-sundae is not installed.
         SimulationError
             IDA gave up.
+        ZenoError
+            Events that reset the state follow each other ever faster.
         """
         from .dae_solution import integrate_dae
 
         tolerances = {"rtol": rtol, "atol": atol}
-        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, tolerances, options)
+        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, events, tolerances, options)

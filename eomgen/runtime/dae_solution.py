@@ -1,27 +1,36 @@
-"""Stage runtime: the differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae)."""
+"""Stage runtime: the differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae).
+
+IDA stops at every event, which its own root finding locates, and at the corners of inputs; it starts anew from there
+with consistent values.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SimulationError
+from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
+from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
 from .integrate import Solution
 from .names import require
 from .recording import record
+from .resets import Resets
 from .signals import Forcing
 from .simulate import find_span, find_state, ordered_times
 
 if TYPE_CHECKING:
+    from .dae import Dae
     from .module import Module
     from .trajectory import Trajectory
 
 UNCONTROLLED = 1e30  #: absolute tolerance of unknowns that the error test leaves out
 STEPS = 1_000_000  #: at most, between two times wanted
+OWN = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: options of IDA that are set here
 
 
 def integrate_dae(
@@ -31,45 +40,193 @@ def integrate_dae(
     parameters: Any,
     inputs: Mapping[str, Any] | None,
     t_eval: Any,
+    events: Any,
     tolerances: Mapping[str, float],
     options: Mapping[str, Any],
 ) -> Trajectory:
     """One run; see :meth:`~.dae.Dae.solve`."""
     ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
+    for name in OWN:
+        if name in options:
+            raise UsageError(f"dae.solve sets {name} of IDA itself; events= takes events as simulate does")
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata["simulation"]["end"]))
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
-    form, n_x = bound.dae, bound.n_x
-    x0 = find_state(bound, initial, start)
-    y, yp = form.initial(x0, start, forcing(start, x0))
-
-    def residual(t: float, y: Array, yp: Array, res: Array) -> None:
-        form.residual(t, y, yp, res, forcing(t, y[:n_x]))
-
-    def jacobian(t: float, y: Array, yp: Array, res: Array, cj: float, JJ: Array) -> None:
-        form.jacobian(t, y, yp, cj, JJ, forcing(t, y[:n_x]))
-
-    atol = np.full(form.n_y, tolerances["atol"])
-    atol[form.algebraic] = UNCONTROLLED
-    algebraic = {"algebraic_idx": form.algebraic.tolist()} if len(form.algebraic) else {}
-    chosen = {"max_num_steps": STEPS, "jacfn": jacobian, **algebraic, **options}
-    solver = ida.IDA(residual, rtol=tolerances["rtol"], atol=atol, **chosen)
+    forcing.begin(start, end)
+    watched = Events(module.layout, events)
+    x0 = find_state(bound, initial, start, forcing)
     times = None if t_eval is None else ordered_times(t_eval, start, end)
-    nodes = np.array([start, end])
-    if times is not None:
-        nodes = np.unique(np.concatenate([nodes, times]))
-        nodes = nodes if end >= start else nodes[::-1]
-        if len(nodes) == 2:  # IDA takes two times for the ends of its own steps
-            nodes = np.insert(nodes, 1, 0.5 * (start + end))
-    found = solver.solve(nodes, y, yp)
-    if not found.success:
-        reached = float(found.t[-1]) if len(found.t) else start
-        raise SimulationError(f"IDA stopped at t = {reached:.6g} s of {end:.6g} s: {found.message}")
-    t, x = np.array(found.t, dtype=float), np.array(found.y, dtype=float)[:, :n_x].T.copy()
-    if times is not None:
-        kept = np.isin(t, times)
-        t, x = t[kept], x[:, kept]
-    counts = {"nfev": int(found.nfev), "njev": int(found.njev)}
-    solution = Solution(t, x, [], [], None, 0, str(found.message), counts, (start, end))
-    return record(bound, forcing, solution, "IDA", dict(tolerances))
+    run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
+    run.travel(x0)
+    warn_of_unknown([event.name for event in run.listed if not event.known])
+    return record(bound, forcing, run.solution(), "IDA", dict(tolerances), watched.names)
+
+
+class _Run:
+    """A run on its way, from one start of IDA to the next."""
+
+    def __init__(
+        self,
+        module: Module,
+        forcing: Forcing,
+        events: Events,
+        span: tuple[float, float],
+        times: Array | None,
+        make: Any,
+        options: Mapping[str, Any],
+    ) -> None:
+        self.module, self.forcing, self.events, self.span, self.times = module, forcing, events, span, times
+        every = [(event, i) for i, event in enumerate(events.listed(module, forcing)) if event.direction != UNWATCHED]
+        self.listed, self.index = [event for event, _ in every], [i for _, i in every]
+        self.names = [events.names[i] for i in self.index]
+        self.left = [event.terminal for event in self.listed]
+        self.stops = [event.action != GO_ON or bool(event.terminal) for event in self.listed]
+        rhs = module.kernels.timed("rhs")
+        self.resets = Resets(self.listed, lambda t, x: rhs(t, x, u=forcing(t, x)), *span)
+        self.make, self.options = make, options
+        self.t: list[Array] = []
+        self.x: list[Array] = []
+        self.t_events: list[list[float]] = [[] for _ in self.listed]
+        self.x_events: list[list[Array]] = [[] for _ in self.listed]
+        self.counts = {"nfev": 0, "njev": 0}
+        self.status, self.message = 0, ""
+
+    def travel(self, x: Array) -> None:
+        """Go on until the run ends."""
+        t, end = self.span
+        corners = self.forcing.corners(t, end)
+        t_before, jumped = t, True
+        x = self._begin(t, x)
+        while not self.status and (t != end or jumped):
+            upto = next((corner for corner in corners if (corner - t) * (end - t) > 0.0), end)
+            if t == end:  # a reset at the very end
+                self._store(np.array([t]), x[:, None], jumped)
+                return
+            t_before = t
+            self.forcing.enter(t, upto)
+            t, x, fired = self._part(t, x, upto, jumped)
+            jumped = False
+            if fired:
+                after = self._happen(t, x, fired)
+                jumped = after is not None and not np.array_equal(after, x)
+                x = x if after is None else after
+            elif t == t_before:
+                raise SimulationError(f"IDA makes no headway at t = {t:.6g} s")
+
+    def _begin(self, t: float, x: Array) -> Array:
+        """The state after events whose value is zero at the start and leaves it in their direction."""
+        fired = []
+        for e, event in enumerate(self.listed):
+            if event(t, x) == 0.0:
+                rate = self.resets.rate(event, t, x)
+                if rate != 0.0 and event.direction * rate >= 0.0:
+                    fired.append(e)
+        after = self._happen(t, x, fired) if fired else None
+        if after is None:
+            return x
+        self._store(np.array([t]), x[:, None], True)
+        return after
+
+    def _part(self, t: float, x: Array, end: float, jumped: bool) -> tuple[float, Array, list[int]]:
+        """Integrate to an event, or to the end of this part; the time and state there, and what happened."""
+        form, forcing, n_x = self.module.dae, self.forcing, self.module.n_x
+        y, yp = form.initial(x, t, forcing(t, x))
+        nodes = np.array([t, end])
+        asked = np.empty(0)
+        if self.times is not None:
+            inside = (self.times - t) * (end - t) > 0.0
+            asked = self.times[inside & ((end - self.times) * (end - t) >= 0.0)]
+            nodes = np.unique(np.concatenate([nodes, asked]))
+            nodes = nodes if end >= t else nodes[::-1]
+            if len(nodes) == 2:  # IDA takes two times for the ends of its own steps
+                nodes = np.insert(nodes, 1, 0.5 * (t + end))
+        solver = self._solver(form)
+        found = solver.solve(nodes, y, yp)
+        self.counts["nfev"] += int(found.nfev)
+        self.counts["njev"] += int(found.njev)
+        if not found.success:
+            reached = float(found.t[-1]) if len(found.t) else t
+            raise SimulationError(f"IDA stopped at t = {reached:.6g} s of {self.span[1]:.6g} s: {found.message}")
+        self.message = str(found.message)
+        times, states = np.array(found.t, dtype=float), np.array(found.y, dtype=float)[:, :n_x].T.copy()
+        at, last, fired = float(times[-1]), states[:, -1], []
+        for row, time, state in zip(*self._rows(found), strict=True):
+            happened = np.flatnonzero(row).tolist()
+            here = np.array(state[:n_x], dtype=float)
+            if any(self.stops[e] for e in happened):
+                at, last, fired = float(time), here, happened
+            else:
+                self._note(float(time), here, happened)
+        if self.times is not None:
+            kept = np.isin(times, asked) | ((times == t) & np.isin(t, self.times))
+            self._store(times[kept], states[:, kept], False)
+        else:
+            self._store(times, states, jumped)
+        return at, last, fired
+
+    @staticmethod
+    def _rows(found: Any) -> tuple[Any, Any, Any]:
+        """Which events happened, when, and the unknowns there."""
+        return ((), (), ()) if found.i_events is None else (found.i_events, found.t_events, found.y_events)
+
+    def _solver(self, form: Dae) -> Any:
+        forcing, n_x, listed = self.forcing, self.module.n_x, self.listed
+
+        def residual(t: float, y: Array, yp: Array, res: Array) -> None:
+            form.residual(t, y, yp, res, forcing(t, y[:n_x]))
+
+        def jacobian(t: float, y: Array, yp: Array, res: Array, cj: float, JJ: Array) -> None:
+            form.jacobian(t, y, yp, cj, JJ, forcing(t, y[:n_x]))
+
+        def values(t: float, y: Array, yp: Array, out: Array) -> None:
+            out[:] = [event(t, np.array(y[:n_x])) for event in listed]
+
+        chosen: dict[str, Any] = {"max_num_steps": STEPS, "jacfn": jacobian, **self.options}
+        if len(form.algebraic):
+            chosen["algebraic_idx"] = form.algebraic.tolist()
+        if listed:
+            values.terminal = self.stops  # type: ignore[attr-defined]
+            values.direction = [event.direction for event in listed]  # type: ignore[attr-defined]
+            chosen |= {"eventsfn": values, "num_events": len(listed)}
+        make, atol = self.make, np.full(form.n_y, float(self.make.keywords["atol"]))
+        atol[form.algebraic] = UNCONTROLLED
+        return make(residual, atol=atol, **chosen)
+
+    def _happen(self, t: float, x: Array, fired: list[int]) -> Array | None:
+        """The state after events; None where it stays."""
+        self._note(t, x, fired)
+        for e in fired:
+            if self.left[e]:
+                self.left[e] -= 1
+                if not self.left[e]:
+                    self.status, self.message = 1, f"event {self.names[e]} ended the run"
+        if self.status:
+            return None
+        changing = [self.index[e] for e in fired if self.listed[e].action != GO_ON]
+        after = self.events.reset(self.module, self.forcing, t, x, changing) if changing else x
+        self.resets.note(t, x, after, fired)
+        return after if changing else None
+
+    def _note(self, t: float, x: Array, fired: list[int]) -> None:
+        for e in fired:
+            self.t_events[e].append(t)
+            self.x_events[e].append(x)
+
+    def _store(self, t: Array, x: Array, jumped: bool) -> None:
+        """Keep the points of a part, without its first where the last one ended there."""
+        last = self.t[-1][-1] if self.t and self.t[-1].size else None
+        skip = int(not jumped and bool(t.size) and last is not None and t[0] == last)
+        self.t.append(t[skip:])
+        self.x.append(x[:, skip:])
+
+    def solution(self) -> Solution:
+        """All of it."""
+        n = self.module.n_x
+        t, x = np.concatenate([np.empty(0), *self.t]), np.concatenate([np.empty((n, 0)), *self.x], axis=1)
+        t_events, x_events = [np.empty(0)] * len(self.events), [np.empty((n, 0))] * len(self.events)
+        for i, times, states in zip(self.index, self.t_events, self.x_events, strict=True):
+            t_events[i], x_events[i] = np.array(times), np.array(states).reshape(-1, n).T
+        reached = max((times[-1] for times in t_events if times.size), default=self.span[1], key=abs)
+        ends = (self.span[0], float(reached) if self.status else self.span[1])
+        return Solution(t, x, t_events, x_events, None, self.status, self.message, self.counts, ends)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 import numpy as np
 
 from ..errors import UsageError, ZenoError
+from ..limits.rounding import TINY
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from .layout import Layout
 from .names import check_names, require_time_and_state, unknown
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
     from .signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
+STOP = 3  #: an integrator stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
-CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, are Zeno's: as in loop.c
 
 
 class Named(list[Array]):
@@ -61,8 +63,8 @@ class Event:
         The run ends when it has happened so often; 0: never.
     direction : {1, -1, 0}
         Rising, falling, both; or UNWATCHED.
-    action : {GO_ON, RESET, WAIT}
-        Whether the model's kernel gives a new state, or an impact does.
+    action : {GO_ON, RESET, WAIT, STOP}
+        Whether the model's kernel gives a new state, or an impact does; STOP in Python's own loops.
     """
 
     def __init__(
@@ -88,8 +90,8 @@ class Event:
         """The value at time t and state x; right after a reset, one on the side to which it led."""
         value = float(self.function(t, x))
         self.known = self.known or value == value
-        if self.left is not None and abs(t - self.left[0]) <= 1e-14 * max(abs(t), 1e-3):
-            return self.left[1] * max(abs(value), 1e-300)
+        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
+            return self.left[1] * max(abs(value), TINY)
         return value
 
 
@@ -157,7 +159,7 @@ class Events:
         kernel = module.kernels.timed("events", nan=True) if self.model else None
         found: list[Event] = []
         for i, event in enumerate(self.model):
-            function = _value_of(kernel, forcing, i)
+            function = _unwatched if event.direction == UNWATCHED else _value_of(kernel, forcing, i)
             found.append(Event(function, self.names[i], event.terminal, event.direction, event.action))
         p = module.p
         for event, formula in self.formulas:
@@ -173,12 +175,12 @@ class Events:
                 for (event, place), value in zip(self.layout.metadata["resets"], values, strict=True):
                     if event == i:
                         after[place] = value
-                after = np.asarray(module.project(after, t=t))
+                after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
             from ..analysis.impact import strike_events
 
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after))
+            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:
@@ -228,6 +230,11 @@ def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
 def _only_in_c(t: float, x: Array) -> float:
     """In place of an event's value until :meth:`Events.listed` binds it; compiled loops evaluate it themselves."""
     raise UsageError("an event by its name or text has a value in a run only; give a function f(t, x) instead")
+
+
+def _unwatched(t: float, x: Array) -> float:
+    """In place of the value of an event that is not watched: SciPy's methods find no zero in it."""
+    return float("nan")
 
 
 def _times(name: str, given: Any) -> int:

@@ -12,10 +12,14 @@ from .layout import KERNELS, Layout
 
 LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
 FLAT = 1e-3  #: sine of the angle between a disc's axle and its plane's normal below which it counts as flat
+LARGE = 1e150  #: a number whose square is beyond double precision
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
-    1: ("the result is not finite", "look for a division by zero, or a root or logarithm of a negative number"),
+    1: (
+        "the result is not finite",
+        "look for an input that is no number, a division by zero, or a root or logarithm of a negative number",
+    ),
     2: (
         "the mass matrix of the degrees of freedom is not positive definite",
         "give the bodies behind the named coordinates mass or inertia",
@@ -38,33 +42,39 @@ WORDS = {
 class Fail:
     """Raises the exception for a failed kernel; what cores call as ``fail(name, status, t, x)``.
 
+    p and u follow where the call was given any.
+
     Parameters
     ----------
     layout : Layout
     culprit : callable, optional
-        (status, t, x) -> words that name what is to blame, or an empty string.
+        (status, t, x, p, u) -> words that name what is to blame, or an empty string.
     poses : callable, optional
-        (q, t=) -> (n_bodies, 4, 4), to tell which discs lie flat.
+        (q, t=, p=) -> (n_bodies, 4, 4), to tell which discs lie flat.
     """
 
     def __init__(
         self,
         layout: Layout,
-        culprit: Callable[[int, float, Array], str] | None = None,
+        culprit: Callable[[int, float, Array, Array | None, Array | None], str] | None = None,
         poses: Callable[..., Array] | None = None,
     ) -> None:
         self.layout = layout
         self.culprit = culprit
         self.poses = poses
 
-    def trouble(self, x: Array, t: float = 0.0) -> tuple[str, str] | None:
+    def trouble(self, x: Array, t: float = 0.0, p: Array | None = None) -> tuple[str, str] | None:
         """What is wrong at a state with a rolling disc or with how a rotation is described, and the remedy."""
-        return flat_disc(self.layout, x, t, self.poses) or rotation_trouble(self.layout, x)
+        return flat_disc(self.layout, x, t, p, self.poses) or rotation_trouble(self.layout, x)
 
-    def __call__(self, name: str, status: int, t: float, x: Array) -> None:
-        raise self.exception(name, status, t, x)
+    def __call__(
+        self, name: str, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
+    ) -> None:
+        raise self.exception(name, status, t, x, p, u)
 
-    def exception(self, name: str, status: int, t: float, x: Array) -> EvaluationError:
+    def exception(
+        self, name: str, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
+    ) -> EvaluationError:
         """The exception, not raised."""
         what, remedy = WORDS.get(status, (f"the kernel returned status {status}", "this is a defect of eomgen"))
         names = self._names(name)
@@ -78,10 +88,17 @@ class Fail:
         elif names and (trouble := no_rotation(self.layout, x)):
             what, remedy = trouble
             status = 1
-        elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t)):
+        elif status == 2 and (idle := self.layout.metadata.get("no_inertia")):
+            what, remedy = f"the model is one for kinematics only: {idle}", "give those bodies mass or inertia"
+        elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
+        elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE]):
+            blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif self.culprit is not None and names:
-            found = self.culprit(status, t, x)
+            if status == 5 and (found := self.culprit(1, t, x, p, u)):
+                status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
+            else:
+                found = self.culprit(status, t, x, p, u)
             blame = f": {found}" if found else ""
         error = STATUS.get(status, EvaluationError)
         return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
@@ -100,12 +117,14 @@ def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     return None
 
 
-def flat_disc(layout: Layout, x: Array, t: float, poses: Callable[..., Array] | None) -> tuple[str, str] | None:
+def flat_disc(
+    layout: Layout, x: Array, t: float, p: Array | None, poses: Callable[..., Array] | None
+) -> tuple[str, str] | None:
     """A rolling disc that lies flat at a state, and the remedy; None if none does."""
     discs = layout.metadata.get("rolling_discs", ())
     if not discs or poses is None or len(x) < layout.n_q:
         return None
-    turns = np.concatenate([poses(x[: layout.n_q], t=t)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
+    turns = np.concatenate([poses(x[: layout.n_q], t=t, p=p)[:, :3, :3], np.eye(3)[None]])  # the last is that of ground
     for name, wheel, axle, plane, normal in discs:
         across = np.cross(turns[wheel] @ axle, turns[plane] @ normal)
         if np.linalg.norm(across) < FLAT:

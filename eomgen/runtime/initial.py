@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError, UsageError
+from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
 from ..numeric.closure import Equations, System, close, closed
 from ..numeric.continuation import follow, follow_time
@@ -28,11 +29,6 @@ from .names import UnknownNameError, unknown
 
 if TYPE_CHECKING:
     from .module import Module
-
-INDEPENDENT = 1e-6  #: a further row counts when it keeps this part of its length after the others are taken out
-STILL = 3e-5  #: share of a motion below which a coordinate stands still; closed positions are known to its square
-STAYS = 1e-12  #: scaled residual below which a position is closed at another time as well
-SAME = 1e-6  #: scaled distance below which two positions are one
 
 
 class Given(NamedTuple):
@@ -168,7 +164,7 @@ class Initial:
 
     def later(self) -> Array | None:
         """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""
-        if not self.t or largest(self.scales.residual(self.position(self.layout.q_reference)[0])) <= STAYS:
+        if not self.t or largest(self.scales.residual(self.position(self.layout.q_reference)[0])) <= SETTLED:
             return None
         first = Initial(self.kernels).reference()
         try:
@@ -247,7 +243,7 @@ class Initial:
             abs((x + np.pi) % (2 * np.pi) - np.pi) if kind != "length" else abs(x)
             for x, kind in zip(self.place.distance(a, b), kinds, strict=True)
         ]
-        return largest(np.array(gap)) > SAME
+        return largest(np.array(gap)) > MEASURED
 
     def side(self, q: Array) -> float:
         """det(J_d): its sign tells the branches of a position apart, 0 is a dead centre."""
@@ -285,7 +281,7 @@ class Initial:
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
             row = self._row(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
-            if still and abs(row @ driven) < 1e-12 and abs(value / scale) > 1e-8:
+            if still and abs(row @ driven) < UNMOVED and abs(value / scale) > SHORT:
                 moves = np.linalg.norm(basis, axis=0)
                 ordered = dict.fromkeys([*layout.independent, *np.argsort(-moves, kind="stable")])
                 others = [layout.v[i] for i in ordered if moves[i] > 0.1]
@@ -352,7 +348,7 @@ class Initial:
                 left = row - added.T @ (added @ row)
                 left -= added.T @ (added @ left)
                 size = np.linalg.norm(left)
-                if not (length > 0.0 and size > INDEPENDENT * length):
+                if not (length > UNMOVED and size > INDEPENDENT * length):
                     break
                 added = np.vstack([added, left / size])
             else:

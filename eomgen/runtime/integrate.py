@@ -12,9 +12,10 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .events import CROWD, CROWDED, GO_ON, WAIT, Event, Events
+from .events import GO_ON, Event
 from .names import require, unknown
 from .pace import Pace, watch_steps
+from .resets import Resets
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
@@ -121,6 +122,7 @@ def integrate(
     options: dict[str, Any],
     pace: Pace,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
+    enter: Callable[[float, float], None] | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
 
@@ -128,6 +130,8 @@ def integrate(
     ------
     Crawling
         The steps lead nowhere, as `pace` judges.
+    ZenoError
+        Resets follow each other ever faster, or lead nowhere.
     Interrupted
         Ctrl-C.
     """
@@ -139,11 +143,13 @@ def integrate(
     pieces: list[Any] = []
     counts = {"nfev": 0, "njev": 0, "nlu": 0}
     x, k, start, jumped = x0, 0, nodes[0], True
-    last_reset, crowded, resets = np.inf, 0, 0
+    resets = Resets(events, rhs, nodes[0], nodes[-1])
     while True:
         span, last = (start, nodes[k + 1]), k == len(nodes) - 2
+        if enter is not None:
+            enter(nodes[k], nodes[k + 1])
         asked = None if t_eval is None else _between(t_eval, span, last)
-        if asked is not None and resets and asked.size and asked[0] == start:  # stored before the reset
+        if asked is not None and resets.count and asked.size and asked[0] == start:  # stored before the reset
             asked = asked[1:]
         first = (
             {} if "first_step" not in options else {"first_step": min(options["first_step"], abs(span[1] - span[0]))}
@@ -191,22 +197,13 @@ def integrate(
         if fired and reset is not None:
             before = x_events[fired[0]][-1][:, -1]
             x = reset(ended, before, fired)
-            resets += 1
-            crowded = crowded + 1 if abs(ended - last_reset) < CROWDED * abs(nodes[-1] - nodes[0]) else 0
-            last_reset, start = ended, ended
-            for e in fired:
-                came, goes = (_rate(events[e], rhs, ended, state, nodes[-1] - nodes[0]) for state in (before, x))
-                stuck = not abs(goes) > 1e-9 * abs(came) or (events[e].action == WAIT and goes < 0.0)
-                if stuck or events[e].direction * came < 0.0:  # the zero it just left, again
-                    crowded = CROWD
-                events[e].left = (ended, float(np.sign(goes)))
-            if crowded >= CROWD or start == nodes[-1]:
+            resets.note(ended, before, x, fired)
+            start = ended
+            if start == nodes[-1]:
                 part.status = 0
                 break
         else:
             x, k, start = y[:, -1], k + 1, nodes[k + 1]
-    if crowded >= max(CROWD, 2 * len(events)):
-        raise Events.crowded_near(start, resets, [event.name for event in events if event.action != GO_ON])
     joined = (
         pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
     )
@@ -253,13 +250,6 @@ def _cut_short(
         counts,
         (start, trail[-1][0]),
     )
-
-
-def _rate(event: Event, rhs: Callable[[float, Array], Array], t: float, x: Array, span: float) -> float:
-    """How fast an event's value changes along the motion, in the direction of the run."""
-    h = 1e-8 * span
-    event.left = None
-    return float((event(t + h, x + h * np.asarray(rhs(t, x))) - event(t, x)) / abs(h))
 
 
 def _between(t_eval: Array, span: tuple[float, float], last: bool) -> Array:

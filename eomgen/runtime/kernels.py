@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..numeric.definite import SINGULAR, correlated
+from ..limits.inertia import SINGULAR
+from ..numeric.definite import correlated
 from ..numeric.scales import Array, Scales
 from .failure import Fail
 from .layout import Layout
@@ -94,22 +95,16 @@ class Kernels:
             return Missing(name, f"{message}; compile again with kernels=None for all, or name it in kernels")
         return maker(name, self.context, self.layout.shape(name), self.fail, nan, UsageError)
 
-    def _poses(self, q: Array, t: float) -> Array:
-        return self.state("poses", nan=True)(q, t=t)
+    def _poses(self, q: Array, t: float, p: Array | None = None) -> Array:
+        return self.state("poses", nan=True)(q, t=t, p=p)
 
-    def _culprit(self, status: int, t: float, x: Array) -> str:
-        """Names what a failure at a state is due to, as far as it can be told."""
+    def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
+        """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
         layout, q = self.layout, x[: self.layout.n_q]
-        if status == 1 and layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
-            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t)
-            bad = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
-            return (
-                f"the loads of {bad} are not (ends that meet or lie inside the cylinder, or a law outside its domain)"
-                if bad
-                else ""
-            )
+        if status == 1:
+            return self._not_finite(t, x, p, u)
         if status == 2:
-            M = self.state("embedded_mass_matrix", nan=True)(q, t=t)
+            M = self.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
@@ -119,15 +114,35 @@ class Kernels:
             moved = zip(layout.independent, weights, strict=True)
             names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
             moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
-            return f"moving {moving} meets no inertia (smallest eigenvalue {values[0]:.2g})"
+            size = "negative" if values[0] < -SINGULAR else "no"
+            return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
         if status == 3:
-            e = self.state("constraints", nan=True)(q, t=t)
+            e = self.state("constraints", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(e).all() or not e.size:
                 return ""
             worst = int(np.abs(layout.scales.residual(e)).argmax())
             return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
         if status == 4:
             return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
+        return ""
+
+    def _not_finite(self, t: float, x: Array, p: Array | None, u: Array | None) -> str:
+        """Names what makes a result that is no number: inputs, loads of elements, the mass matrix."""
+        layout = self.layout
+        inputs = self.context.u if u is None else u
+        bad = [name for name, value in zip(layout.u, inputs, strict=True) if not np.isfinite(value).all()]
+        if bad:
+            return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
+        if layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
+            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
+            loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
+            if loads:
+                why = "ends that meet or lie inside the cylinder, or a law outside its domain"
+                return f"the loads of {loads} are not ({why})"
+        if "mass_matrix" in self.core.names and x.size >= layout.n_q:
+            M = self.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
+            if not np.isfinite(M).all():
+                return "the mass matrix is not (a mass, an inertia or a length outside the domain of its law)"
         return ""
 
 
@@ -184,6 +199,44 @@ class Rows:
         if out is None:
             return result
         return _write(out, result)
+
+
+class Projection:
+    """The projection, whose second argument is the time: the constraints of drivers move with it."""
+
+    def __init__(self, kernel: State) -> None:
+        self.kernel = kernel
+
+    @property
+    def failure(self) -> tuple[int, float, Array] | None:
+        """Status, time and state of the last failure that was returned as NaN."""
+        return self.kernel.failure
+
+    def __call__(
+        self,
+        x: ArrayLike,
+        t: ArrayLike = 0.0,
+        p: ArrayLike | None = None,
+        u: ArrayLike | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """The nearest state on the constraints.
+
+        Parameters
+        ----------
+        x : (n_x,) or (n_x, k) array
+        t : float or (k,) array
+            Time (s).
+        p, u : arrays, optional
+            Parameters (n_p,) and inputs, (n_u,) or (n_u, k); those bound by default.
+        out : array, optional
+            Where the result goes.
+
+        Returns
+        -------
+        (n_x,) or (n_x, k) array
+        """
+        return self.kernel(x, p=p, u=u, out=out, t=t)
 
 
 class Constant:

@@ -71,7 +71,15 @@ class Layout:
         self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
         self.n_events: int = data.get("n_events", 0)
         self.n_resets: int = data.get("n_resets", 0)
+        self.n_strike: int = data.get("n_strike", 0)
         self.n_e = len(self.fragile_forces)
+        #: inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order
+        self.input_rates: dict[str, list[tuple[str, int]]] = {
+            name: [(str(rate), int(times)) for rate, times in rates]
+            for name, rates in data.get("input_rates", {}).items()
+        }
+        #: places in u of the inputs on which constraints depend
+        self.constraint_inputs = [self.u.index(name) for name in data.get("constraint_inputs", ())]
         self.independent = np.array(data.get("independent", range(self.n_v)), dtype=np.intp)
         self.rows = np.array(data.get("independent_rows", range(self.n_c)), dtype=np.intp)
         self.rank = self.n_v - self.n_dof
@@ -135,6 +143,7 @@ class Layout:
         """Length of the vector x a kernel takes."""
         motion, dae = self.n_q + 2 * self.n_v, 2 * self.n_dae
         sizes = {"q": self.n_q, "x": self.n_x, "motion": motion, "none": 0, "dae": dae, "dae_cj": dae + 1}
+        sizes["strike"] = motion + self.n_c + self.n_events
         return sizes.get(KERNELS[kernel][0], 3 * self.n_dof + self.n_q)
 
     def shape(self, kernel: str) -> tuple[int, ...]:
@@ -144,6 +153,8 @@ class Layout:
             "n_v+n_c": self.n_v + self.n_c,
             "n_centroidal": self.n_com * (self.n_v + 6),
             "n_assembly": self.n_h + self.n_c + 2 * self.n_k,
+            "n_events+n_resets": self.n_events + self.n_resets,
+            "n_x+1+n_u+n_p": self.n_x + 1 + self.n_u + self.n_p,
             "n_x+n_u+n_p": self.n_x + self.n_u + self.n_p,
             "n_motion+n_u+n_p": self.n_x + self.n_v + self.n_u + self.n_p,
         }
@@ -192,7 +203,11 @@ class Layout:
         shown = changed or [f"{name} = {x:.6g}" for name, x, _ in named]
         head = "the constants that follow from the parameters are not finite"
         which = " (changed from their declared values)" if changed else ""
-        return f"{head} with {', '.join(shown)}{which}; look for a division by zero, a root or an overflow in a law"
+        masses = self.metadata.get("masses", {})
+        nought = [f"{name} is the mass of body {masses[name]!r}" for name, x, _ in named if name in masses and x == 0.0]
+        cause = f": {', '.join(nought)}" if nought else ""
+        remedy = "look for a mass, an inertia or a length of 0, a root of a negative number or an overflow"
+        return f"{head} with {', '.join(shown)}{which}{cause}; {remedy}"
 
     def _check_masses(self, what: str, names: Sequence[str], values: Array) -> None:
         """Refuse a negative value of a parameter that is a body's mass."""
@@ -256,5 +271,7 @@ KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
     "events": ("x", ("n_events",)),
     "resets": ("x", ("n_resets",)),
     "event_slopes": ("x", ("n_events", "n_x")),
+    "event_derivatives": ("x", ("n_events+n_resets", "n_x+1+n_u+n_p")),
+    "strike_derivatives": ("strike", ("n_strike", "n_x+1+n_u+n_p")),
     "scales": ("none", ("n_v+n_c",)),
 }

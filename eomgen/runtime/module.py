@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from .analyses import Analyses
 from .assembled import Assembled
 from .forms import Forms
-from .kernels import Kernels, Rows
+from .kernels import Kernels, Projection, Rows
 from .kinematic_analyses import KinematicAnalyses
 from .layout import Layout
 from .momenta import Momenta
@@ -88,7 +88,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
     mass_matrix: State
     embedded_mass_matrix: State
     energy: State
-    project: State
+    project: Projection
     poses: State
     inverse_dynamics: Motion
     constraints: Rows
@@ -122,7 +122,8 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         self.bias, self.outputs = kernels.timed("bias"), kernels.timed("outputs")
         self.mass_matrix = kernels.state("mass_matrix")
         self.embedded_mass_matrix = kernels.state("embedded_mass_matrix")
-        self.energy, self.project, self.poses = (kernels.state(name) for name in ("energy", "project", "poses"))
+        self.energy, self.poses = kernels.state("energy"), kernels.state("poses")
+        self.project = Projection(kernels.state("project"))
         self.inverse_dynamics = kernels.motion("inverse_dynamics")
         self.constraints, self.constraint_jacobian = kernels.constraints, kernels.constraint_jacobian
         self.velocity_constraints = kernels.velocity_constraints
@@ -342,6 +343,11 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         -------
         (n_x,) array
             The state at t + h; loops drift at the order of the step, see :meth:`project`.
+
+        Raises
+        ------
+        UsageError
+            Events of the model reset its state, which a step does not watch.
         """
         from .steppers import march
 

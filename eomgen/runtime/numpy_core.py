@@ -100,7 +100,7 @@ class NumpyCore:
         shape : tuple of int
             Shape of the result for one state.
         fail : callable
-            Called as ``fail(name, status, t, x)`` when the kernel fails; it must raise.
+            Called as ``fail(name, status, t, x)`` when the kernel fails, then p and u if any was given; it must raise.
         nan : bool
             Fill the result with NaN at a recoverable failure and record it in ``failure`` instead.
         error : type
@@ -159,6 +159,7 @@ class NumpyKernel:
         c = self.context.c
         if p is not None:
             c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
+        given = () if p is None and u is None else (p,)
         force = self.context.u if u is None else _real(u, "u", self.error)
         if force.shape not in ((layout.n_u,), (layout.n_u, *x.shape[1:])):
             raise self.error(
@@ -172,20 +173,22 @@ class NumpyKernel:
             _check_out(out, expected, self.name, self.error)
         with np.errstate(all="ignore"):
             if x.ndim == 1 or self.vectorised:
-                result = self._batch(t, x, force, c, expected)
+                result = self._batch(t, x, force, c, expected, given)
             else:
                 result = np.empty(expected)
                 for j in range(x.shape[1]):
                     column = force if force.ndim == 1 else force[:, j]
-                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c)
+                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c, given)
         if out is None:
             return result
         out[...] = result
         return out
 
-    def _batch(self, t: Array, x: Array, u: Array, c: Array, expected: tuple[int, ...]) -> Array:
+    def _batch(
+        self, t: Array, x: Array, u: Array, c: Array, expected: tuple[int, ...], given: tuple[Any, ...]
+    ) -> Array:
         if x.ndim == 1:
-            return self._single(t, x, u, c)
+            return self._single(t, x, u, c, given)
         try:
             result = np.asarray(self.call(t, x, u, c), dtype=float).reshape(expected)
         except EvaluationError:
@@ -194,10 +197,10 @@ class NumpyKernel:
             for j in range(x.shape[1]):  # one by one, to find out which and why
                 if not np.isfinite(result[..., j]).all():
                     column = u if u.ndim == 1 else u[:, j]
-                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c)
+                    result[..., j] = self._single(t[j] if t.ndim else t, x[:, j], column, c, given)
         return result
 
-    def _single(self, t: Any, x: Array, u: Array, c: Array) -> Array:
+    def _single(self, t: Any, x: Array, u: Array, c: Array, given: tuple[Any, ...]) -> Array:
         time = float(t)
         try:
             result = np.asarray(self.call(time, x, u, c), dtype=float).reshape(self.shape)
@@ -207,7 +210,7 @@ class NumpyKernel:
         if status:
             result = np.full(self.shape, np.nan)
             if not self.nan:
-                self.fail(self.name, status, time, np.array(x))
+                self.fail(self.name, status, time, np.array(x), *given, *([np.array(u)] if given else []))
             self.failure = (status, time, np.array(x))
         return result
 

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import SingularMassMatrixError
+from ..limits.inertia import SINGULAR
 from ..numeric import embedded, projection
-from ..numeric.definite import SINGULAR, correlated
+from ..numeric.definite import correlated
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.scales import Array, GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian

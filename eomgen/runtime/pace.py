@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.runs import NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from .failure import place
 
 WINDOW = 200  #: steps judged together
-SHORT = 5e-9  #: mean step relative to the span below which a run crawls
-STILL = 1e-4  #: change of the state in a window, relative to the largest yet, below which nothing happens
 MANY = 100_000  #: steps left that a run may take at any pace
 REMEDY = (
     "look for a force that jumps (smooth it), a singular position, or motions far faster than the run is long (try an "
@@ -113,7 +112,7 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
     t, x = crawl.t, crawl.x
     found, words = 0.0, ""
     sizes = np.fmax(np.broadcast_to(atol, x.shape), 10.0 * crawl.step * np.abs(np.array(rhs(t, x))))
-    sizes = np.fmax(sizes, 1e-12 * np.abs(x))
+    sizes = np.fmax(sizes, NOTICED * np.abs(x))
     for j, size in enumerate(sizes):
         low, high = x.copy(), x.copy()
         low[j] -= size
@@ -123,7 +122,7 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
             continue
         slope = change / (2 * size)
         i = int(slope.argmax())
-        if slope[i] > max(found, 1e-2 / crawl.step):
+        if slope[i] > max(found, STEEP / crawl.step):
             found = slope[i]
             words = f"the rate of {names[i]} changes by {change[i]:.3g} where {names[j]} changes by {2 * size:.1g}"
     return words

@@ -126,7 +126,7 @@ def record(
     ProjectionError
         A stored state cannot be brought onto the constraints.
     """
-    residuals, x = project(module, solution.t, solution.x)
+    residuals, x = project(module, solution.t, solution.x, forcing)
     header: dict[str, Any] = {
         **describe(module),
         "method": method,
@@ -141,13 +141,15 @@ def record(
     }
     columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
     header["units"] = _units(module.layout)
-    events = [project(module, t, found)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)]
+    events = [
+        project(module, t, found, forcing)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)
+    ]
     dense = solution.dense
     sample: Callable[[Array], Trajectory] | None = None
     if dense is not None:
 
         def sample(t: Array) -> Trajectory:
-            found, states = project(module, t, dense(t))
+            found, states = project(module, t, dense(t), forcing)
             head = header | {"residuals": found._asdict()}
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
@@ -187,14 +189,20 @@ def _described(layout: Layout) -> dict[str, Any]:
     }
 
 
-def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
-    """Projected states (n_x, k), and how far the raw ones were off."""
+def project(module: Module, t: Array, raw: Array, forcing: Forcing | None = None) -> tuple[Residuals, Array]:
+    """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then."""
     n = module.n_q
     if not t.size or not (module.n_rows or module.layout.space):
         return Residuals(), raw
-    x = module.project(raw, t=t)
+    led = forcing is not None and forcing.constrained
+    u = forcing.sample(t, raw) if led and forcing is not None else None
+    x = module.project(raw, t=t, u=u)
     if not module.n_rows:
         return Residuals(), x
+    here = u
+    if led and forcing is not None and forcing.feedback:
+        here = forcing.sample(t, x)
+        x = module.project(x, t=t, u=here)
     position = module.constraints.every
     velocity = module.kernels.state("velocity_constraints")
     correction = np.abs(x - raw)
@@ -202,10 +210,10 @@ def project(module: Module, t: Array, raw: Array) -> tuple[Residuals, Array]:
         e = raw[i : i + 4]
         correction[i : i + 4] = np.abs(x[i : i + 4] - e / np.sqrt((e * e).sum(axis=0)))
     return Residuals(
-        raw_position=largest(position(raw[:n], t=t)),
-        raw_velocity=largest(velocity(raw, t=t)),
-        position=largest(position(x[:n], t=t)),
-        velocity=largest(velocity(x, t=t)),
+        raw_position=largest(position(raw[:n], t=t, u=u)),
+        raw_velocity=largest(velocity(raw, t=t, u=u)),
+        position=largest(position(x[:n], t=t, u=here)),
+        velocity=largest(velocity(x, t=t, u=here)),
         correction_position=float(correction[:n].max()),
         correction_velocity=float(correction[n:].max()),
     ), x

@@ -76,7 +76,10 @@ class Run:
 
     def cause(self) -> EvaluationError | None:
         """The last failure of a kernel as an exception."""
-        return None if self.last is None else self.module.kernels.fail.exception(*self.last)
+        if self.last is None:
+            return None
+        u = self.forcing(*self.last[2:]) if self.forcing else None
+        return self.module.kernels.fail.exception(*self.last, None, u)
 
     def troubled(self, t: float, x: Array) -> bool:
         """Whether a state is at a singularity that can be named."""

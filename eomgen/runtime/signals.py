@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, require_time_and_state, unknown
+from .signal_rates import TableRate, derive, fill_rates, jumps, pieces_of, require_smooth
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -72,6 +74,22 @@ class Signal:
         c = self.coefficients[k]
         return (c[..., 0] + s * (c[..., 1] + s * (c[..., 2] + s * c[..., 3])))[()]
 
+    def beside(self, t: Any, at: Any) -> Any:
+        """The value at t of the piece that holds at time ``at``."""
+        return self(at if self.order == 0 and self.corners else t)
+
+    def derivative(self) -> TableRate:
+        """The rate between the jumps of the value."""
+        return TableRate(self.times, self._pieces, self.corners).derivative()
+
+    def jumps(self, order: int) -> Array:
+        """Times at which the derivative of an order jumps; 0: the value."""
+        return jumps(self.times, self._pieces, self.values, order)
+
+    @property
+    def _pieces(self) -> Array:
+        return pieces_of(self.times, self.values, self.coefficients if self.order == 3 else None, self.order)
+
     @cached_property
     def coefficients(self) -> Array:
         """Rows (k, 4) of value, slope, half the curvature and a sixth of the third derivative at each time."""
@@ -94,7 +112,7 @@ class Signal:
             return np.asarray(self.times[1:][np.diff(self.values) != 0.0])
         rates = np.concatenate([[0.0], np.diff(self.values) / np.diff(self.times), [0.0]])
         size = np.abs(rates).max()
-        return np.asarray(self.times[np.abs(np.diff(rates)) > 1e-9 * size])
+        return np.asarray(self.times[np.abs(np.diff(rates)) > CONTINUOUS * size])
 
     def encode(self) -> tuple[int, Array, Array]:
         """Order, times and values as the compiled loop reads them."""
@@ -143,46 +161,85 @@ class Forcing:
         if not isinstance(given, Mapping):
             raise UsageError(f"inputs must be a mapping of names, not {type(given).__name__}")
         check_names("input", given, layout.u)
+        self.layout = layout
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
         self.feedback = self.foreign = False
         self.formulas: dict[int, Formula | DeclaredSignal] = {}
+        values = {name: self._read(name, value) for name, value in given.items()}
+        self.derived = fill_rates(layout, values, derive)
+        for name, (_, _, value) in self.derived.items():
+            values[name] = value
         for name, tape in layout.metadata.get("signals", {}).items():
-            if name not in given:
-                self.formulas[layout.u.index(name)] = declared = DeclaredSignal(tape)
-                self.feedback = self.feedback or declared.depends_on_state
-        for name, value in given.items():
+            if name not in values:
+                values[name] = DeclaredSignal(tape, layout.metadata.get("signal_slopes", {})[name])
+        for name, value in values.items():
             index = layout.u.index(name)
-            if isinstance(value, Signal):
-                self.varying[index] = value
-            elif callable(value):
-                require_time_and_state(f"input {name}: its function", value)
-                self.varying[index] = value
-                self.feedback = self.foreign = True
-            elif is_formula(value):
-                self.formulas[index] = formula = Formula(layout, value, f"input {name}")
-                self.feedback = self.feedback or formula.depends_on_state
-            elif isinstance(value, (tuple, list)) and len(value) == 2 and np.ndim(value[0]) > 0:
-                try:
-                    self.varying[index] = Signal(*value)
-                except UsageError as error:
-                    raise UsageError(f"input {name}: {error}") from None
-            elif np.ndim(value) == 0:
-                self.constants[name] = number(f"input {name}", value)
+            if isinstance(value, Formula | DeclaredSignal):
+                self.formulas[index] = value
+                self.feedback = self.feedback or value.depends_on_state
+            elif isinstance(value, float):
+                self.constants[name] = value
             else:
-                raise UsageError(
-                    f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
-                    f"f(t, x), not {value!r}"
-                )
-        self.base = np.zeros(layout.n_u)
+                self.varying[index] = value
+                if not isinstance(value, Signal | TableRate):
+                    self.feedback = self.foreign = True
+        #: whether constraints depend on inputs that vary
+        self.constrained = not {*self.varying, *self.formulas}.isdisjoint(layout.constraint_inputs)
+        self.within: tuple[float, float] | None = None  #: first and last number in the part between two corners
+        self.span: tuple[float, float] | None = None
+        self.base, self.parameters = np.zeros(layout.n_u), np.zeros(layout.n_p)
         self.names = layout.u
         self.lapse: Lapse | None = None
 
+    def _read(self, name: str, value: Any) -> Any:
+        """What a user gives as a number, a Signal, a Formula or a function."""
+        if isinstance(value, Signal):
+            return value
+        if callable(value):
+            require_time_and_state(f"input {name}: its function", value)
+            return value
+        if is_formula(value):
+            return Formula(self.layout, value, f"input {name}")
+        if isinstance(value, (tuple, list)) and len(value) == 2 and np.ndim(value[0]) > 0:
+            try:
+                return Signal(*value)
+            except UsageError as error:
+                raise UsageError(f"input {name}: {error}") from None
+        if np.ndim(value) == 0:
+            return number(f"input {name}", value)
+        raise UsageError(
+            f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
+            f"f(t, x), not {value!r}"
+        )
+
+    def begin(self, start: float, end: float) -> None:
+        """Take the times of a run, over which tables must be as smooth as the equations need them.
+
+        Raises
+        ------
+        UsageError
+            A table jumps where its rate is needed, or its rate where the rate of that is.
+        """
+        self.span = (start, end)
+        self.enter(start, end)
+        require_smooth(self, start, end)
+
+    def enter(self, start: float, end: float) -> None:
+        """Go on with the part of a run between two corners: at its ends tables have the piece inside it."""
+        self.within = _inside(start, end)
+
     def attach(self, module: Any) -> None:
         """Take the values that a module binds: its inputs where none are given, its parameters in expressions."""
-        self.base = module.u
+        self.base, self.parameters = module.u, module.p
         for index, formula in self.formulas.items():
             self.varying[index] = formula.function(module.p)
+
+    @property
+    def state_dependent(self) -> list[int]:
+        """Places in u of the inputs whose rates are inputs too and that depend on the state."""
+        bases = {self.layout.u.index(name) for name, _, _ in self.derived.values()}
+        return [i for i, formula in self.formulas.items() if i in bases and formula.depends_on_state]
 
     @property
     def stepwise(self) -> bool:
@@ -194,7 +251,9 @@ class Forcing:
         """The inputs that vary, as the compiled loop takes them."""
         if not self:
             return []
-        tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal)]
+        tables: list[tuple[Any, ...]] = [
+            (i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal | TableRate)
+        ]
         for i, formula in self.formulas.items():
             tables.append((i, formula.tape if isinstance(formula, DeclaredSignal) else record_tape([formula])))
         return tables
@@ -211,9 +270,11 @@ class Forcing:
     def __call__(self, t: float, x: Array) -> Array:
         """u (n_u,) at time t and state x."""
         u = self.base.copy()
+        inside = t if self.within is None else min(max(t, self.within[0]), self.within[1])
         for index, signal in self.varying.items():
             try:
-                value = signal(t, x)
+                beside = inside != t and isinstance(signal, Signal | TableRate)
+                value = signal.beside(t, inside) if beside else signal(t, x)  # type: ignore[attr-defined]
             except Exception as error:
                 error.add_note(f"raised by the function of input {self.names[index]}, called as f({t:.6g}, x)")
                 raise
@@ -240,12 +301,14 @@ class Forcing:
         if not self.base.size:
             return np.empty((0, len(t)))
         u = np.repeat(self.base[:, None], len(t), axis=1)
-        tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Signal)}
+        tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Signal | TableRate)}
         if len(self.varying) > len(tables):
             for j in range(len(t)):
                 u[:, j] = self(float(t[j]), x[:, j])
+        edges = None if self.span is None else _inside(*self.span)
         for i, signal in tables.items():
-            u[i] = signal(t)
+            inner = t if edges is None else np.clip(t, *edges)
+            u[i] = signal.beside(t, inner) if isinstance(signal, TableRate) else signal(t)
         return u
 
     def corners(self, start: float, end: float, every_jump: bool = False) -> list[float]:
@@ -253,12 +316,15 @@ class Forcing:
 
         Where they are more than KINKS, only some, unless ``every_jump``: compiled loops take any number.
         """
+        if self.span != (start, end):
+            self.begin(start, end)
         if not self.varying:
             return []
         low, high = min(start, end), max(start, end)
 
         def found(jumps: bool) -> list[float]:
-            signals = (s for s in self.varying.values() if isinstance(s, Signal) and (s.order == 0) == jumps)
+            tables = (s for s in self.varying.values() if isinstance(s, Signal | TableRate))
+            signals = (s for s in tables if (s.order == 0) == jumps)
             return sorted({float(t) for signal in signals for t in signal.kinks() if low < t < high})
 
         jumps, bends = found(True), found(False)
@@ -272,7 +338,7 @@ class Forcing:
         u, n = self(t, x), len(x)
         du = np.zeros((len(u), n))
         for j in range(n):
-            h = 1e-6 * max(1.0, abs(x[j]))
+            h = DIFFERENCE * max(1.0, abs(x[j]))
             moved = np.array(x, dtype=float)
             moved[j] += h
             du[:, j] = (self(t, moved) - u) / h
@@ -281,8 +347,14 @@ class Forcing:
         f = rhs(t, x, u=u)
         result = np.zeros((n, n))
         for k in np.flatnonzero(du.any(axis=1)):
-            h = 1e-6 * max(1.0, abs(u[k]))
+            h = DIFFERENCE * max(1.0, abs(u[k]))
             pushed = u.copy()
             pushed[k] += h
             result += np.outer((rhs(t, x, u=pushed) - f) / h, du[k])
         return result
+
+
+def _inside(start: float, end: float) -> tuple[float, float] | None:
+    """The least and the greatest number between two times; None where they are one."""
+    low, high = min(start, end), max(start, end)
+    return None if low == high else (float(np.nextafter(low, np.inf)), float(np.nextafter(high, -np.inf)))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
 
 #: Steps of one size in one run; storing them takes gigabytes.
 MOST_STEPS = 10**8
-DEFAULTS = {"method": "DOP853", "rtol": 1e-8, "atol": 1e-10, "end": 10.0}
+#: Assemblies in turn with inputs that depend on the state.
+ROUNDS = 50
+DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
 
 
@@ -117,7 +120,7 @@ def simulate(
     if method == "kinematic" or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
-        if is_driven(module):
+        if is_driven(module) and not _led_by_inputs(module, inputs, method):
             steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
@@ -143,7 +146,9 @@ def simulate(
         max_step, first_step = step, min(step, abs(end - start)) or None
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
-    x0 = find_state(bound, initial, start)
+    nodes = [start, *forcing.corners(start, end, compiled), end]
+    forcing.enter(*nodes[:2])
+    x0 = find_state(bound, initial, start, forcing)
     if forcing:
         u0 = forcing(start, x0)
         forcing.require_finite()
@@ -162,7 +167,6 @@ def simulate(
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    nodes = [start, *forcing.corners(start, end, compiled), end]
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
@@ -180,7 +184,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, pace,
-                    partial(watched.reset, bound, forcing),
+                    partial(watched.reset, bound, forcing), forcing.enter,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:
@@ -230,6 +234,18 @@ def _follow_drivers(
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
     given = {key: value for key, value in options.items() if value is not None}
     return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
+
+
+def _led_by_inputs(module: Module, inputs: Mapping[str, Any] | None, method: Any) -> bool:
+    """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
+    led = Forcing(module.layout, inputs).constrained
+    if led and method == "kinematic":
+        names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
+        raise UsageError(
+            f"method 'kinematic' follows drivers that are expressions of t, and inputs ({names}) move {module.name}; "
+            "leave method= out, and it is integrated"
+        )
+    return led
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:
@@ -296,8 +312,27 @@ def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
     return times
 
 
-def find_state(module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float) -> Array:
-    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected."""
+def find_state(
+    module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float, forcing: Forcing | None = None
+) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or the inputs on which they depend change with the state that they give.
+    """
+    if forcing is not None and forcing.constrained:
+        layout = module.layout
+        x, places = np.concatenate([layout.q_reference, np.zeros(layout.n_v)]), layout.constraint_inputs
+        for _ in range(ROUNDS):
+            u = forcing(t, x)
+            forcing.require_finite()
+            x = find_state(module.bind(None, u), initial, t)
+            if np.allclose(forcing(t, x)[places], u[places], rtol=1e-13, atol=1e-13):
+                return x
+        names = ", ".join(layout.u[i] for i in places)
+        raise AssemblyError(f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s", [])
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):

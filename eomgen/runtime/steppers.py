@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .compiled import no_series, stepper_options
+from .events import Events
 from .late import eager
 from .names import require
 from .tolerances import IMPLICIT
@@ -133,12 +134,18 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
 
 def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
     """See :meth:`~.module.Module.step`."""
+    if module.layout.n_events and Events(module.layout, None).resets:
+        raise UsageError(
+            f"events of {module.name} reset its state, and a single step watches none; simulate over (t, t + h)"
+        )
     core = eager(module.core)
     if hasattr(core, "march"):
         context = module.kernels.context
         status, result = core.march(context, t, h, x, u, out)
         if status != 0:
-            module.kernels.fail("rhs", status, t, np.array(x, dtype=float))
+            module.kernels.fail(
+                "rhs", status, t, np.array(x, dtype=float), None, None if u is None else np.array(u, dtype=float)
+            )
         return np.asarray(result)
     start = np.array(x, dtype=float)
     k = [module.rhs(t, start, u=u)]

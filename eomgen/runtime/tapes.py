@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,10 +63,57 @@ class Formula:
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
         self._evaluate = compile_evaluator([self.expression], known)
 
+    @cached_property
+    def branches(self) -> bool:
+        """Whether it has conditions, at which it may jump or bend."""
+        from ..graph.traverse import reachable
+
+        graph = self.expression.graph
+        return any(graph.nodes[i][0] in BRANCHING for i in reachable(graph, [self.expression.id]))
+
+    def derivative(self, name: str, rate: str) -> Formula:
+        """The derivative by time along the motion, of an input that is called ``name``.
+
+        Raises
+        ------
+        UsageError
+            It would need accelerations.
+        """
+        from ..graph.differentiate import jvp
+        from ..graph.evaluate import compile_evaluator
+        from ..graph.substitute import symbols_of
+
+        layout, graph = self.layout, self.expression.graph
+        moving = dict(zip(layout.freedoms, layout.v, strict=True))
+        states = sorted(symbols_of([self.expression]) & set(layout.x))
+        for state in states:
+            if state not in layout.q or state not in moving:
+                raise UsageError(
+                    f"input {name}: the equations need its rate {rate}, and that of {self.text!r} depends on the rate "
+                    f"of {state}, which is an acceleration; write {name} in t and parameters, or give {rate} beside it"
+                )
+        along = {graph.symbol(q): graph.symbol(moving[q]) for q in states}
+        other = object.__new__(type(self))
+        other.layout, other.text = layout, f"d/dt ({self.text})"
+        other.expression = jvp([self.expression], {graph.symbol("t"): graph.one, **along})[0]
+        other.depends_on_state = not symbols_of([other.expression]).isdisjoint(layout.x)
+        other._evaluate = compile_evaluator([other.expression], ("t", *layout.x, *layout.p))
+        return other
+
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
         evaluate, values = self._evaluate, p.tolist()
         return lambda t, x: float(evaluate([t, *np.asarray(x).tolist(), *values])[0])
+
+    def slopes(self, p: Array) -> Callable[[float, Array], Array]:
+        """Its derivatives (1 + n_x + n_p,) by t, x and p, as f(t, x) at given parameters (n_p,)."""
+        from ..graph.differentiate import gradient
+        from ..graph.evaluate import compile_evaluator
+
+        graph, known = self.expression.graph, ("t", *self.layout.x, *self.layout.p)
+        evaluate = compile_evaluator(gradient(self.expression, [graph.symbol(name) for name in known]), known)
+        values = p.tolist()
+        return lambda t, x: np.array(evaluate([t, *np.asarray(x).tolist(), *values]), dtype=float)
 
 
 def record_tape(formulas: Sequence[Formula]) -> Tape:
@@ -90,38 +138,63 @@ class DeclaredSignal:
     ----------
     tape : list
         As :mod:`eomgen.graph.tape` makes them.
+    slopes : list, optional
+        Places of the derivatives that do not vanish, among those by t, x and p, and their tape.
     """
 
-    def __init__(self, tape: Sequence[Any]) -> None:
-        code, numbers, out = tape
-        self.tape: Tape = [(str(op), int(a), int(b), int(c)) for op, a, b, c in code], list(numbers), list(out)
+    def __init__(self, tape: Sequence[Any], slopes: Sequence[Any] = ((), ((), (), ()))) -> None:
+        self.tape = _tape(tape)
+        self.places, self.derived = [int(k) for k in slopes[0]], _tape(slopes[1])
         self.depends_on_state = any(op == "x" for op, *_ in self.tape[0])
+        self.branches = not {op for op, *_ in self.tape[0]}.isdisjoint(BRANCHING)
 
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
-        code, numbers, out = self.tape
-        leaves = {"const": numbers, "p": p.tolist()}
+        play = _player(self.tape, p)
+        return lambda t, x: play(t, x)[0]
 
-        def play(t: float, x: Array) -> float:
-            results: list[float] = []
-            for op, a, b, c in code:
-                if op == "t":
-                    value = t
-                elif op == "x":
-                    value = float(x[a])
-                elif op in leaves:
-                    value = leaves[op][a]
-                else:
-                    operands = (results[a], results[b], results[c])
-                    try:
-                        value = OPERATIONS[op](*operands)
-                    except (ArithmeticError, ValueError):  # outside of its domain, or infinite: as C has it
-                        with np.errstate(all="ignore"):
-                            value = BEYOND[op](*operands)
-                results.append(float(value))
-            return results[out[0]]
+    def slopes(self, p: Array) -> Callable[[float, Array], Array]:
+        """Its derivatives (1 + n_x + n_p,) by t, x and p, as f(t, x) at given parameters (n_p,)."""
+        play = _player(self.derived, p)
 
-        return play
+        def slopes(t: float, x: Array) -> Array:
+            result = np.zeros(1 + len(x) + len(p))
+            result[self.places] = play(t, x)
+            return result
+
+        return slopes
+
+
+def _tape(given: Sequence[Any]) -> Tape:
+    code, numbers, out = given
+    return [(str(op), int(a), int(b), int(c)) for op, a, b, c in code], list(numbers), list(out)
+
+
+def _player(tape: Tape, p: Array) -> Callable[[float, Array], list[float]]:
+    """The results of a tape at time t and state x."""
+    code, numbers, out = tape
+    leaves = {"const": numbers, "p": p.tolist()}
+
+    def play(t: float, x: Array) -> list[float]:
+        results: list[float] = []
+        for op, a, b, c in code:
+            if op == "t":
+                value = t
+            elif op == "x":
+                value = float(x[a])
+            elif op in leaves:
+                value = leaves[op][a]
+            else:
+                operands = (results[a], results[b], results[c])
+                try:
+                    value = OPERATIONS[op](*operands)
+                except (ArithmeticError, ValueError):  # outside of its domain, or infinite: as C has it
+                    with np.errstate(all="ignore"):
+                        value = BEYOND[op](*operands)
+            results.append(float(value))
+        return [results[k] for k in out]
+
+    return play
 
 
 def _one(function: Callable[[float], float]) -> Callable[[float, float, float], float]:
@@ -165,6 +238,10 @@ BEYOND: dict[str, Callable[[float, float, float], float]] = {
     name: _one(getattr(np, name.replace("asin", "arcsin").replace("acos", "arccos")))
     for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "sinh", "cosh")
 }
+
+
+#: Operations at which an expression may jump or bend.
+BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
 
 
 def is_formula(value: Any) -> bool:

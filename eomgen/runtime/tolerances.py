@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import LEAST_RTOL
 from .layout import number
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
-LEAST = 100.0 * np.finfo(float).eps  #: smallest relative tolerance, as in SciPy: nothing smaller can be kept
 
 
 def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
             checked[name] = _tolerance(name, checked[name], n)
     if "rtol" in checked:
         rtol = checked["rtol"]
-        checked["rtol"] = max(rtol, LEAST) if isinstance(rtol, float) else np.maximum(rtol, LEAST)
+        checked["rtol"] = max(rtol, LEAST_RTOL) if isinstance(rtol, float) else np.maximum(rtol, LEAST_RTOL)
     for name in ("max_step", "first_step"):
         if name in checked:
             checked[name] = check_step(name, checked[name])

@@ -163,7 +163,7 @@ cdef class Kernel:
     shape : tuple of int
         Shape of the result for one state.
     fail : callable
-        Called as ``fail(name, status, t, x)`` when the kernel fails; it must raise.
+        Called as ``fail(name, status, t, x)`` when the kernel fails, then p and u if any was given; it must raise.
     nan : bool
         At a recoverable failure (status > 0) fill the result with NaN and remember instead.
     error : type
@@ -247,13 +247,13 @@ cdef class Kernel:
         if status != 0:
             for i in range(self.n_out):
                 data[i] = NAN
-            self.report(status, now, copy(state, self.n_in))
+            self.report(status, now, copy(state, self.n_in), ())
         return out
 
-    cdef int report(self, int status, double t, cnp.ndarray x) except -1:
-        """Remember a recoverable failure where NaN is wanted, else raise."""
+    cdef int report(self, int status, double t, cnp.ndarray x, tuple given) except -1:
+        """Remember a recoverable failure where NaN is wanted, else raise; `given` has p and u of the call, if any."""
         if not self.tolerant or status < 0:
-            self.fail(self.name, status, t, x)
+            self.fail(self.name, status, t, x, *given)
             raise RuntimeError(f"kernel {self.name!r} failed with status {status} at t = {t}")
         self.failure = (status, t, x)
 
@@ -303,7 +303,8 @@ cdef class Kernel:
             failed = evaluate(&batch, <double *>cnp.PyArray_DATA(result), &status)
         if failed >= 0:
             now = load(&batch, failed)
-            self.report(status, now, copy(batch.x, self.n_in))
+            given = () if p is None and u is None else (p, copy(batch.u, MODEL.n_u))
+            self.report(status, now, copy(batch.x, self.n_in), given)
         if out is not None and out is not result:
             out[...] = result
         return result if out is None else out

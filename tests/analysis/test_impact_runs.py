@@ -222,3 +222,15 @@ def test_the_run_is_a_trajectory(tmp_path: Path) -> None:
         np.testing.assert_array_equal(other["lo"], run["lo"])
     pytest.importorskip("pandas")
     assert run.to_pandas("y", "lo").shape == (len(run.t), 2)
+
+
+def test_an_event_of_the_model_ends_a_run_with_impacts() -> None:
+    m = eg.Model("ended", gravity=(0, -10, 0))
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="h")
+    m.event("late", "t - 0.6", terminal=True)
+    m.initial(h=1.0)
+    run = m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})
+    assert (run.ended, run.t[-1], len(run.impacts)) == ("event", pytest.approx(0.6, abs=1e-9), 1)
+    m.event("often", "h - 0.5", terminal=2)
+    with pytest.raises(eg.UsageError, match="event often ends a run when it has happened 2 times"):
+        m.compile(target="numpy").simulate_impacts(2.0, {"h": 0.5})

@@ -126,8 +126,36 @@ def test_inputs_over_time(compiled: Compiled) -> None:
     found = mod.sensitivities(["F", "k"], 1.0, inputs={"F": table}, t_eval=times)
     expected = (1 - np.cos(np.sqrt(2.5) * times)) / 5.0
     np.testing.assert_allclose(found["s", "F"], expected, atol=1e-8)
-    feedback = mod.sensitivities(["s_dot"], 1.0, inputs={"F": lambda t, x: -3.0 * x[0]}, t_eval=times)
-    np.testing.assert_allclose(feedback["s", "s_dot"], np.sin(2.0 * times) / 2.0, atol=1e-6)
+    feedback = mod.sensitivities(["s_dot"], 1.0, inputs={"F": "-3*s"}, t_eval=times)
+    np.testing.assert_allclose(feedback["s", "s_dot"], np.sin(2.0 * times) / 2.0, atol=1e-8)
+    timed = mod.sensitivities(["F", "k"], 1.0, inputs={"F": lambda t, x: float(np.interp(t, *table))}, t_eval=times)
+    np.testing.assert_allclose(timed.dx, found.dx, atol=1e-6)  # its corners are not stepped on
+    with pytest.raises(eg.UsageError, match="input F is a Python function that reads the state.*expression in a text"):
+        mod.sensitivities(["s_dot"], 1.0, inputs={"F": lambda t, x: -3.0 * x[0]})
+
+
+@pytest.mark.parametrize("declared", [False, True], ids=["of the run", "of the model"])
+def test_parameters_and_states_in_the_text_of_an_input(declared: bool) -> None:
+    """s'' = -k^2 s + a cos(b t) with all of it in the input's text; outputs that hold the input follow."""
+    text = "-k**2*s + a*cos(b*t)"
+    m = eg.Model("led")
+    for name, value in (("k", 2.0), ("a", 0.5), ("b", 3.0)):
+        m.parameter(name, value)
+    m.prismatic("rail", m.ground, m.body("b1", mass=1.0), axis="x", coordinate="s")
+    m.torque("motor", "rail", m.input("u", **({"signal": text} if declared else {})))
+    m.output("both", "2*u + s_ddot")
+    mod = m.compile(target="numpy")
+    times = np.linspace(0.0, 2.0, 6)
+    given = {} if declared else {"inputs": {"u": text}}
+    found = mod.sensitivities(["k", "a", "b", "s"], 2.0, {"s": 1.0, "s_dot": 0.0}, t_eval=times, **given)
+    k, a, b, x0, t = sympy.symbols("k a b x0 t", positive=True)
+    part = a / (k**2 - b**2)
+    x = (x0 - part) * sympy.cos(k * t) + part * sympy.cos(b * t)
+    numbers = {k: 2.0, a: 0.5, b: 3.0, x0: 1.0}
+    for name, symbol in zip(found.names, (k, a, b, x0), strict=True):
+        for row, expression in (("s", x), ("s_dot", x.diff(t)), ("both", 3 * x.diff(t, 2))):
+            exact = sympy.lambdify(t, expression.diff(symbol).subs(numbers) + 0 * t)(times)
+            np.testing.assert_allclose(found[row, name], exact, rtol=0, atol=2e-8)
 
 
 def test_mistakes_and_files(compiled: Compiled, tmp_path: Path) -> None:

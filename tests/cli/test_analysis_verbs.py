@@ -35,7 +35,7 @@ KEYS = {
         "constraint_impulses",
     },
     "consistent": {"name", "method", "t", "x", "rough", "change"},
-    "sensitivity": {"name", "method", "t", "names", "held", "steps", "final", "files"},
+    "sensitivity": {"name", "method", "t", "names", "held", "steps", "final", "events", "files"},
 }  # fmt: skip
 
 

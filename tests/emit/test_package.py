@@ -85,7 +85,7 @@ def test_the_files_of_each_target(packages):
     assert files["c"] == c_files | {"model.json", "README.md", "Makefile"}
     copied = {"errors.py"} | {
         str(p.relative_to(ROOT))
-        for d in ("numeric", "runtime", "analysis", "ensembles")
+        for d in ("limits", "numeric", "runtime", "analysis", "ensembles")
         for p in (ROOT / d).glob("*.py")
     }
     python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}

@@ -153,6 +153,10 @@ def test_motion_without_inertia_is_named(target: str) -> None:
         module.rhs(0.0, x)
     empty = eg.Model("empty")
     empty.revolute("q", empty.ground, empty.body("b", mass=0))
+    kinematic = empty.derive("recursive").compile(target=target)  # nothing has mass: a model of motion alone
+    with pytest.raises(eg.SingularMassMatrixError, match=r"kinematics only: .*bodies without mass and inertia: b;"):
+        kinematic.rhs(0.0, [0.0, 0.0])
+    empty.torque("push", "q", 1)
     with pytest.raises(eg.ModelError, match="no inertia behind it"):
         empty.derive("recursive").compile(target=target)
 

@@ -48,9 +48,6 @@ class Judge:
         mujoco.set_mju_user_warning(lambda text: None)  # no log file in the current folder
         self.mj = mujoco.MjModel.from_xml_path(str(path))
         self.mj.opt.density = self.mj.opt.viscosity = 0.0  # the medium is left out of ours, which a note says
-        self.mj.actuator_ctrllimited[:] = 0  # limits are data in ours
-        self.mj.actuator_forcelimited[:] = 0
-        self.mj.jnt_actfrclimited[:] = 0
         self.data = mujoco.MjData(self.mj)
         self.model = model
         joints, inputs = model.renamed.get("joints", {}), model.renamed.get("inputs", {})

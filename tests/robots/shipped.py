@@ -49,6 +49,7 @@ URDF: dict[str, tuple[str, bool]] = {
     "borinot": ("borinot_description/urdf/borinot_flying_arm_2.urdf", True),
     "simple humanoid": ("simple_humanoid_description/urdf/simple_humanoid.urdf", True),
     "g1": ("g1_description/urdf/g1_29dof_rev_1_0.urdf", True),
+    "icub": ("icub_description/robots/icub.urdf", True),
     "talos": ("talos_data/robots/talos_reduced.urdf", True),
 }
 #: The same of pybullet_data.

@@ -124,6 +124,91 @@ def test_left_out_with_a_note(parts: dict[str, str], what: str, tmp_path: Path) 
     assert what in note
 
 
+# -- ranges of controls and forces ------------------------------------------------------------------------------------
+PULLERS = """
+<mujoco model="pullers"><option gravity="0 0 -9.81"/><worldbody>
+    <body pos="0 0 1"><joint name="j" axis="0 1 0" {joint}/><geom type="box" size=".1 .2 .3" pos=".1 0 0" mass="1.5"/>
+      <body pos="0.3 0 0"><joint name="k" axis="0 1 0"/><geom type="box" size=".2 .2 .1" mass="0.5"/></body></body>
+  </worldbody>
+  <tendon><fixed name="cord" {tendon}><joint joint="j" coef="2"/><joint joint="k" coef="-3"/></fixed></tendon>
+  <actuator>
+    <position name="p" joint="j" gear="2" kp="20" kv="3" {p}/>
+    <motor name="m" joint="j" gear="-4" {m}/>
+    <general name="a" tendon="cord" gear="3" gainprm="5" biastype="affine" biasprm="0.3 -4 -0.2" {a}/>
+    <motor name="b" tendon="cord" gear="0.5" {b}/>
+  </actuator></mujoco>
+"""
+RANGES = [
+    {"p": 'ctrlrange="-0.3 0.4"'},
+    {"p": 'forcerange="-2 3"'},
+    {"p": 'ctrlrange="-0.3 0.4" forcerange="-2 3"', "m": 'forcerange="-0.5 0.25"'},
+    {"joint": 'actuatorfrcrange="-6 5"'},
+    {"joint": 'actuatorfrcrange="-6 5"', "p": 'forcerange="-2 3"', "a": 'forcerange="-4 1"'},
+    {"tendon": 'actuatorfrcrange="-3 2"'},
+    {"tendon": 'actuatorfrcrange="-3 2"', "a": 'forcerange="-1 1.5"', "joint": 'actuatorfrcrange="-6 5"'},
+    {"p": 'forcerange="-2 3" damping="0.7"', "joint": 'actuatorfrcrange="-6 5" damping="0.4" stiffness="3"'},
+]
+
+
+@pytest.mark.parametrize(("given", "target"), [*((g, "numpy") for g in RANGES), (RANGES[6], "cython")], ids=str)
+def test_forces_and_controls_are_cut_as_in_mujoco(given: dict[str, str], target: str, tmp_path: Path) -> None:
+    path = tmp_path / "pullers.xml"
+    ranges = dict.fromkeys(("joint", "tendon", "p", "m", "a", "b"), "") | given
+    path.write_text(PULLERS.format(**ranges))
+    free = tmp_path / "free.xml"
+    free.write_text(PULLERS.format(**dict.fromkeys(ranges, "")))
+    model, mj = eg.load(path, limits="off"), mujoco.MjModel.from_xml_path(str(path))
+    assert model.notes == ()
+    module, data = model.compile(target=target, kernels=["rhs"]), mujoco.MjData(mj)
+    loose = eg.load(free).compile(target="numpy", kernels=["rhs"])
+    random = np.random.default_rng(3)
+    differs = 0
+    for _ in range(30):
+        data.qpos[:], data.qvel[:] = random.uniform(-1, 1, (2, 2))
+        data.ctrl[:] = random.uniform(-1.5, 1.5, 4)
+        mujoco.mj_forward(mj, data)
+        u = np.array([data.ctrl["pmab".index(name)] for name in module.u_names])
+        x = np.concatenate([data.qpos, data.qvel])
+        found = module.rhs(0.0, x, u=u)[2:]
+        assert found == pytest.approx(data.qacc_smooth, rel=1e-9)
+        if "damping" not in str(given):
+            differs += bool(np.abs(found - loose.rhs(0.0, x, u=u)[2:]).max() > 1e-6)
+    assert "damping" in str(given) or differs > 3  # the ranges were met
+
+
+def test_controls_are_not_cut_where_the_file_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "pullers.xml"
+    text = PULLERS.format(**dict.fromkeys(("joint", "tendon", "m", "a", "b"), "") | {"p": 'ctrlrange="-0.3 0.4"'})
+    path.write_text(text.replace("<option gravity", '<option><flag clampctrl="disable"/></option><option gravity'))
+    module, mj = eg.load(path).compile(target="numpy"), mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(mj)
+    data.ctrl[:] = 1.0
+    mujoco.mj_forward(mj, data)
+    assert module.rhs(0.0, np.zeros(4), u=np.ones(4))[2:] == pytest.approx(data.qacc_smooth, rel=1e-9)
+
+
+def test_a_gripper_does_not_close_faster_than_its_motor_can(tmp_path: Path) -> None:
+    """450 rad/s^2 without the range of the force, 18 with it."""
+    path = tmp_path / "gripper.xml"
+    path.write_text(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="finger" axis="0 0 1"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>'
+        '<actuator><position name="grip" joint="finger" kp="45" forcerange="-1.8 1.8"/></actuator></mujoco>'
+    )
+    module = eg.load(path).compile(target="numpy")
+    assert module.rhs(0.0, np.zeros(2), u=[1.0])[1] == pytest.approx(18.0)
+    slope = module.jacobian(0.0, np.zeros(2), u=[1.0])
+    assert slope[1].tolist() == [0.0, 0.0]  # a force that is cut does not change with the angle
+    assert module.jacobian(0.0, np.zeros(2), u=[0.01])[1, 0] == pytest.approx(-450.0)
+
+
+def test_limits_that_do_not_act_are_noted(tmp_path: Path) -> None:
+    model, _ = load(tmp_path, joint='limited="true" range="-1 2" actuatorfrcrange="-1 1"')
+    assert model.notes == ("limits of joints are data, nothing stops there (j); limits='off' is silent",)
+    assert load(tmp_path, joint='actuatorfrcrange="-1 1"')[0].notes == ()
+    assert eg.load(tmp_path / "pieces.xml", limits="off").notes == ()
+
+
 # -- every field of MuJoCo's model -----------------------------------------------------------------------------------
 KINDS = {"read", "noted", "data", "unused", "derived", "solver", "screen", "user"}
 

@@ -321,3 +321,18 @@ def test_a_long_linear_table_is_stepped_on_at_every_corner() -> None:
     t, u = np.linspace(0, 3, 3001), np.random.default_rng(0).normal(size=3001)
     run = m.compile().simulate(3, inputs={"u": (t, u)})
     assert run["s_dot"][-1] == pytest.approx(np.trapezoid(u, t), abs=1e-12)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA"])
+def test_an_event_that_is_not_watched_ends_no_run(method: str) -> None:
+    model = ball()
+    model.event("late", "t - 0.2", terminal=True)
+    run = model.compile(target="numpy").simulate(0.4, events=["apex"], method=method, **TIGHT)
+    assert (run.t[-1], run.status, len(run.t_events["late"])) == (0.4, 0, 0)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_single_step_passes_over_no_reset(target: str) -> None:
+    mod = ball().compile(target=target)
+    with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step watches none"):
+        mod.step(0.0, mod.x0(), 0.5)

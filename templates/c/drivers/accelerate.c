@@ -56,7 +56,7 @@ static int accelerate(double t, const double *restrict u, const double *restrict
         fastest = fmax(fastest, fabs(w[AT_V + k] / s[k]));
     }
     /* of minimum norm: no small pivot makes it large */
-    status = correct_linear(M, w + AT_G, r, scaled, 1e-15 * fastest * fastest, 2, w);
+    status = correct_linear(M, w + AT_G, r, scaled, CONSTRAINTS_EXACT * fastest * fastest, 2, w);
     if (status != 0) {
         return status;
     }

@@ -1,7 +1,3 @@
-/* Terms that regularise J J^T, relative to its largest diagonal entry: to begin with, and the least for weak rows. */
-#define GENTLE 1e-8
-#define TIKHONOV 1e-12
-
 /* G = L L^T in place, lower triangle of the first `rows` rows of the M x M matrix; status 3 where G is not positive definite. */
 static int cholesky(int rows, double *restrict g)
 {

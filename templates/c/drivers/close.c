@@ -9,7 +9,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
     }
     int status = close_position(t, q, u, c, w);
     if (status == 0 && MH < M) { /* nonholonomic rows join here */
-        status = factor_gram(M, w + AT_J, GENTLE, w + AT_G);
+        status = factor_gram(M, w + AT_J, CONSTRAINTS_GENTLE, w + AT_G);
     }
     if (status != 0) {
         return status;
@@ -21,7 +21,7 @@ static int close_loops(double t, const double *restrict x, const double *restric
     for (int k = 0; k < N; k++) {
         v[k] /= s[k];
     }
-    status = correct_linear(M, w + AT_G, r, v, 1e-15 * fmax(longest_of(v, N), longest_of(r, M)), 1, w);
+    status = correct_linear(M, w + AT_G, r, v, CONSTRAINTS_EXACT * fmax(longest_of(v, N), longest_of(r, M)), 1, w);
     for (int k = 0; k < N; k++) {
         v[k] *= s[k];
     }

@@ -1,11 +1,11 @@
 /* The nearest x with J x + r = 0, in the first rows of J, by passes x -= J^T G^-1 (J x + r). Where weak rows keep
    something, the term in G is lowered below them, unless it is rounding: noise / s^order along a singular value s, with
-   noise = 1e-15 V^order of velocities V (eomgen/numeric/gram.py says why). Leaves G as it was, with the term GENTLE. */
+   noise = EXACT V^order of velocities V (eomgen/numeric/gram.py says why). Leaves G as it was, with the term CONSTRAINTS_GENTLE. */
 static int correct_linear(int rows, double *restrict G, const double *restrict r, double *restrict x, double noise,
                           int order, double *restrict w)
 {
     const double *const J = w + AT_J;
-    double *const e = w + AT_E, *const z = e + M, relative = GENTLE, before = INFINITY;
+    double *const e = w + AT_E, *const z = e + M, relative = CONSTRAINTS_GENTLE, before = INFINITY;
     int status = 0;
     for (int pass = 0; pass < 50 && status == 0; pass++) {
         double longest = 0.0, square = 0.0, size;
@@ -18,7 +18,7 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
                 e[i] += term;
                 total += fabs(term);
             }
-            left = left || fabs(e[i]) > 4.0 * 2.220446049250313e-16 * total;
+            left = left || fabs(e[i]) > ROUNDING_SUMMED * total;
             longest = fmax(longest, fabs(e[i]));
             square += e[i] * e[i];
             z[i] = e[i];
@@ -32,8 +32,8 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
             if (!(sqrt(square) * (order == 2 ? weak : sqrt(weak)) > noise * sqrt(size))) {
                 break;
             }
-            if (relative > TIKHONOV) {
-                relative = fmax(TIKHONOV, fmin(0.1 * relative, 1e-4 * weak));
+            if (relative > CONSTRAINTS_TIKHONOV) {
+                relative = fmax(CONSTRAINTS_TIKHONOV, fmin(0.1 * relative, CONSTRAINTS_BELOW * weak));
                 status = factor_gram(rows, J, relative, G);
                 for (int i = 0; i < rows; i++) {
                     z[i] = e[i];
@@ -50,8 +50,8 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
         }
         before = longest;
     }
-    if (relative < GENTLE && status == 0) {
-        status = factor_gram(rows, J, GENTLE, G);
+    if (relative < CONSTRAINTS_GENTLE && status == 0) {
+        status = factor_gram(rows, J, CONSTRAINTS_GENTLE, G);
     }
     return status;
 }

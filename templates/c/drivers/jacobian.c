@@ -10,7 +10,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
         status = accelerate(t, u, c, width, &parts, w + AT_ACC, w);
     }
     if (status == 0 && MH < M) {
-        status = factor_gram(MH, w + AT_J, GENTLE, w + AT_GH);
+        status = factor_gram(MH, w + AT_J, CONSTRAINTS_GENTLE, w + AT_GH);
     }
     if (status != 0) {
         return status;

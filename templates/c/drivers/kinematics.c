@@ -17,7 +17,7 @@ static int close_dependent(double t, double *restrict q, const double *restrict 
             return 0;
         }
         if (count == 50) {
-            return is_within(1e-10, 64.0, C, w + AT_J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(CONSTRAINTS_ACCEPTED, ROUNDING_ROUNDED, C, w + AT_J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
         form_rows(w + AT_J, C, N + 1, w);
         const int status = split(N + 1, 1, &parts, w);

@@ -1,5 +1,5 @@
 /* The sums of positive terms in the diagonal of B^T M B: what rounding in M_e is measured by. Returns the largest; of a
-   single freedom, for which there is nothing beside, 1e-4 of all that it moves (numeric/definite.py, STILL). */
+   single freedom, for which there is nothing beside, STILL of all that it moves. */
 static double embedded_sizes(const double *restrict B, const double *restrict mass, double *restrict sizes)
 {
     double largest = 0.0;
@@ -15,7 +15,7 @@ static double embedded_sizes(const double *restrict B, const double *restrict ma
         for (int i = 0; i < N; i++) {
             reach += B[i] != 0.0 ? mass[i * N + i] : 0.0;
         }
-        largest = fmax(largest, 1e-4 * reach);
+        largest = fmax(largest, INERTIA_STILL / INERTIA_NOTHING * reach);
     }
     return largest;
 }
@@ -31,7 +31,7 @@ static int ldl_factor(const double *restrict B, const double *restrict mass, dou
         for (int k = 0; k < j; k++) {
             d -= a[j * F + k] * a[j * F + k] * a[k * F + k];
         }
-        if (d <= 1e-13 * sizes[j] || d <= 1e-22 * largest) { /* NaN shows in the result */
+        if (d <= INERTIA_SINGULAR * sizes[j] || d <= INERTIA_NOTHING * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         a[j * F + j] = d;

@@ -46,7 +46,7 @@ static int split(int width, int strict, partition *restrict parts, double *restr
         if (!strict && (best < 0.01 * best_any || best == 0.0)) {
             best = best_any, row = row_any, column = column_any;
         }
-        if (!(best > (strict ? 1e-8 : 1e-10) * size)) {
+        if (!(best > (strict ? CONSTRAINTS_CHOSEN : CONSTRAINTS_STATE) * size)) {
             return EOMGEN_PARTITION_BAD;
         }
         eliminate(a, width, row, column);

@@ -32,19 +32,19 @@ static int close_position(double t, double *restrict q, const double *restrict u
         }
         form_scaled(C + MH, s, w + AT_J);
         /* the term follows the residual: rows that depend on each other on the manifold only would point along it */
-        const int status = factor_gram(MH, J, fmax(GENTLE, mean_residual(C, s)), w + AT_G);
+        const int status = factor_gram(MH, J, fmax(CONSTRAINTS_GENTLE, mean_residual(C, s)), w + AT_G);
         if (status != 0 || last || has_settled(step, size, before, C, J, q, s)) {
             return status;
         }
         if (step == 25) {
-            return is_within(1e-10, 64.0, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
+            return is_within(CONSTRAINTS_ACCEPTED, ROUNDING_ROUNDED, C, J, q, s) ? 0 : EOMGEN_PROJECTION_FAILED;
         }
         double left = step_back(C, w);
-        if (left > 0.1 * size && !is_within(1e-15, 4.0, C, J, q, s)) { /* along weak rows, and the term keeps it */
+        if (left > CONSTRAINTS_HINDERED * size && !is_within(CONSTRAINTS_EXACT, ROUNDING_SUMMED, C, J, q, s)) { /* along weak rows, and the term keeps it */
             double row;
             const double weak = weakness(MH, J, w + AT_E, &row);
             if (size < 0.01 * weak) { /* the step is far shorter than the way to lost rank */
-                (void)factor_gram(MH, J, fmax(TIKHONOV, 1e-4 * weak), w + AT_G);
+                (void)factor_gram(MH, J, fmax(CONSTRAINTS_TIKHONOV, CONSTRAINTS_BELOW * weak), w + AT_G);
                 left = step_back(C, w);
             }
         }

@@ -17,7 +17,7 @@ static int is_closed(double t, const double *restrict x, const double *restrict 
         }
         left = fmax(left, fabs(rate / s[N + i]));
     }
-    return largest_residual(C, s) <= 1e-15 && left <= 1e-15 * fastest;
+    return largest_residual(C, s) <= CONSTRAINTS_EXACT && left <= CONSTRAINTS_EXACT * fastest;
 }
 
 static int project_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,

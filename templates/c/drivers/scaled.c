@@ -24,7 +24,7 @@ EOMGEN_SHARED double largest_residual(const double *restrict C, const double *re
     return largest;
 }
 
-/* Whether each |C / s_c| is within the limit, or within what rounding of q leaves of it: so many eps |J| |q / s_q|. */
+/* Whether each |C / s_c| is within the limit, or within what rounding of q leaves of it: that part of |J| |q / s_q|. */
 EOMGEN_SHARED int is_within(double limit, double roundings, const double *restrict C, const double *restrict J,
                             const double *restrict q, const double *restrict s)
 {
@@ -33,25 +33,26 @@ EOMGEN_SHARED int is_within(double limit, double roundings, const double *restri
         for (int k = 0; k < N; k++) {
             rounded += fabs(J[i * N + k] * coordinate_of(q, k)) / s[k];
         }
-        if (!(fabs(C[i] / s[N + i]) <= fmax(limit, roundings * 2.220446049250313e-16 * rounded))) {
+        if (!(fabs(C[i] / s[N + i]) <= fmax(limit, roundings * rounded))) {
             return 0;
         }
     }
     return 1;
 }
 
-/* Newton has arrived, at rounding or within 1e-12 and no longer getting closer; one step at least is always made,
+/* Newton has arrived, at rounding or within SETTLED and no longer getting closer; one step at least is always made,
    because near configurations where rows depend on each other a small residual is not a small distance. */
 EOMGEN_SHARED int has_settled(int step, double size, double before, const double *restrict C, const double *restrict J,
                               const double *restrict q, const double *restrict s)
 {
-    return size == 0.0 || (step > 0 && (size <= 1e-15 || (size > 0.5 * before && is_within(1e-12, 64.0, C, J, q, s))));
+    return size == 0.0 || (step > 0 && (size <= CONSTRAINTS_EXACT
+        || (size > 0.5 * before && is_within(CONSTRAINTS_SETTLED, ROUNDING_ROUNDED, C, J, q, s))));
 }
 
 /* A full step of this scaled length that leaves so much of the residual, by linear theory, is the last one needed. */
 EOMGEN_SHARED int arrives(double longest, double left)
 {
-    return longest <= 1e-8 && left <= 1e-15;
+    return longest <= CONSTRAINTS_SHORT && left <= CONSTRAINTS_EXACT;
 }
 
 EOMGEN_SHARED double longest_of(const double *restrict step, int length)

@@ -15,7 +15,7 @@ static int shift_driver(block_function *block, int columns, double t, const doub
         status = accelerate(t, u, c, width, &parts, w + AT_ACC, w);
     }
     if (status == 0 && MH < M) {
-        status = factor_gram(MH, w + AT_J, GENTLE, w + AT_GH);
+        status = factor_gram(MH, w + AT_J, CONSTRAINTS_GENTLE, w + AT_GH);
     }
     if (status != 0) {
         return status;

@@ -1,4 +1,4 @@
-/* Balanced K, less 1e-10 where redundant constraints may leave it singular, as L U with row exchanges; status 2 where a
+/* Balanced K, less a little where redundant constraints may leave it singular, as L U with row exchanges; status 2 where a
    pivot vanishes: no inertia is behind a motion. plan (3 NZ): rows exchanged, last column of each row of U, last row of
    each column of L, so that what is zero in the sparse K costs little. */
 static int factor_system(double *restrict w, int *restrict plan)
@@ -23,7 +23,7 @@ static int factor_system(double *restrict w, int *restrict plan)
         return EOMGEN_NON_FINITE;
     }
     for (int e = 0; e < RELAXED; e++) {
-        lu[RELAX[e][0] * NZ + RELAX[e][1]] -= 1e-10;
+        lu[RELAX[e][0] * NZ + RELAX[e][1]] -= SYSTEMS_RELAXATION;
         last[RELAX[e][0]] = RELAX[e][1] > last[RELAX[e][0]] ? RELAX[e][1] : last[RELAX[e][0]];
     }
     for (int k = 0; k < NZ; k++) {
@@ -32,7 +32,7 @@ static int factor_system(double *restrict w, int *restrict plan)
             best = fabs(lu[i * NZ + k]) > fabs(lu[best * NZ + k]) ? i : best;
         }
         plan[k] = best;
-        if (!(fabs(lu[best * NZ + k]) > 1e-14)) {
+        if (!(fabs(lu[best * NZ + k]) > SYSTEMS_PIVOT)) {
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         if (best != k) {

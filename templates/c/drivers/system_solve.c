@@ -25,8 +25,8 @@ static int solve_system(const double *restrict r, const int *restrict plan, doub
             return EOMGEN_NON_FINITE;
         }
         if (size == 0.0 || count == 30 || (count > 1 && size > 0.5 * before)) {
-            /* a step leaves 1e-10 / (s^2 + 1e-10) along constraints of singular value s */
-            const double weak = size > 0.0 ? 1e-10 * (before / size - 1.0) : 1.0;
+            /* a step leaves RELAXATION / (s^2 + RELAXATION) along constraints of singular value s */
+            const double weak = size > 0.0 ? SYSTEMS_RELAXATION * (before / size - 1.0) : 1.0;
             return is_solved(r, z, weak, w) ? 0 : EOMGEN_UNSOLVED;
         }
         before = size;

@@ -18,8 +18,8 @@ static void substitute_system(const double *restrict lu, const int *restrict pla
     }
 }
 
-/* Whether K z = r holds but for rounding: no more is left of any equation than 1e-11 of its terms, or 1e-14 of the
-   largest terms of all; of constraints along which K has the singular value s (s^2 = weak) 1e-15 / s^2, which is what
+/* Whether K z = r holds but for rounding: no more is left of any equation than LEFT of its terms, or ROUNDED of the
+   largest terms of all; of constraints along which K has the singular value s (s^2 = weak) FAINT / s^2, which is what
    rounding of the position makes of their accelerations. The defect is in w + AT_DEFECT, balanced. */
 static int is_solved(const double *restrict r, const double *restrict z, double weak, double *restrict w)
 {
@@ -37,10 +37,10 @@ static int is_solved(const double *restrict r, const double *restrict z, double 
         most = fmax(most, terms[i]);
     }
     for (int e = 0; e < RELAXED; e++) {
-        terms[RELAX[e][0]] *= fmax(1.0, 1e-4 / fmax(weak, 1e-13));
+        terms[RELAX[e][0]] *= fmax(1.0, SYSTEMS_FAINT / SYSTEMS_LEFT / fmax(weak, SYSTEMS_WEAKEST));
     }
     for (int i = 0; i < NZ; i++) {
-        if (!(fabs(d[i]) <= 1e-11 * terms[i] + 1e-14 * most)) {
+        if (!(fabs(d[i]) <= SYSTEMS_LEFT * terms[i] + SYSTEMS_ROUNDED * most)) {
             return 0;
         }
     }

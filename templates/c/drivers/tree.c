@@ -11,7 +11,7 @@ static int tree_factor(double *restrict H, const double *restrict s)
     }
     for (int k = N - 1; k >= 0; k--) {
         double *const row = H + k * (k + 1) / 2;
-        if (row[k] <= 1e-13 * own[k] || row[k] * s[k] * s[k] <= 1e-22 * largest) { /* NaN shows in the result */
+        if (row[k] <= INERTIA_SINGULAR * own[k] || row[k] * s[k] * s[k] <= INERTIA_NOTHING * largest) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         for (int i = PARENT[k]; i >= 0; i = PARENT[i]) {

@@ -64,7 +64,7 @@ static EOMGEN_APART void read_tables(lane_run *run, real t)
 {
     for (int i = 0; i < run->n_u; i++) {
         for (int l = 0; run->signals[i].n > 0 && l < W; l++) {
-            run->u[i][l] = eomgen_table_value(run->signals + i, run->signals[i].order == 0 ? run->hold[l] : t[l]);
+            run->u[i][l] = eomgen_table_value(run->signals + i, t[l], run->hold[l]);
         }
     }
 }

@@ -124,7 +124,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
         const double zero = ev->bracket[4 * k];
-        if (stop && (stop == 2 || fabs(zero - *t) > 1e-14 * fmax(fabs(*t), j->span))) {
+        if (stop && (stop == 2 || fabs(zero - *t) > RUNS_INSTANT * fmax(fabs(*t), j->span))) {
             break;
         }
         double *const row = j->notes + j->n_notes++ * (2 + run->n);

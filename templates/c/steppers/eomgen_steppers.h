@@ -19,14 +19,12 @@ typedef struct {
 /* One input over time: u = value of a table at t, or constant where n is 0. Outside the table its end values hold. */
 typedef struct {
     int n;                /* points; 1 for a tape */
-    int order;            /* 0 holds the last value, 1 linear, 3 cubic; 2 as 0, but read at t even inside a part */
+    int order;            /* 0 holds the last value, 1 linear, 3 cubic; 2 as 0, but read at t even inside a part;
+                             4 cubic pieces that may jump where they meet */
     const double *times;  /* n, increasing */
-    const double *values; /* n values; for order 3, 4 coefficients a point: value, slope, curvature / 2, third / 6 */
+    const double *values; /* n values; for order 3 and 4, 4 coefficients a point: value, slope, curvature / 2, third / 6 */
     const eomgen_tape *tape; /* an expression of t, x and parameters instead of a table, or NULL */
 } eomgen_signal;
-
-/* The value of a table at time t. */
-double eomgen_interpolated(const eomgen_signal *s, double t);
 
 /* One integration. The caller owns every array; y, f, K, F change. */
 typedef struct {
@@ -51,7 +49,7 @@ typedef struct {
     int failure;                  /* status of the last evaluation that failed */
     double failure_time;
     double *failure_state;        /* n */
-    double hold;                  /* tables of order 0 are read at this time, inside the present part; NAN: at t itself */
+    double hold;                  /* inside the present part: where tables of order 0 and 4 have their piece; NAN: at t */
     long look_in;                 /* evaluations until look is called; below 0 never */
     long (*look)(void *looker, const double *t); /* the next look_in, or 0 to stop the run */
     void *looker;
@@ -93,7 +91,7 @@ const eomgen_method *eomgen_suited(const eomgen_method *method, int n);
 enum { EOMGEN_STEP_TOO_SMALL = -100, EOMGEN_STOPPED = -101, EOMGEN_TOO_MANY_STEPS = -104 };
 
 /* The value of a table at time t. */
-double eomgen_table_value(const eomgen_signal *s, double t);
+double eomgen_table_value(const eomgen_signal *s, double t, double hold); /* hold: as in eomgen_run */
 
 /* error to the power of -1 / (order + 1): what the next step is to be multiplied with, but for safety. */
 static inline double eomgen_stretch(double error, int order)

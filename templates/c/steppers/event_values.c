@@ -68,9 +68,9 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
             continue;
         }
         const double rate = run->direction * ev->slope[i];
-        const int touching = fabs(ev->g[i]) <= 1e-9 * ev->size[i];
+        const int touching = fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i];
         const int through = ev->action[i] == EOMGEN_WAIT && rate < 0.0; /* a gap that goes on closing */
-        stuck = stuck || (touching && (through || !(fabs(rate) > 1e-9 * ev->trial[i])));
+        stuck = stuck || (touching && (through || !(fabs(rate) > RUNS_TOUCHING * ev->trial[i])));
         ev->leaving[i] = touching ? (rate > 0.0 ? 1 : -1) : 0;
         ev->fired[i] = 0;
     }

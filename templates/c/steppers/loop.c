@@ -4,10 +4,6 @@
 
 #include "eomgen_loop.h"
 
-/* Resets closer together than this part of the span count as crowded; so many in a row are too many. */
-static const double CROWDED = 1e-9;
-enum { CROWD = 12 };
-
 static void store(const eomgen_run *run, eomgen_journey *j, double t, const double *y)
 {
     j->times[j->stored] = t;
@@ -58,10 +54,10 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
     if (j->n_eval < 0) {
         store(run, j, run->t, run->y);
     }
-    ev->crowded = fabs(run->t - ev->last_reset) < CROWDED * j->span ? ev->crowded + 1 : 0;
+    ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
     ev->last_reset = run->t;
     j->resets++;
-    return eomgen_depart(run, ev) || ev->crowded >= (2 * ev->n > CROWD ? 2 * ev->n : CROWD) ? EOMGEN_ZENO : 0;
+    return eomgen_depart(run, ev) || ev->crowded >= (2 * ev->n > RUNS_CROWD ? 2 * ev->n : RUNS_CROWD) ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */

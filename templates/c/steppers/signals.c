@@ -3,19 +3,20 @@
 
 #include "eomgen_steppers.h"
 
-double eomgen_table_value(const eomgen_signal *s, double t)
+double eomgen_table_value(const eomgen_signal *s, double t, double hold)
 {
     int low = 0, high = s->n - 1;
-    const int size = s->order == 3 ? 4 : 1;
-    if (t <= s->times[0] || high == 0) {
+    const int size = s->order >= 3 ? 4 : 1;
+    const double at = (s->order == 0 || s->order == 4) && !isnan(hold) ? hold : t; /* picks the piece */
+    if (at <= s->times[0] || high == 0) {
         return s->values[0];
     }
-    if (t >= s->times[high]) {
+    if (at >= s->times[high]) {
         return s->values[high * size];
     }
     while (high - low > 1) {
         const int middle = (low + high) / 2;
-        if (s->times[middle] <= t) {
+        if (s->times[middle] <= at) {
             low = middle;
         } else {
             high = middle;
@@ -38,7 +39,7 @@ void eomgen_force(eomgen_run *run, double t, const double *y)
         if (s->n > 0 && s->tape != NULL) {
             eomgen_play(s->tape, t, y, run->u, run->c, run->u + i);
         } else if (s->n > 0) {
-            run->u[i] = eomgen_table_value(s, s->order == 0 && !isnan(run->hold) ? run->hold : t);
+            run->u[i] = eomgen_table_value(s, t, run->hold);
         }
     }
 }

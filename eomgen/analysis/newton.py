@@ -1,0 +1,174 @@
+"""Analysis: equations near iterates -> an iterate at which they hold, by Newton's iteration and what helps it.
+
+Steps are judged by the corrections that they leave, not by residuals (the natural monotonicity test: P. Deuflhard,
+Newton Methods for Nonlinear Problems, 2004, algorithm NLEQ-ERR, section 3.3.2).  Neither the scale nor the mixture of
+the equations matters then: a stiff spring stretched by the curvature of a step is one small correction away.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..numeric.scales import Array
+from .rounding import BALANCED, EPS
+
+if TYPE_CHECKING:
+    from .search import Point, Search
+
+STEPS = 200  #: at most
+LONGEST = 0.5  #: largest scaled step of a coordinate
+SHORTEST = 1e-5  #: part of Newton's step below which it leads nowhere
+SMALL = 1e-12  #: scaled step at which Newton's iteration has arrived
+CLOSE = 1e-6  #: the same where rounding of the forces leaves no more
+RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
+DIFFERENCES = 1e-8  #: the same of central differences
+STIFFEST = 1e16  #: largest damping of a step
+CONTRACTS = 0.5  #: part of a correction that the next one may be
+
+
+class Linear(NamedTuple):
+    """Equations near an iterate: J by scaled variables, which move the tree and change unknowns."""
+
+    J: Array  #: (m, k)
+    moved: Array  #: (n_v, k) scaled displacements; the first n_z of length 1, at right angles
+    changed: Array  #: (j, k) changes of the unknowns
+    sizes: Array  #: (m,) of the terms in each row
+    noise: float  #: relative error of J
+    flow: Array | None  #: (n_v, n_z) how what drives the tree changes along them
+
+
+class Solver:
+    """Solutions of least norm with one J, rows divided by the sizes of their terms."""
+
+    def __init__(self, linear: Linear) -> None:
+        self.linear = linear
+        self.sizes = np.where(linear.sizes > 0.0, linear.sizes, 1.0)
+        self.J = linear.J / self.sizes[:, None]
+        self.U, values, self.V = np.linalg.svd(self.J, full_matrices=False)
+        self.kept = values > linear.noise
+        self.inverse = np.where(self.kept, 1.0 / np.where(self.kept, values, 1.0), 0.0)
+
+    def solve(self, residual: Array) -> Array:
+        """The correction."""
+        return np.asarray(-self.V.T @ (self.inverse * (self.U.T @ (residual / self.sizes))))
+
+    def shown(self, change: Array) -> Array:
+        """The correction as a scaled displacement of the tree and a change of scaled unknowns."""
+        return np.concatenate([self.linear.moved @ change, change[self.J.shape[1] - len(self.linear.changed) :]])
+
+    def arrived(self, residual: Array, change: Array, numbers: float) -> bool:
+        """Whether no correction and no residual is left but for rounding.
+
+        numbers: scaled size of what the position is made of.
+        """
+        rounding = BALANCED * numbers
+        left = residual / self.sizes + self.J @ change
+        answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
+        limit = max(SMALL, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
+        return largest(self.shown(change)) <= limit and largest(left) <= rounding
+
+
+def largest(values: Array) -> float:
+    """Largest magnitude, 0 of none."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def newton(search: Search, point: Point, plain: bool = False, reach: float = np.inf) -> tuple[Point, int, bool]:
+    """The last iterate, the number of steps, and whether it is balanced.
+
+    plain: whole steps, whatever they lead to; reach: largest scaled distance from the start.
+    """
+    part, before, start, last = 1.0, None, point.q, np.inf
+    for step in range(STEPS):
+        solver = Solver(search.linearise(point))
+        residual = search.residual(point.here, point.here)
+        change = solver.solve(residual)
+        shown = solver.shown(change)
+        size, longest = float(np.linalg.norm(shown)), largest(solver.linear.moved @ change)
+        if not np.isfinite(size):
+            return point, step, False
+        arrived = solver.arrived(residual, change, search.rounded(point))
+        if arrived and (size <= SMALL or size > CONTRACTS * last):
+            return _polished(search, point, solver, change), step, True
+        if size <= SMALL or largest(search.layout.place_scales.distance(point.q, start)) > reach:
+            return point, step, False
+        most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
+        if before is not None:
+            apart = float(np.linalg.norm(before[1] - shown))
+            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, 1e-300)
+        part, retried = most if plain else min(most, part), False
+        there, grown = None, None
+        while part >= SHORTEST * most:
+            there = search.step(point, solver.linear.moved @ (part * change), solver.linear.changed @ (part * change))
+            if there is None:
+                part *= 0.5
+                continue
+            left = solver.shown(solver.solve(search.residual(there.here, point.here)))
+            if plain:
+                break
+            off = float(np.linalg.norm(left - (1.0 - part) * shown))
+            wanted = 0.5 * size * part**2 / max(off, 1e-300)
+            if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
+                if arrived:  # rounding: no correction gets smaller
+                    return _polished(search, point, solver, change), step, True
+                there, part, retried = None, min(wanted, 0.5 * part), True
+            elif min(wanted, most) >= 4.0 * part and not retried:
+                there, part, retried = None, min(wanted, most), True
+            else:
+                grown = left, part
+                break
+        if there is None:
+            return point, step, arrived
+        point, last = there, size
+        before = None if grown is None or plain else (shown, grown[0], grown[1])
+    return point, STEPS, False
+
+
+def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Point:
+    """The iterate one last step away, if it is nearer to balance."""
+    there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
+    if there is None:
+        return point
+    here, after = (search.residual(one.here, point.here) / solver.sizes for one in (point, there))
+    return there if np.linalg.norm(after) < np.linalg.norm(here) else point
+
+
+def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
+    """Down the residual: Levenberg and Marquardt's steps, with columns scaled by the largest norms that they have had.
+
+    J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows
+    the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
+    """
+    damping, growth, columns = 1e-3, 2.0, np.zeros(0)
+    start = Solver(search.linearise(point)).sizes
+    for step in range(STEPS):
+        solver, here = Solver(search.linearise(point)), point.here
+        residual = search.residual(here, here)
+        change = solver.solve(residual)
+        if not residual.any() or solver.arrived(residual, change, search.rounded(point)):
+            return point, step, True
+        same = len(start) == len(solver.sizes)
+        sizes = start if same else solver.sizes
+        J, r = solver.linear.J / sizes[:, None], residual / sizes
+        norms = np.linalg.norm(J, axis=0)
+        columns = np.maximum(columns, norms) if len(columns) == len(norms) else norms
+        scale = np.where(columns > 0.0, columns, 1.0)
+        there = None
+        while damping < STIFFEST:
+            stacked = np.vstack([J, np.sqrt(damping) * np.diag(scale)])
+            change = np.linalg.lstsq(stacked, np.concatenate([-r, np.zeros(len(scale))]), rcond=None)[0]
+            there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
+            gain = -1.0
+            if there is not None:
+                lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
+                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), 1e-300)
+            if gain > 1e-4:
+                damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
+                break
+            there, damping, growth = None, damping * growth, 2.0 * growth
+        if there is None:
+            return point, step, False
+        point = there
+    return point, STEPS, False

@@ -1,0 +1,233 @@
+"""Analysis: derivatives of a run on one side of an event -> those on the other (saltation), and those of its time.
+
+An event g(t, x, u, p) = 0 happens at a time T that moves with what a run is differentiated by:
+
+    dT = -(g_x S- + g_p) / (g_t + g_x f-),  S+ = R_x (S- + f- dT) + R_t dT + R_p - f+ dT
+
+with the state x+ = R(t, x-, p) after it and f-, f+ the rates on both sides (I. A. Hiskens, M. A. Pai, Trajectory
+sensitivity analysis of hybrid systems, IEEE Trans. Circuits Syst. I 47 (2000), 204-220; R. I. Leine, H. Nijmeijer,
+Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7; N. J. Kong et al., Saltation matrices: the
+essential tool for linearizing hybrid dynamical systems, Proc. IEEE 112 (2024), 585-608).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import NoDerivativeError, UsageError
+from ..numeric.scales import Array
+from ..runtime.events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
+from .impact import TOUCHING
+from .sensitivity_result import EventSlopes
+from .start import keep_consistent
+from .strike_slopes import after_impact, after_reset
+from .variations import Move, Variational
+
+ASIDE = 1e-7  #: part of the span by which the rates on one side of an event are looked at
+SMOOTH = 1e-9  #: part of the rates by which they may differ on both sides of an event and count as continuous
+GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
+INSTANT = 1e-12  #: part of the span within which events are simultaneous
+
+
+class Saltation:
+    """Carries the derivatives of one run through its events.
+
+    Parameters
+    ----------
+    run : Variational
+    events : Events
+    span : (float, float)
+    tolerances : (float, array or float)
+        rtol and atol of the run.
+    corners : sequence of float
+        Times at which inputs jump or bend.
+    """
+
+    def __init__(
+        self, run: Variational, events: Events, span: tuple[float, float], tolerances: tuple[float, Any],
+        corners: Sequence[float],
+    ) -> None:  # fmt: skip
+        if events.functions:
+            raise UsageError(
+                f"event {events.functions[0].name} is a Python function, whose derivatives are not known: give its "
+                "expression as a text"
+            )
+        self.run, self.events, self.span, self.tolerances, self.corners = run, events, span, tolerances, corners
+        self.module, self.n = run.module, run.module.n_x
+        every = events.listed(self.module, run.forcing)
+        self.listed = [(i, event) for i, event in enumerate(every) if event.direction != UNWATCHED]
+        self.names = [events.names[i] for i, _ in self.listed]
+        self.watched = [self._of_both(event, name) for (_, event), name in zip(self.listed, self.names, strict=True)]
+        self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
+        self.kernel = self.module.kernels.timed("event_derivatives")
+        self.found: list[EventSlopes] = []
+
+    def _of_both(self, event: Event, name: str) -> Event:
+        """The same event of z = [x; S], at which the integrator stops whatever it does: rates may jump there."""
+        action = STOP if event.action == GO_ON else event.action
+        return Event(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
+
+    def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
+        """z = [x; S] right after events that happened at time t."""
+        own, forcing = fired[0], self.run.forcing
+        index, event = self.listed[own]
+        raw, S = self.run.split(z)
+        x, S = self._consistent(t, raw, S)
+        before, after = self._sides(t, x)
+        changes = event.action != GO_ON or bool(np.abs(before - after).max() > 0.0)
+        if changes:
+            self._refuse_ends(t, own)
+            self._refuse_others(t, x, own, before)
+        dt = self._time(t, x, S, index, before, self.names[own], changes)
+        move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)
+        if not changes:
+            self.found.append(EventSlopes(self.names[own], t, x, x, dt, move.x, move.x))
+            return z
+        x_after, d_after = x, move.x
+        if event.action != GO_ON:
+            x_after = self.events.reset(self.module, forcing, t, x, [index])
+            d_after = self._after(t, x, move, x_after, index)
+            after = self._sides(t, x_after)[1]
+        self.found.append(EventSlopes(self.names[own], t, x, x_after, dt, move.x, d_after))
+        x_after, S = self._consistent(t, x_after, d_after - np.multiply.outer(after, dt))
+        return self.run.joined(x_after, S)
+
+    def stop(self, t: float, z: Array, own: int) -> None:
+        """Note an event that ended the run."""
+        x, S = self._consistent(t, *self.run.split(z))
+        before = self._sides(t, x)[0]
+        self._refuse_others(t, x, own, before)
+        dt = self._time(t, x, S, self.listed[own][0], before, self.names[own], True)
+        moved = S + np.multiply.outer(before, dt)
+        self.found.append(EventSlopes(self.names[own], t, x, x, dt, moved, moved))
+
+    def _after(self, t: float, x: Array, move: Move, x_after: Array, index: int) -> Array:
+        forcing = self.run.forcing
+        here = self.module.bind(u=forcing(t, x))
+        if self.events.model[index].action == RESET:
+            return after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
+        declared = self.events.declared
+        values = self.module.kernels.timed("events")(t, x, u=forcing(t, x))
+        near = TOUCHING * max(1.0, self.module.layout.length)
+        gaps = [j for j, other in enumerate(declared) if other.get("restitution") is not None]
+        touching = [str(declared[j]["name"]) for j in gaps if j != index and abs(values[j]) <= near]
+        if touching:
+            raise self._at_once(t, [str(declared[index]["name"]), *touching])
+        self._refuse_moving(t, x, index)
+        v, e = x[self.module.n_q :], float(declared[index]["restitution"])
+        return after_impact(self.run, here, t, v, move, x_after, index, e)
+
+    def _refuse_moving(self, t: float, x: Array, index: int) -> None:
+        layout = self.module.layout
+        by_u = self._gradient(t, x, index)[0, self.n + 1 : self.n + 1 + layout.n_u]
+        for j in np.flatnonzero(by_u):
+            if j in self.run.forcing.varying:
+                raise NoDerivativeError(
+                    f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
+                    "derivative of such an impact is not derived; write the motion into the gap's expression"
+                )
+
+    # -- the time of an event -------------------------------------------------------------------------------------
+    def _gradient(self, t: float, x: Array, index: int) -> Array:
+        """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
+        first = len(self.events.model)
+        if index < first:
+            return np.asarray(self.kernel(t, x, u=self.run.forcing(t, x))[index : index + 1])
+        every, n_u = self.formulas[index - first](t, x), self.module.layout.n_u
+        return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
+
+    def _rate(self, t: float, x: Array, index: int, f: Array, name: str) -> float:
+        """How fast an event's value changes along rates f (n_x,)."""
+        layout = self.module.layout
+        u = np.zeros((layout.n_u, 1))
+        if self.run.forcing:
+            by_t, by_x, _ = self.run.inputs(t, x)
+            u = (by_t + by_x @ f)[:, None]
+        flow = Move(f[:, None], np.ones(1), u, np.zeros((layout.n_p, 1)))
+        return float(flow.along(self._gradient(t, x, index), f"event {name}", layout.u)[0, 0])
+
+    def _time(self, t: float, x: Array, S: Array, index: int, f: Array, name: str, needed: bool) -> Array:
+        """The derivatives (k,) of the time of an event; NaN where they do not exist and nothing depends on them."""
+        gradient, rate = self._gradient(t, x, index), self._rate(t, x, index, f, name)
+        h = ASIDE * (self.span[1] - self.span[0])
+        earlier = x - h * f
+        with np.errstate(all="ignore"):
+            bend = (rate - self._rate(t - h, earlier, index, self._f(t - h, earlier), name)) / h
+        error = self._error(x, gradient)
+        if not rate * rate > GRAZING * abs(bend) * error or rate == 0.0 or t == self.span[0]:
+            if needed:
+                raise NoDerivativeError(
+                    f"event {name} at t = {t:.6g} s only grazes its surface (its rate is {rate:.3g}): "
+                    "the run has no derivative there, nor where impacts die away; end it before, or take tighter "
+                    "tolerances if it does cross"
+                )
+            return np.full(S.shape[1], np.nan)
+        along = self.run.move(t, x, S).along(gradient, f"event {name}", self.module.layout.u)
+        return np.asarray(-along[0] / rate)
+
+    def _error(self, x: Array, gradient: Array) -> float:
+        """What the errors that the integrator allows make of an event's value."""
+        rtol, atol = self.tolerances
+        sizes = np.broadcast_to(np.asarray(atol, dtype=float), np.shape(atol) or (1,))
+        allowed = rtol * np.abs(x) + (sizes[: self.n] if len(sizes) > 1 else sizes)
+        return float(np.abs(gradient[0, : self.n]) @ allowed)
+
+    # -- both sides -----------------------------------------------------------------------------------------------
+    def _f(self, t: float, x: Array) -> Array:
+        return np.asarray(self.run.rhs(t, x, u=self.run.forcing(t, x)))
+
+    def _sides(self, t: float, x: Array) -> tuple[Array, Array]:
+        """The rates (n_x,) before and after an event at x, extrapolated from either side where they jump."""
+        f, step = self._f(t, x), ASIDE * (self.span[1] - self.span[0])
+        limit, sides = SMOOTH * np.abs(f).max(initial=0.0), []
+        for h in (-step, step):
+            with np.errstate(all="ignore"):
+                near, far = (self._f(t + k * h, x + k * h * f) for k in (1.0, 2.0))
+            side = 2.0 * near - far
+            smooth = not np.isfinite(side).all() or np.abs(side - f).max(initial=0.0) <= limit
+            sides.append(f if smooth else side)
+        return sides[0], sides[1]
+
+    def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
+        """A state and its derivatives, brought onto the constraints."""
+        module, forcing = self.module, self.run.forcing
+        x = np.asarray(module.project(x, t=t))
+        slopes = self.run.inputs(t, x) if forcing else None
+        return x, keep_consistent(module.bind(u=forcing(t, x)), t, x, S, self.run.columns, slopes)
+
+    # -- what has no derivative -----------------------------------------------------------------------------------
+    def _refuse_ends(self, t: float, own: int) -> None:
+        near = INSTANT * abs(self.span[1] - self.span[0])
+        for end, what in ((self.span[0], "start"), (self.span[1], "end")):
+            if abs(t - end) <= near:
+                raise NoDerivativeError(
+                    f"event {self.names[own]} happens at the {what} of the run, t = {t:.6g} s: a small change takes it "
+                    "out of the run, which has no derivative there; take another span"
+                )
+        if any(abs(t - corner) <= near for corner in self.corners):
+            raise NoDerivativeError(
+                f"event {self.names[own]} happens at t = {t:.6g} s, at which an input jumps or bends: the run has no "
+                "derivative there"
+            )
+
+    def _refuse_others(self, t: float, x: Array, own: int, f: Array) -> None:
+        """Refuse another event at the same instant that changes the state or ends the run."""
+        for other, (index, event) in enumerate(self.listed):
+            if other == own or (event.action == GO_ON and not event.terminal):
+                continue
+            value, gradient = float(event.function(t, x)), self._gradient(t, x, index)
+            rate = self._rate(t, x, index, f, self.names[other])
+            if (event.action == WAIT and rate > 0.0) or event.direction * rate < 0.0:
+                continue  # it has just happened, and leaves
+            near = max(self._error(x, gradient), abs(rate) * INSTANT * abs(self.span[1] - self.span[0]))
+            if abs(value) <= near:
+                raise self._at_once(t, [self.names[own], self.names[other]])
+
+    def _at_once(self, t: float, names: Sequence[str]) -> NoDerivativeError:
+        return NoDerivativeError(
+            f"the events {' and '.join(names)} happen at once at t = {t:.6g} s: which comes first after a small change "
+            "decides what follows, so that the run has no derivative there"
+        )

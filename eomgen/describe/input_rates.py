@@ -1,0 +1,131 @@
+"""Stage describe, inputs that move: the equations of a model -> the rates of inputs they need, as inputs of their own.
+
+Where an input u stands in what is differentiated by time (dL/dv of a Lagrangian, constraints, the gap of an impact,
+q' = N v + b of given equations), u' and u'' stand in the equations of motion.  They are further inputs ``u_dot`` and
+``u_ddot``, 0 unless given: a run that is given u as a number, text or table fills them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from ..constraints import Driver, Equation
+from ..constraints.base import POSITION, Constraint
+from ..graph.core import Expr, Graph
+from ..graph.differentiate import gradient, jvp
+from ..graph.substitute import symbols_of
+from .input_names import chains, rate_of, split_rate
+from .mechanism import Event, GivenEquations, Input, Lagrangian, Output
+from .reading import Reader
+
+
+def clock(graph: Graph, inputs: Sequence[Input]) -> dict[Expr, Expr]:
+    """The direction of d/dt of what is prescribed: t' = 1, and the rate of every input."""
+    rates = {graph.symbol(u.name): graph.symbol(rate_of(u.name)) for u in inputs}
+    return {graph.symbol("t"): graph.one, **rates}
+
+
+def add_rates(
+    reader: Reader,
+    inputs: tuple[Input, ...],
+    lagrangian: Lagrangian | None,
+    given: GivenEquations | None,
+    constraints: Sequence[Constraint],
+    events: Sequence[Event],
+    outputs: Sequence[Output],
+) -> tuple[Input, ...]:
+    """The inputs, and those rates of them that the equations need; all rates with their expressions over time.
+
+    A rate that is declared as an input already stays where it is.  Faults are noted: a name that is taken, a rate that
+    would need accelerations.
+    """
+    needed: dict[str, str] = {}
+    for expressions, times, why in _differentiated(reader, lagrangian, given, constraints, events, outputs):
+        for name in sorted(symbols_of(expressions) & {u.name for u in inputs}):
+            for k in range(1, times + 1):
+                needed.setdefault(rate_of(name, k), f"input {name!r}, whose rate {why} needs")
+    own = {u.name for u in inputs}
+    added = []
+    for rate, why in needed.items():
+        if rate in own:
+            continue
+        base = next(u for u in inputs if split_rate(u.name)[0] == split_rate(rate)[0])
+        kind = reader.names.kinds.get(rate)
+        if kind is not None:
+            message = f"the name is the rate of {why}"
+            reader.faults.add(reader.names.places[rate], message, f"rename the {kind}, or the input")
+            continue
+        reader.names.declare("input", rate, f"inputs.{base.name}")
+        unit = f"{base.unit}/s^{k}" if (k := split_rate(rate)[1]) > 1 else f"{base.unit}/s"
+        doc = f"rate of {base.name}" if k == 1 else f"derivative {k} of {base.name} by time"
+        added.append(Input(rate, 0.0, unit if base.unit else "", doc))
+    return _with_signals(reader, (*inputs, *added))
+
+
+def _differentiated(
+    reader: Reader,
+    lagrangian: Lagrangian | None,
+    given: GivenEquations | None,
+    constraints: Sequence[Constraint],
+    events: Sequence[Event],
+    outputs: Sequence[Output],
+) -> list[tuple[list[Expr], int, str]]:
+    """Expressions that the equations differentiate by time, how often, and what they are."""
+    symbol = reader.graph.symbol
+    found: list[tuple[list[Expr], int, str]] = []
+    rates: set[str] = set()
+    if lagrangian is not None:
+        v = [symbol(f"{name}_dot") for name in lagrangian.coordinates]
+        found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)"))
+        rates = {f"{name}_dot" for name in lagrangian.coordinates}
+    if given is not None:
+        rates = {f"{name}_dot" for name in given.coordinates} | set(given.velocities)
+    bare = lagrangian or given
+    positions = [e for e in bare.constraints if symbols_of([e]).isdisjoint(rates)] if bare is not None else []
+    velocities = [e for e in bare.constraints if not symbols_of([e]).isdisjoint(rates)] if bare is not None else []
+    found += [(positions, 2, "a constraint"), (velocities, 1, "a constraint of velocities")]
+    if given is not None:
+        seconds = {f"{name}_ddot" for name in given.coordinates}
+        shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
+        if positions or shown:
+            found.append((list(given.rates), 1, "q'' of the given rates"))
+    for c in constraints:
+        if isinstance(c, Driver):
+            found.append(([c.value], 2, f"the driver {c.name!r}"))
+        elif isinstance(c, Equation):
+            found.append(([c.expression], 2 if c.level == POSITION else 1, f"the constraint {c.name!r}"))
+    found += [([e.expression], 1, f"the gap {e.name!r}") for e in events if e.restitution is not None]
+    return found
+
+
+def _with_signals(reader: Reader, inputs: tuple[Input, ...]) -> tuple[Input, ...]:
+    """Rates of inputs with an expression over time get its derivative, where they have none of their own."""
+    signals = {u.name: u.signal for u in inputs if u.signal is not None}
+    for base, rates in chains([u.name for u in inputs]).items():
+        last = base
+        for rate in rates if base in signals else ():
+            if rate not in signals:
+                found: Expr | None = signals[last]
+                for k in range(split_rate(rate)[1] - split_rate(last)[1]):
+                    found = None if found is None else _rate_of_signal(reader, found, last, k)
+                if found is None:
+                    return inputs
+                signals[rate] = found
+            last = rate
+    return tuple(replace(u, signal=signals[u.name]) if u.name in signals else u for u in inputs)
+
+
+def _rate_of_signal(reader: Reader, signal: Expr, name: str, order: int) -> Expr | None:
+    """The derivative by time of an expression of t, coordinates, velocities and parameters; faults are noted."""
+    kinds, symbol = reader.names.kinds, reader.graph.symbol
+    along: Mapping[str, str] = {
+        n: f"{n}_dot" for n in symbols_of([signal]) if kinds.get(n) not in ("time", "parameter", None)
+    }
+    for state in sorted(along):
+        if kinds.get(along[state]) != "velocity":
+            message = f"{rate_of(name, order + 1)} is needed, and the rate of {state!r} is no velocity"
+            reader.faults.add(f"inputs.{name}.signal", message, "write it in t and parameters")
+            return None
+    direction = {symbol(n): symbol(rate) for n, rate in along.items()}
+    return jvp([signal], {symbol("t"): reader.graph.one, **direction})[0]

@@ -1,0 +1,17 @@
+"""Limits: what double precision leaves of a number that should be zero."""
+
+from __future__ import annotations
+
+EPS = 2.0**-52  #: distance from 1 to the next number
+#: A sum counts as zero within so many times eps of its terms: the numbers of a description are rounded before they come
+#: here, entries of a turned frame from three angles by up to nine products, a turned tensor from some 30.
+ROUNDED = 64.0 * EPS
+#: The same of a sum of products formed here, of which each is rounded once and the sum once.
+SUMMED = 4.0 * EPS
+#: The same of a constraint row over its own terms, each known to half of eps: what is smaller is noise for certain.
+ROW = 2.0 * EPS
+#: Stands for a size that is zero, where it divides: far below any size, far above the least number (2.2e-308).
+TINY = 1e-300
+#: The same of sizes that are squared.
+TINY_ROOT = 1e-150
+LARGE_ROOT = 1e150  #: a number whose square is beyond double precision

@@ -1,0 +1,26 @@
+"""Limits: integrators, events and inputs over time."""
+
+from __future__ import annotations
+
+from .rounding import EPS
+
+# -- tolerances ------------------------------------------------------------------------------------------------------
+RTOL, ATOL = 1e-8, 1e-10  #: of a run, where nothing is said
+LEAST_RTOL = 100.0 * EPS  #: as in SciPy: nothing smaller can be kept
+
+# -- runs that stall -------------------------------------------------------------------------------------------------
+SHORT = 5e-9  #: mean step relative to the span below which a run does not get on: 2e8 steps to its end
+STILL = 1e-4  #: change of the state in a window of steps, relative to the largest yet, below which nothing happens
+NOTICED = 1e-12  #: part of a state below which its change is rounding of the steps
+STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrator
+
+# -- events ----------------------------------------------------------------------------------------------------------
+CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time
+TOUCHING = 1e-9  #: part of its size at which the value of an event counts as zero, and its rate as none
+INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end
+AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken: the root of its rounding
+
+# -- inputs ----------------------------------------------------------------------------------------------------------
+MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is differenced: the cube root of eps
+CONTINUOUS = 1e-9  #: part of the largest value or slope of a table by which it may jump and count as continuous
+DIFFERENCE = 1e-6  #: part of a variable over which a function of it is differenced

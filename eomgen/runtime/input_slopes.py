@@ -1,0 +1,111 @@
+"""Stage runtime: the inputs of a run -> their derivatives by time, state and parameters, exact or refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .layout import Layout
+from .signals import Forcing, Signal
+
+
+class Slopes(NamedTuple):
+    """Derivatives of all inputs at a time and state."""
+
+    by_t: Array  #: (n_u,)
+    by_x: Array  #: (n_u, n_x)
+    by_p: Array  #: (n_u, n_p)
+
+
+class InputSlopes:
+    """Derivatives of the inputs of one run.
+
+    An expression is differentiated on the graph, a table piece by piece.  A Python function is called without the
+    state from here on: one that reads it has derivatives that nobody knows.
+
+    Parameters
+    ----------
+    layout : Layout
+    forcing : Forcing
+        Attached to the module of the run.
+    p : (n_p,) array
+    """
+
+    def __init__(self, layout: Layout, forcing: Forcing, p: Array) -> None:
+        self.layout = layout
+        self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
+        self.tables: dict[int, Signal] = {}
+        self.functions: set[int] = set()
+        for i, signal in forcing.varying.items():
+            if i in self.formulas:
+                continue
+            if isinstance(signal, Signal):
+                self.tables[i] = signal
+            else:
+                self.functions.add(i)
+                forcing.varying[i] = OfTime(layout.u[i], signal)
+
+    @property
+    def by_state_or_parameters(self) -> bool:
+        """Whether an input may depend on more than time."""
+        return bool(self.formulas)
+
+    def __call__(self, t: float, x: Array) -> Slopes:
+        """The derivatives; NaN by time for a Python function."""
+        n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
+        every = np.zeros((n_u, 1 + n_x + n_p))
+        for i, slopes in self.formulas.items():
+            every[i] = slopes(t, x)
+        for i, table in self.tables.items():
+            every[i, 0] = table_rate(table, t)
+        for i in self.functions:
+            every[i, 0] = np.nan
+        return Slopes(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
+
+
+class OfTime:
+    """A user's function f(t, x) as one of time alone.
+
+    Parameters
+    ----------
+    name : str
+        Of the input.
+    function : callable f(t, x)
+    """
+
+    def __init__(self, name: str, function: Callable[[float, Any], float]) -> None:
+        self.name, self.function = name, function
+
+    def __call__(self, t: float, x: Array) -> float:
+        """The value, without the state.
+
+        Raises
+        ------
+        UsageError
+            The function reads the state.
+        """
+        try:
+            return self.function(t, None)
+        except Exception:
+            self.function(t, x)  # a fault of its own comes out as it is
+        raise UsageError(
+            f"input {self.name} is a Python function that reads the state, whose derivatives are not known: give it as "
+            'an expression in a text, such as "-k*theta", or as a function of time alone'
+        )
+
+
+def table_rate(table: Signal, t: float) -> float:
+    """The slope of a table at time t, to the right where it jumps."""
+    times = table.times
+    if table.order == 0 or len(times) < 2 or not times[0] <= t < times[-1]:
+        return 0.0
+    k = int(np.searchsorted(times, t, side="right")) - 1
+    if table.order == 1:
+        return float((table.values[k + 1] - table.values[k]) / (times[k + 1] - times[k]))
+    _, slope, bend, third = table.coefficients[k]
+    s = t - times[k]
+    return float(slope + s * (2.0 * bend + 3.0 * s * third))

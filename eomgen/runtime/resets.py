@@ -1,0 +1,62 @@
+"""Stage runtime: the resets of one run -> where events go on from, and when they follow each other without end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..errors import ZenoError
+from ..limits.runs import AHEAD, CROWD, CROWDED, TOUCHING
+from ..numeric.scales import Array
+from .events import RESET, WAIT, Event, Events
+
+
+class Resets:
+    """What an integrator that starts anew at each reset has to remember.
+
+    Parameters
+    ----------
+    events : sequence of Event
+    rhs : callable
+        (t, x) -> x'.
+    start, end : float
+        Of the run (s).
+    """
+
+    def __init__(self, events: Sequence[Event], rhs: Callable[[float, Array], Array], start: float, end: float) -> None:
+        self.events, self.rhs, self.span = events, rhs, end - start
+        self.count, self.crowded, self.last = 0, 0, np.inf
+        self.most = max(CROWD, 2 * len(events))
+
+    def note(self, t: float, before: Array, after: Array, fired: Sequence[int]) -> None:
+        """Take note of events that happened at time t and led from one state to another.
+
+        Raises
+        ------
+        ZenoError
+            Resets follow each other ever faster, or lead nowhere.
+        """
+        self.count += 1
+        self.crowded = self.crowded + 1 if abs(t - self.last) < CROWDED * abs(self.span) else 0
+        self.last = t
+        for e in fired:
+            event = self.events[e]
+            came, goes = (self.rate(event, t, state) for state in (before, after))
+            stuck = not abs(goes) > TOUCHING * abs(came) or (event.action == WAIT and goes < 0.0)
+            again = event.direction * came < 0.0  # the zero it just left
+            if event.action in (RESET, WAIT) and (stuck or again):
+                self.crowded = self.most
+            event.left = (t, float(np.sign(goes)))
+        if self.crowded >= self.most:
+            raise self.endless()
+
+    def endless(self) -> ZenoError:
+        """The error for resets that never end."""
+        return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action in (RESET, WAIT)])
+
+    def rate(self, event: Event, t: float, x: Array) -> float:
+        """How fast an event's value changes along the motion, in the direction of the run."""
+        h = AHEAD * self.span
+        event.left = None
+        return float((event(t + h, x + h * np.asarray(self.rhs(t, x))) - event(t, x)) / abs(h))

@@ -1,0 +1,225 @@
+"""Stage runtime: an input as it is given for a run -> its rates, which the equations may need as inputs of their own.
+
+A number has rate 0, a table the slope of its pieces, a text the derivative of its expression along the motion, and an
+object with a method ``derivative()`` says it itself.  Of any other function no rate is known, and it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..limits.rounding import TINY
+from ..limits.runs import CONTINUOUS, MOMENT
+from ..numeric.scales import Array
+from .tapes import DeclaredSignal, Formula
+
+if TYPE_CHECKING:
+    from .layout import Layout
+    from .signals import Forcing
+
+CELLS = 256  #: intervals of a run in which jumps of a text are looked for
+
+
+class TableRate:
+    """A derivative of a table by time: cubic pieces that may jump where they meet, 0 before and after.
+
+    At the first and the last time it is that of the piece inside, so that a run over just the table sees no jump.
+
+    Parameters
+    ----------
+    times : (k,) array
+    pieces : (k - 1, 4) array
+        Coefficients of each piece in powers of the time since its beginning.
+    corners : bool
+        Whether integrators step on the times where pieces meet.
+    """
+
+    order = 4  #: as the compiled loop knows it
+
+    def __init__(self, times: Array, pieces: Array, corners: bool) -> None:
+        self.times, self.pieces, self.corners = times, pieces, corners
+
+    def __call__(self, t: Any, x: Any = None) -> Any:
+        """The value at time t, a number or an array of them."""
+        return self.beside(t, t)
+
+    def beside(self, t: Any, at: Any) -> Any:
+        """The value at t of the piece that holds at time ``at``."""
+        if not len(self.pieces):
+            return np.zeros(np.shape(t))[()]
+        k = np.clip(np.searchsorted(self.times, at, side="right") - 1, 0, len(self.pieces) - 1)
+        s, c = np.asarray(t) - self.times[k], self.pieces[k]
+        value = c[..., 0] + s * (c[..., 1] + s * (c[..., 2] + s * c[..., 3]))
+        return np.where((np.asarray(at) < self.times[0]) | (np.asarray(at) > self.times[-1]), 0.0, value)[()]
+
+    def derivative(self) -> TableRate:
+        """The derivative of this one."""
+        return TableRate(self.times, self.pieces[:, [1, 2, 3, 3]] * (1.0, 2.0, 3.0, 0.0), self.corners)
+
+    def kinks(self) -> Array:
+        """Times where integrators start anew."""
+        return self.times if self.corners else np.empty(0)
+
+    def encode(self) -> tuple[int, Array, Array]:
+        """Order, times and values as the compiled loop reads them: 0 from a time before the first to it, and after."""
+        nothing = np.zeros((1, 4))
+        times = np.concatenate([[self.times[0] - 1.0], self.times])
+        return self.order if self.corners else 3, times, np.concatenate([nothing, self.pieces, nothing])
+
+
+def pieces_of(times: Array, values: Array, coefficients: Array | None, order: int) -> Array:
+    """Rows (k - 1, 4) of a table: value, slope, half the curvature, a sixth of the third derivative of each piece."""
+    if coefficients is not None:
+        return coefficients[:-1]
+    pieces = np.zeros((len(times) - 1, 4))
+    pieces[:, 0] = values[:-1]
+    if order == 1:
+        pieces[:, 1] = np.diff(values) / np.diff(times)
+    return pieces
+
+
+def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
+    """Times at which the derivative of an order (0: the value) of a table jumps; its end values hold outside."""
+    here, ends = TableRate(times, pieces, True), (values[:1], values[-1:])
+    for _ in range(order):
+        here, ends = here.derivative(), (np.zeros(1), np.zeros(1))
+    left = np.concatenate([ends[0], here.beside(times[1:], times[:-1])]) if len(pieces) else ends[0]
+    right = np.concatenate([here.beside(times[:-1], times[:-1]), ends[1]]) if len(pieces) else ends[1]
+    size = max(np.abs(left).max(), np.abs(right).max())
+    return np.asarray(times[np.abs(right - left) > CONTINUOUS * size])
+
+
+def require_smooth(forcing: Forcing, start: float, end: float) -> None:
+    """Refuse tables that jump where their rates are needed, and texts that do not change as their rates say.
+
+    Raises
+    ------
+    UsageError
+    """
+    layout = forcing.layout
+    for rate, (name, times, _) in forcing.derived.items():
+        table: Any = forcing.varying.get(layout.u.index(name))
+        if not hasattr(table, "jumps"):
+            continue
+        found = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
+        if found:
+            what = "its value" if times == 1 else "its slope" if times == 2 else f"its derivative {times - 1}"
+            raise UsageError(
+                f"input {name}: the equations need {rate}, and {what} jumps in the {table.interpolation} table at "
+                f't = {found[0]:.6g} s, which is an impact; give Signal(times, values, "cubic") over all of the run, '
+                f"a text, or {rate} beside it"
+            )
+    zero = np.zeros(layout.n_x)
+    for first, of in layout.input_rates.items():
+        for name, rate in pairwise([first, *(rate for rate, _ in of)]):
+            f, g = (forcing.formulas.get(layout.u.index(n)) for n in (name, rate))
+            follows = rate in forcing.derived or (isinstance(f, DeclaredSignal) and isinstance(g, DeclaredSignal))
+            if f is None or g is None or not follows or not f.branches or start == end:
+                continue  # conditions have slope 0: only they can hide a jump
+            what = f"input {name}: the equations need its rate {rate}"
+            if f.depends_on_state:
+                raise UsageError(f"{what}, and conditions on the state may make it jump; write it without, or in t")
+            jump = find_jump(f.function(forcing.parameters), g.function(forcing.parameters), zero, start, end)
+            if jump is not None:
+                raise UsageError(f"{what}, and it jumps at t = {jump:.6g} s, which is an impact; write it smoother")
+
+
+def find_jump(
+    value: Callable[[float, Array], float], rate: Callable[[float, Array], float], x: Array, start: float, end: float
+) -> float | None:
+    """A time at which a function jumps that has this rate elsewhere; None if it does not.
+
+    Over an interval the function changes by the integral of its rate, whose error goes with the interval where the rate
+    has kinks; a jump stays.
+    """
+    low, high = min(start, end), max(start, end)
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+
+    def gap(a: float, b: float) -> float:
+        times = 0.5 * (a + b) + 0.5 * (b - a) * nodes
+        integral = 0.5 * (b - a) * sum(w * rate(t, x) for w, t in zip(weights, times, strict=True))
+        return float(abs(value(b, x) - value(a, x) - integral))
+
+    edges: list[float] = np.linspace(low, high, CELLS + 1).tolist()
+    values = [value(t, x) for t in edges]
+    allowed = CONTINUOUS * max(TINY, *map(abs, values))
+    for a, b in pairwise(edges):
+        left, right = a, b
+        while gap(left, right) > allowed:
+            middle = 0.5 * (left + right)
+            if right - left <= 1e-12 * (high - low) or not left < middle < right:
+                return middle
+            left, right = (left, middle) if gap(left, middle) > gap(middle, right) else (middle, right)
+    return None
+
+
+def drift(values: Callable[[float], Array], t: float) -> Array:
+    """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
+    h = (t + MOMENT * max(1.0, abs(t))) - t
+    near, far = values(t + h) - values(t - h), values(t + 2.0 * h) - values(t - 2.0 * h)
+    return np.asarray((8.0 * near - far) / (12.0 * h))
+
+
+def moving_inputs(layout: Layout, u: Array) -> Array:
+    """Rates (n_u,) of inputs whose rates are among the inputs u (n_u,); 0 of the others."""
+    rates = np.zeros(layout.n_u)
+    for name, of in layout.input_rates.items():
+        chain = [name, *(rate for rate, _ in of)]
+        orders = [0, *(times for _, times in of)]
+        for k in range(len(of)):
+            if orders[k + 1] == orders[k] + 1:
+                rates[layout.u.index(chain[k])] = u[layout.u.index(chain[k + 1])]
+    return rates
+
+
+def fill_rates(
+    layout: Layout, given: Mapping[str, Any], derive: Callable[[str, str, Any], Any]
+) -> dict[str, tuple[str, int, Any]]:
+    """Rates that follow from what is given: name -> (the input they are of, how many times it is derived, value).
+
+    Parameters
+    ----------
+    layout : Layout
+    given : mapping
+        Inputs of a run, by name.
+    derive : callable
+        As :func:`derive`.
+    """
+    found: dict[str, tuple[str, int, Any]] = {}
+    for first, rates in layout.input_rates.items():
+        last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
+        for rate, times in rates:
+            if rate in given:
+                last, order, value, at = rate, times, given[rate], times
+            elif last:
+                for _ in range(times - at):
+                    value = derive(last, rate, value)
+                at = times
+                found[rate] = last, times - order, value
+    return found
+
+
+def derive(name: str, rate: str, value: Any) -> Any:
+    """The rate of an input given as a number, Formula, Signal or function.
+
+    Raises
+    ------
+    UsageError
+        It is a function that knows none, or would need accelerations.
+    """
+    if isinstance(value, float):
+        return 0.0
+    if isinstance(value, Formula):
+        return value.derivative(name, rate)
+    derivative = getattr(value, "derivative", None)
+    if callable(derivative):
+        return derivative()
+    raise UsageError(
+        f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
+        f"or {name} as text, table or Signal, or as an object with a method derivative()"
+    )
