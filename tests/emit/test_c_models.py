@@ -28,8 +28,8 @@ class Case(NamedTuple):
     x: np.ndarray  #: a state on the constraints
 
 
-def rods(name: str = "rods") -> eg.Model:
-    """Two bodies on balls, held together by a rod: five freedoms."""
+def rods(name: str = "rods", twice: bool = False) -> eg.Model:
+    """Two bodies on balls, held together by a rod, or two in one place: five freedoms."""
     m = eg.Model(name, gravity=(0.0, 0.0, -9.81))
     l, torque = m.parameter("l", 1.1), m.input("torque", 0.4)
     a = m.body("a", mass=1.2, com=(0.1, 0.2, -0.5), inertia=(0.2, 0.3, 0.15))
@@ -37,6 +37,9 @@ def rods(name: str = "rods") -> eg.Model:
     m.spherical("A", m.ground, a, rotation="euler_parameters")
     m.spherical("B", m.ground.at(1.0, 0.0, 0.0), b, rotation="euler_parameters")
     m.distance("rod", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l)
+    if twice:
+        gap = m.parameter("gap", 0.0)
+        m.distance("second", a.at(0.0, 0.3, -1.0), b.at(0.2, 0.0, -0.9), length=l + gap)
     m.torque("drive", a, (torque, 0, 0))
     return m
 
@@ -75,6 +78,7 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
     models: dict[str, tuple[Callable[[], eg.Model], str]] = {
         "balls": (rods, "embedding"),
         "forces": (lambda: rods("reacting"), "newton_euler"),
+        "twice": (lambda: rods("doubled", twice=True), "embedding"),
         "freedoms": (five_bar, "embedding"),
         "tree": (lambda: links(4, "shortchain"), "embedding"),
         "columns": (lambda: links(5, "longchain"), "recursive"),
@@ -85,7 +89,7 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
         if name not in known:
             model, method = models[name]
             equations = model().derive(method)
-            kernels = KERNELS if name != "forces" else ["rhs", "project"]
+            kernels = KERNELS if name not in ("forces", "twice") else ["rhs", "project"]
             kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
             metadata = collect_metadata(kinematics, mobility, tree) | {"target": "c"}
             limits = Limits(unrolled=0, unrolled_loops=0)  # the drivers are what is tried
@@ -184,3 +188,17 @@ def test_euler_parameters_are_projected_by_the_least_turn(make: Callable[[str], 
     step, C_q = np.concatenate(steps), module.constraint_jacobian(closed[:n_q])[0]
     across = step - C_q * (C_q @ step) / (C_q @ C_q)
     assert np.abs(across).max() <= 1e-3 * np.abs(step).max()
+
+
+def test_a_gap_that_is_left_is_reported(make: Callable[[str], Case]) -> None:
+    """Two rods in one place whose lengths differ: half of the difference is left at either."""
+    library, module, x = make("twice")
+    names, p = list(module.p_names), np.array(module.p)
+    for gap, status in ((0.0, 0), (2e-11, 0), (1e-9, 3), (1e-3, 3)):
+        p[names.index("gap")] = gap
+        library.set_parameters(p)
+        found, closed = library("project", x)
+        assert found == status, gap
+        if status == 0:
+            residuals = module.bind(p=p).constraints(closed[: module.n_q], rows="all")
+            assert np.abs(residuals).max() == pytest.approx(gap / 2, abs=1e-14)

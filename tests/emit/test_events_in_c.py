@@ -75,7 +75,7 @@ int main(void)
     for (int order = 0; order < 4; order++) {
         const eomgen_signal table = {5, order, times, order == 3 ? pieces : values_, NULL};
         for (int k = -2; k < 45; k++) {
-            printf("%.17g ", eomgen_table_value(&table, 0.05 * k));
+            printf("%.17g ", eomgen_table_value(&table, 0.05 * k, NAN));
         }
         printf("\n");
     }
