@@ -48,3 +48,30 @@ def test_dissipation_brakes(method: str) -> None:
     ).compile(method=method, target="numpy")  # fmt: skip
     x = np.array([0.0, 0.0, 1.2, -0.4])
     assert mod.rhs(0.0, x)[2:] == pytest.approx([(1.5 - 0.8 * 1.6) / 2.0, 0.8 * 1.6 / 0.5], rel=1e-12)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_length_that_an_input_prescribes(method: str) -> None:
+    """(l^2 theta')' = 0 on a turntable with l = 1 + t: theta' = theta'(0) / l^2, so theta'(1) = 1/4."""
+    mod = eg.Model.from_lagrangian("reel", "l**2*th_dot**2/2", ["th"], inputs={"l": 1.0}).compile(
+        method=method, target="numpy"
+    )
+    assert mod.u_names == ("l", "l_dot")
+    assert mod.rhs(0.0, np.array([0.0, 3.0]), u=[2.0, 0.5]) == pytest.approx([3.0, -2 * 0.5 / 2.0 * 3.0], rel=1e-13)
+    run = mod.simulate(1.0, {"th": 0.0, "th_dot": 1.0}, inputs={"l": "1 + t"}, rtol=1e-10, atol=1e-12)
+    assert run["th_dot"][-1] == pytest.approx(0.25, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", OF_LAGRANGIANS)
+def test_a_constraint_that_an_input_moves(method: str) -> None:
+    """A bead on a rod through the origin that is turned by a(t): r'' = r a'^2 - g sin(a) (Goldstein, sec. 1.6)."""
+    mod = eg.Model.from_lagrangian(
+        "rod", "(x_dot**2 + y_dot**2)/2 - g*y", ["x", "y"], constraints=["x*sin(a) - y*cos(a)"],
+        parameters={"g": 9.81}, inputs={"a": 0.4},
+    ).compile(method=method, target="numpy")  # fmt: skip
+    assert mod.u_names == ("a", "a_dot", "a_ddot")
+    a, rate, bend, r, slide = 0.4, 0.7, -1.1, 1.3, 0.5
+    along, across = np.array([np.cos(a), np.sin(a)]), np.array([-np.sin(a), np.cos(a)])
+    x = np.concatenate([r * along, slide * along + r * rate * across])
+    expected = (-9.81 * np.sin(a)) * along + (2 * slide * rate + r * bend) * across
+    assert mod.rhs(0.0, x, u=[a, rate, bend])[2:] == pytest.approx(expected, rel=1e-11)

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
-from mutations import c_code, derivation, elements, numerics
+from mutations import c_code, derivation, elements, emitters, numerics, runtime
 
-FAULTS = (*derivation.FAULTS, *elements.FAULTS, *numerics.FAULTS, *c_code.FAULTS)
+FAULTS = (
+    *derivation.FAULTS,
+    *elements.FAULTS,
+    *numerics.FAULTS,
+    *emitters.FAULTS,
+    *c_code.FAULTS,
+    *runtime.FAULTS,
+)

@@ -1,0 +1,153 @@
+"""Faults in the runtime and in analyses: inputs and their rates, events, impacts, sensitivities, equilibria, starts."""
+
+from __future__ import annotations
+
+from mutations.fault import Fault
+
+BARE = "tests/equations/test_bare_lagrangian.py"
+EVENTS, SENSITIVITIES = "tests/runtime/test_events.py", "tests/analysis/test_sensitivities.py"
+SALTATION, IMPACT = "tests/analysis/test_sensitivities_events.py", "tests/analysis/test_impact_law.py"
+
+FAULTS = (
+    Fault(
+        "input-rates", "eomgen/describe/input_rates.py",
+        'return {graph.symbol("t"): graph.one, **rates}', 'return {graph.symbol("t"): graph.one}',
+        "rates of inputs are dropped from d/dt", (BARE,),
+    ),
+    Fault(
+        "input-second-rates", "eomgen/describe/input_rates.py",
+        '(positions, 2, "a constraint")', '(positions, 1, "a constraint")',
+        "second rates of inputs in constraints are taken for 0", (BARE,),
+    ),
+    Fault(
+        "table-rate", "eomgen/runtime/signal_rates.py",
+        "self.pieces[:, [1, 2, 3, 3]] * (1.0, 2.0, 3.0, 0.0)", "self.pieces[:, [1, 2, 3, 3]] * (1.0, 1.0, 1.0, 0.0)",
+        "rates of cubic tables lack the factors 2 and 3", ("tests/runtime/test_rates_of_tables.py",),
+    ),
+    Fault(
+        "table-coefficients", "eomgen/runtime/signals.py",
+        "(slope[:-1] + slope[1:] - 2.0 * rise) / h", "(slope[:-1] + slope[1:] - rise) / h",
+        "cubic tables: a factor 2", ("tests/runtime/test_rates_of_tables.py",),
+    ),
+    Fault(
+        "table-held", "eomgen/runtime/signals.py",
+        'k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 1)\n        if self.order == 0:',
+        'k = np.clip(np.searchsorted(self.times, t, side="right"), 0, len(self.times) - 1)\n        if self.order == 0:',
+        "held tables give the next value instead of the last", ("tests/runtime/test_rates_of_tables.py",),
+    ),
+    Fault(
+        "event-reset-projection", "eomgen/runtime/events.py",
+        "after = np.asarray(module.project(after, t=t, u=forcing(t, after)))", "after = np.asarray(after)",
+        "a reset state is not brought back onto the loops", (f"{EVENTS}::test_a_reset_in_a_loop_is_brought_back_onto_it",),
+    ),
+    Fault(
+        "event-direction-scipy", "eomgen/runtime/events.py",
+        "self.direction = int(np.sign(given)) if", "self.direction = 0 if",
+        "the direction of an event is ignored", (f"{EVENTS}::test_texts_functions_and_mappings",),
+    ),
+    Fault(
+        "gap-rate-in-time", "eomgen/analysis/impact.py",
+        "rates = rows @ v + drift(", "rates = rows @ v + 0.0 * drift(",
+        "impacts of the model's events: the rate of a gap that moves by itself is dropped", ("tests/runtime/test_events.py",),
+    ),
+    Fault(
+        "gap-rate-of-racket", "eomgen/analysis/impact_gaps.py",
+        "rates += drift(lambda time: each.values(time, x), t)", "rates += 0.0 * drift(lambda time: each.values(time, x), t)",
+        "impacts: the rate of a gap that moves by itself is dropped", (IMPACT,),
+    ),
+    Fault(
+        "gap-rate-of-inputs", "eomgen/runtime/signal_rates.py",
+        "rates[layout.u.index(chain[k])] = u[layout.u.index(chain[k + 1])]", "rates[layout.u.index(chain[k])] = 0.0",
+        "impacts: the rate of a gap that an input moves is dropped", (EVENTS, "tests/analysis/test_impact_runs.py"),
+    ),
+    Fault(
+        "restitution", "eomgen/analysis/impact_law.py",
+        "-(1.0 + e) * rates", "-(1.0 + e * e) * rates",
+        "the restitution of impacts is squared", (IMPACT,),
+    ),
+    Fault(
+        "impact-metric", "eomgen/analysis/impact_law.py",
+        "wanted, now = step - gaps.T @ change, rates[:count]", "wanted, now = step, rates[:count]",
+        "impacts with locked coordinates: what the locks do is counted twice", ("tests/analysis/test_impact.py", IMPACT),
+    ),
+    Fault(
+        "sensitivity-parameters", "eomgen/analysis/variations.py",
+        "S_dot = S_dot + self.by_p(t, x, u=u) @ self.dp", "S_dot = S_dot + 0.0 * self.by_p(t, x, u=u) @ self.dp",
+        "sensitivities: df/dp is dropped", (f"{SENSITIVITIES}::test_a_linear_oscillator",),
+    ),
+    Fault(
+        "sensitivity-input-parameters", "eomgen/analysis/variations.py",
+        "du = self.du + by_x @ dx + by_p @ self.dp", "du = self.du + by_x @ dx",
+        "sensitivities: parameters inside an input's text are dropped", (f"{SENSITIVITIES}::test_parameters_and_states_in_the_text_of_an_input",),
+    ),
+    Fault(
+        "sensitivity-input-states", "eomgen/analysis/variations.py",
+        "du = self.du + by_x @ dx + by_p @ self.dp", "du = self.du + by_p @ self.dp",
+        "sensitivities: states inside an input's text are dropped", (f"{SENSITIVITIES}::test_parameters_and_states_in_the_text_of_an_input",),
+    ),
+    Fault(
+        "sensitivity-start", "eomgen/analysis/start.py",
+        "right = [*(-(other[lines] + E[lines, :n_q] @ dq) / scales.c[:, None])]", "right = [*(-other[lines] / scales.c[:, None])]",
+        "sensitivities at the start: velocities do not follow the position", (f"{SENSITIVITIES}::test_the_start_follows_the_parameters",),
+    ),
+    Fault(
+        "saltation-time", "eomgen/analysis/saltation.py",
+        "move = self.run.move(t, x, S + np.multiply.outer(before, dt), dt)", "move = self.run.move(t, x, S, dt)",
+        "saltation: the term f- dT is dropped", (f"{SALTATION}::test_a_bouncing_ball_in_closed_form",),
+    ),
+    Fault(
+        "saltation-after", "eomgen/analysis/saltation.py",
+        "d_after - np.multiply.outer(after, dt)", "d_after",
+        "saltation: the term f+ dT is dropped", (f"{SALTATION}::test_a_bouncing_ball_in_closed_form",),
+    ),
+    Fault(
+        "saltation-sign", "eomgen/analysis/saltation.py",
+        "return np.asarray(-along[0] / rate)", "return np.asarray(along[0] / rate)",
+        "the time of an event moves the wrong way", (f"{SALTATION}::test_an_event_that_ends_the_run",),
+    ),
+    Fault(
+        "strike-restitution", "eomgen/analysis/strike_slopes.py",
+        "names) + e * move.along(before", "names) + move.along(before",
+        "derivative of an impact: the restitution is taken for 1", (f"{SALTATION}::test_a_bouncing_ball_in_closed_form",),
+    ),
+    Fault(
+        "equilibrium-nonholonomic", "eomgen/analysis/search.py",
+        "return np.concatenate([forces, (here.v / s)[like.surplus]])", "return np.concatenate([forces, 0.0 * (here.v / s)[like.surplus]])",
+        "equilibria ignore what nonholonomic rows move", ("tests/analysis/test_rest_and_velocity_rows.py",),
+    ),
+    Fault(
+        "equilibrium-tolerance", "eomgen/analysis/newton.py",
+        "SMALL = 1e-12 ", "SMALL = 1e-3 ",
+        "equilibria are found to three digits only", ("tests/analysis/test_equilibrium.py",),
+    ),
+    Fault(
+        "dae-jacobian", "eomgen/runtime/numpy_drivers.py",
+        "x[2 * n] * np.eye(n)])", "np.eye(n)])",
+        "dF/dy + cj dF/dy' of the differential-algebraic form: cj is taken for 1", ("tests/forms/test_dae.py::test_consistent_values_leave_no_residual_and_the_jacobian_is_exact",),
+    ),
+    Fault(
+        "numpy-given-jacobian", "eomgen/runtime/numpy_drivers.py",
+        "da = system.solve(-right)[:n]", "da = system.solve(right)[:n]",
+        "the Jacobian of a stabilised right-hand side has the wrong sign", ("tests/forms/test_baumgarte.py::test_the_jacobian_is_that_of_the_stabilised_right_hand_side",),
+    ),
+    Fault(
+        "multipliers-scale", "eomgen/analysis/constrained.py",
+        "scaled[:, :, 0].T / scales.c[:, None]", "scaled[:, :, 0].T * scales.c[:, None]",
+        "multipliers are scaled back the wrong way", ("tests/analysis/test_reactions_closed.py", "tests/acceptance/test_any_units.py"),
+    ),
+    Fault(
+        "minimal-velocities", "eomgen/runtime/minimal.py",
+        "q_i, v_i = x[:k], x[k:]", "q_i, v_i = x[:k], 0.0 * x[k:]",
+        "the minimal form forgets the velocities", ("tests/acceptance/test_minimal.py",),
+    ),
+    Fault(
+        "start-branch", "eomgen/runtime/initial.py",
+        "return self._alignment is None or bool((self._alignment(q, t=self.t) > 0.0).all())", "return True",
+        "flipped positions are accepted", ("tests/acceptance/test_isolation.py", "tests/runtime/test_simulate.py"),
+    ),
+    Fault(
+        "momenta-place", "eomgen/runtime/momenta.py",
+        'self._part("momentum", 3 + 3 * self.kernels.layout.n_v, 6, rates=True)', 'self._part("momentum", 9 + 3 * self.kernels.layout.n_v, 6, rates=True)',
+        "momentum is read from the place of the inertia", ("tests/runtime/test_momenta.py",),
+    ),
+)  # fmt: skip
