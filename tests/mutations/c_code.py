@@ -10,6 +10,7 @@ BALL, EVENTS = "tests/emit/test_steppers_in_c.py", "tests/emit/test_events_in_c.
 MODELS = "tests/emit/test_c_models.py"
 SOLVE, SLOPES = f"{MODELS}::test_accelerations_are_those_of_a_solve_with_multipliers", f"{MODELS}::test_derivatives_are_differences"
 PROJECTION = f"{LOOPS}::test_the_projection_closes_the_loops_with_the_smallest_change"
+LANES = "tests/emit/test_ensembles_in_c.py"
 DRIVERS, STEPPERS = "templates/c/drivers", "templates/c/steppers"
 
 FAULTS = (
@@ -267,5 +268,45 @@ FAULTS = (
         "wide-steps", f"{STEPPERS}/wide.c",
         "(a >= b ? a : b) * run->rtol;", "(a >= b ? b : a) * run->rtol;",
         "steps four states at a time measure errors by the smaller of two sizes", ("tests/emit/test_wide_steps_in_c.py",),
+    ),
+    Fault(
+        "lanes-rejected", "templates/c/ensembles/lane_runs.c",
+        "run->y[i] = choose(moved, run->y[i], run->y_old[i]);", "run->y[i] = run->y[i];",
+        "a lane whose step is rejected goes on from where it led", (LANES,),
+    ),
+    Fault(
+        "lanes-safety", "templates/c/ensembles/lane_runs.c",
+        "0.8 * stretch_of(error, order)", "0.4 * stretch_of(error, order)",
+        "lanes take twice as many steps as they need", (LANES,),
+    ),
+    Fault(
+        "lanes-rates", "templates/c/ensembles/lane_runs.c",
+        "run->f[i] = choose(moved, run->f[i], run->K[i]);", "run->f[i] = choose(moved, run->K[i], run->f[i]);",
+        "lanes begin a step with the rates of the one before", (LANES,),
+    ),
+    Fault(
+        "lanes-samples", "templates/c/ensembles/lane_runs.c",
+        "e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][l];", "e->samples[(run->index[l] * e->n_eval + run->done[l]) * n + i] = run->z[i][0];",
+        "samples of all lanes are those of the first", (LANES,),
+    ),
+    Fault(
+        "lanes-tables", "templates/c/ensembles/lane_steps.c",
+        "eomgen_table_value(run->signals + i, t[l], run->hold[l])", "eomgen_table_value(run->signals + i, t[0], run->hold[l])",
+        "tables are read in all lanes at the time of the first", (LANES,),
+    ),
+    Fault(
+        "lanes-first-steps", "templates/c/ensembles/lane_steps.c",
+        "run->f[i] = choose(begins, f1[i], run->f[i]);", "run->f[i] = f1[i];",
+        "a lane that begins gives the others its rates", (LANES,),
+    ),
+    Fault(
+        "lanes-taylor-carry", "templates/c/ensembles/lane_taylor.c",
+        "run->K[i] = choose(moved, run->after[i], run->K[i]);", "run->K[i] = run->after[i];",
+        "lanes that try a step again take the coefficients of others' next one", (LANES,),
+    ),
+    Fault(
+        "lanes-taylor-reach", "templates/c/ensembles/lane_taylor.c",
+        "choose(first < second, first, second) - TAYLOR_SAFETY", "choose(first < second, second, first) - TAYLOR_SAFETY",
+        "steps of Taylor's method in lanes follow the weaker of the last two terms", (LANES,),
     ),
 )  # fmt: skip
