@@ -95,12 +95,12 @@ FAULTS = (
     Fault(
         "spring-energy", "eomgen/forces/elements.py",
         "return 0.5 * self.stiffness * (stretch * stretch)", "return self.stiffness * (stretch * stretch)",
-        "energy of a spring without its 1/2", ("tests/forces/test_loads.py",),
+        "energy of a spring without its 1/2", ("tests/forces/test_energies_of_springs.py",),
     ),
     Fault(
         "spring-rest", "eomgen/forces/elements.py",
         "-self.stiffness * (value - self.rest)", "-self.stiffness * value",
-        "a spring forgets its rest length", ("tests/forces/test_loads.py", "tests/forces/test_paths.py"),
+        "a spring forgets its rest length", ("tests/forces/test_energies_of_springs.py",),
     ),
     Fault(
         "body-force-axes", "eomgen/forces/elements.py",
@@ -145,7 +145,7 @@ FAULTS = (
     Fault(
         "stop-energy", "eomgen/forces/normal_laws.py",
         "self.stiffness * d**power / power", "self.stiffness * d**power / self.exponent",
-        "elastic energy of a contact is divided by n instead of n + 1", ("tests/forces/test_motions.py", "tests/forces/test_loads.py"),
+        "elastic energy of a contact is divided by n instead of n + 1", ("tests/forces/test_energies_of_springs.py",),
     ),
     Fault(
         "gravity-gradient", "eomgen/forces/attraction.py",
