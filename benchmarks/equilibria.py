@@ -15,9 +15,10 @@ from .report import Limit, Report, Table
 from .rest_models import FAMILIES
 
 TITLE = "equilibria"
-EACH = 40  #: of every family
+EACH = 30  #: of every family
 PEERS = ("newton", "hybr", "lm")
 BALANCED = 1e-9  #: what may be left of a balance, relative to the terms of its row
+TELLS = 1e-8  #: part of the stiffness that central differences tell from zero
 SINGULAR = 1e12  #: condition of the mass matrix above which coordinates are singular
 
 Array = Any
@@ -77,6 +78,18 @@ class Balance:
         terms = np.abs(self.slopes(z)) @ np.maximum(1.0, np.abs(z))
         return bool(np.isfinite(residual).all() and (np.abs(residual) <= BALANCED * terms).all())
 
+    def lowest(self, z: Array) -> float:
+        """Lowest eigenvalue of the stiffness along what the constraints leave free, in units of the highest magnitude.
+
+        The stiffness is symmetric where forces have a potential.
+        """
+        q, layout = z[: self.n_q], self.module.layout
+        along = self.slopes(z)[: self.module.n_v, : self.n_q] @ layout.scales.rates(q, np.eye(self.module.n_v))
+        rows = self.module.constraint_jacobian(q)
+        free = np.linalg.svd(rows)[2][len(rows) :].T if len(rows) else np.eye(self.module.n_v)
+        values = np.linalg.eigvalsh(0.5 * free.T @ (along + along.T) @ free)
+        return float(values[0] / np.abs(values).max()) if values.size else 1.0
+
     def by_newton(self, z: Array) -> Array:
         """Plain Newton: whole steps."""
         for _ in range(100):
@@ -102,6 +115,7 @@ class Case(NamedTuple):
     seconds: float
     why: str
     stability: str
+    agrees: bool  #: the verdict of stability with the sign of the stiffness, where differences tell it
 
 
 def judge(family: str, number: int) -> Case:
@@ -117,14 +131,16 @@ def judge(family: str, number: int) -> Case:
                 peers[name] = balance.holds(solve(balance.start(q)))
             except (np.linalg.LinAlgError, eg.EomgenError, ValueError):
                 peers[name] = False
-    begin, why, stability = process_time(), "", ""
+    begin, why, stability, agrees = process_time(), "", "", True
     try:
         found = module.equilibrium(q)
-        ours, stability = balance.holds(balance.start(found.q)) and found.linear.is_equilibrium, found.stability
+        z, stability = balance.start(found.q), found.stability
+        ours, lowest = balance.holds(z) and found.linear.is_equilibrium, balance.lowest(z)
+        agrees = abs(lowest) < TELLS or (lowest < 0.0) == (stability == "unstable")
         why = "" if ours else "what was returned is no equilibrium"
     except eg.EquilibriumError as error:
         ours, why = False, str(error)
-    return Case(family, number, peers, ours, process_time() - begin, why, stability)
+    return Case(family, number, peers, ours, process_time() - begin, why, stability, agrees)
 
 
 def run(quick: bool) -> Report:
@@ -138,10 +154,16 @@ def run(quick: bool) -> Report:
         times = [1e3 * case.seconds for case in own]
         rows.append([family, len(own), *counts, sum(case.ours for case in own), lost, np.median(times), max(times)])
     lost = sum(not case.ours and any(case.peers.values()) for case in cases)
+    wrong = sum(not case.agrees for case in cases)
     notes = (
         "Newton with whole steps, SciPy's hybr and lm solve the bare equations of balance from the same start.",
         f"Found is what leaves {BALANCED:g} of the terms of each equation. Lost: found by one of them and not by us.",
     )
     columns = ("family", "cases", *PEERS, "ours", "lost", "median ms", "longest ms")
     details = {"lost": [case._asdict() for case in cases if not case.ours]}
-    return Report((Table("equilibria", columns, rows),), (Limit("lost", lost, 0),), notes, details)
+    return Report(
+        (Table("equilibria", columns, rows),),
+        (Limit("lost", lost, 0), Limit("stability that the stiffness contradicts", wrong, 0)),
+        notes,
+        details,
+    )

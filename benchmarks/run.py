@@ -16,7 +16,7 @@ from .report import Report, show, write
 BENCHMARKS = (
     *("derive", "growth", "compile", "panda", "robots", "latency"),
     *("call", "simulate", "integrate", "stiff", "loops"),
-    *("rhs", "lanes", "ensembles"),
+    *("rhs", "lanes", "ensembles", "equilibria"),
 )
 
 

@@ -179,12 +179,16 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
     kinematics.mechanism.require_values()
     idle = require_inertia(kinematics, mobility, tree)
-    if idle and tree.accelerations is not None:
-        tree = METHODS["embedding"](kinematics)  # the pivots of the other are nought already as they are written
+    strange = bool(idle or kinematics.mechanism.negative)
+    if strange and tree.accelerations is not None:
+        tree = tree.without_accelerations()  # which divide by pivots before they are looked at
     metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
     limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
     if idle:
         metadata["no_inertia"] = idle
+    if kinematics.mechanism.negative:
+        metadata["indefinite"] = True
+    if strange:
         limits = Limits(unrolled=0, unrolled_loops=0)  # drivers that look before they divide
     return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels, limits=limits)
 

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..limits.constraints import STATE
+from ..limits.rounding import TINY
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
@@ -90,7 +92,7 @@ def _displacements(J: Array, velocities: Indices) -> Partition:
 
 def unit_rows(rows: Array) -> Array:
     """Rows of length 1, so that all weigh alike."""
-    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300))
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), TINY))
 
 
 class Slopes(NamedTuple):
@@ -133,7 +135,7 @@ def slopes(
         C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
-        step = -np.linalg.lstsq(stacked, wanted, rcond=1e-10)[0]
+        step = -np.linalg.lstsq(stacked, wanted, rcond=STATE)[0]
         motion[:, : len(parameters)] = scales.q[:, None] * step
         by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[n_q:]
     along = tangent.T[:, : tangent.Z.shape[1]]

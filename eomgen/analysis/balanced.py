@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..limits.constraints import STATE
+from ..limits.statics import DIFFERENCES
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, force_slopes, weigh
 from .linear import linearise
 from .linearisation import Linearisation
-from .newton import DIFFERENCES
 from .rounding import judge
 from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
@@ -102,7 +103,7 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
         found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
         free = weigh(module, t, q)
-        pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=1e-10)[0]
+        pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=STATE)[0]
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A, second = _held_motion(search, module, here, t)

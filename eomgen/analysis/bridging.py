@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..limits.motions import ASTRAY
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales
 from .walking import Point, Walk
@@ -98,7 +99,7 @@ def build_bridge(walk: Walk, before: Point, after: Point, middle: float) -> Brid
         piers.append(found)
     bridge = Bridge(piers, scales)
     for near in (before, after):  # one branch, or several?
-        if bridge.covers(near.s) and largest(scales.distance(bridge.at(near.s)[0], near.q)) > 1e-5:
+        if bridge.covers(near.s) and largest(scales.distance(bridge.at(near.s)[0], near.q)) > ASTRAY:
             return None
     return bridge
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ..errors import ProjectionError, UsageError
 from ..limits.constraints import ACCEPTED, EXACT, GENTLE
 from ..limits.constraints import STATE as RANK
+from ..limits.motions import NEAREST
 from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
 CLOSING = 25  #: Newton steps onto the constraints, at most
 PASSES = 30  #: of the linear correction of velocities, at most
-STILL = 1e-12  #: scaled step along the constraints at which the nearest position is found
 DAMPING = 0.5  #: largest scaled step
 
 
@@ -87,7 +87,8 @@ def _metric(
             return np.asarray(np.linalg.cholesky(module.mass_matrix(q, t=t)))
         except np.linalg.LinAlgError:
             raise UsageError(
-                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass"
+                "weights='mass' needs a positive definite mass matrix of the tree; there are bodies without mass, or "
+                "with negative inertia"
             ) from None
     factors = np.ones(layout.n_v)
     if isinstance(weights, Mapping):
@@ -168,12 +169,12 @@ def _positions(
         across = Vt[sizes > RANK * sizes[0]]
         y = change(q)
         slope = y - across.T @ (across @ y)
-        if largest(np.linalg.solve(L.T, slope) / scales.q[free]) <= STILL:
+        if largest(np.linalg.solve(L.T, slope) / scales.q[free]) <= NEAREST:
             break
         trial = close(moved(q, -share * slope))
         if trial is not None and float(change(trial) @ change(trial)) < float(y @ y):
             q, share = trial, min(1.0, 2.0 * share)
-        elif share < STILL:
+        elif share < NEAREST:
             break
         else:
             share *= 0.5

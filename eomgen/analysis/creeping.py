@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..limits.statics import CLOSE
 from ..numeric.scales import Array
-from .newton import CLOSE, CONTRACTS, LONGEST, largest
+from .newton import CONTRACTS, LONGEST, largest
 from .rounding import EPS
 
 if TYPE_CHECKING:

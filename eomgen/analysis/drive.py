@@ -18,6 +18,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
+from ..limits.rounding import TINY
+from ..limits.statics import AFFINE, REACHED, REMAINDER
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
@@ -26,9 +28,6 @@ from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-REACHED = 1e-8  #: largest share of the needed forces that may be left over
-AFFINE = 1e-9  #: relative deviation from a straight line at which forces count as linear in an input
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def find_forces(
         want = B.T @ (needed[:, k] + S[:, :, k] @ base)
         found = _solve(A, want, weights)
         left = want - A @ found
-        if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), 1e-300):
+        if np.abs(left).max(initial=0.0) > REACHED * max(np.abs(want).max(initial=0.0), TINY):
             raise UsageError(_out_of_reach(layout, names, B, A, states.t[k], k if count > 1 else None))
         forces[:, k] = found
     _check_inputs(states, names, accelerations, forces, bases, S)
@@ -159,7 +158,7 @@ def _check_inputs(
             - S[:, others, k] @ forces[others, k]
         )
         size = np.abs(B).T @ (np.abs(S[:, :, k]) @ np.abs(forces[:, k]))
-        if (np.abs(left) > REACHED * np.maximum(size, 1e-300)).any():
+        if (np.abs(left) > REACHED * np.maximum(size, TINY)).any():
             raise UsageError(
                 f"forces are not linear in the inputs {', '.join(module.u_names[j] for _, j in inputs)} together (they "
                 "multiply each other); name one of them, or the coordinates that they drive"
@@ -251,7 +250,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
         off = np.einsum("kij,jk->ik", J, result - free) / layout.scales.c[:, None]
         size = np.einsum("kij,jk->ik", np.abs(J), np.abs(result) + np.abs(free)) / layout.scales.c[:, None]
         worst = np.unravel_index(int((np.abs(off) / (size + 1.0)).argmax()), off.shape)
-        if np.abs(off[worst]) > 1e-6 * (size[worst] + 1.0):
+        if np.abs(off[worst]) > REMAINDER * (size[worst] + 1.0):
             raise UsageError(
                 f"a breaks the constraint {layout.constraint_labels[int(worst[0])]} by {off[worst]:.3g} at "
                 f"t = {states.t[int(worst[1])]:g}; name the independent accelerations (a={{...}}) instead"
@@ -288,7 +287,7 @@ def _input_effect(states: States, j: int) -> Array:
         u[j] += step
         h.append(np.asarray(module.bias(states.t, states.x, u=u)))
     slope, bend = 0.5 * (h[0] - h[2]), h[0] - 2.0 * h[1] + h[2]
-    if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), 1e-300):
+    if np.abs(bend).max(initial=0.0) > AFFINE * max(*(np.abs(y).max(initial=0.0) for y in h), TINY):
         raise UsageError(f"forces are not linear in the input {module.u_names[j]!r}; give the coordinate it drives")
     return np.asarray(slope)
 
@@ -296,7 +295,7 @@ def _input_effect(states: States, j: int) -> Array:
 def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: float, k: int | None) -> str:
     """Why drives cannot make a motion, by the freedom they do not move."""
     U, sizes, _ = np.linalg.svd(A)
-    rank = int((sizes > RANK * max(sizes.max(initial=0.0), 1e-300)).sum())
+    rank = int((sizes > RANK * max(sizes.max(initial=0.0), TINY)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
     moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
     need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"

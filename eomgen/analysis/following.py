@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
+from ..limits.constraints import ACCEPTED, AT_ONCE, SETTLED
+from ..limits.motions import NULL
 from ..numeric.projection import largest, within
 from ..numeric.scales import Array
 
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
 
 STEPS = 25  #: Newton steps
 LONGEST = 0.3  #: largest scaled Newton step
-EXACT, SETTLED, ACCEPTED = 1e-14, 1e-12, 1e-10  #: scaled residuals: stop at once, stop when it falls no longer, closed
 
 
 class Tangent(NamedTuple):
@@ -135,8 +136,8 @@ class Follower:
             C = self._C(q, t=t)
             e = np.concatenate([self.scales.residual(C), self._gap(q, y, t)])
             size = largest(e)
-            if size <= EXACT or not np.isfinite(size):
-                return q if size <= EXACT else None
+            if size <= AT_ONCE or not np.isfinite(size):
+                return q if size <= AT_ONCE else None
             K = self.matrix(q, t)
             K = np.concatenate([K[: len(C)], K[self.layout.n_c :]])
             rounded = self.scales.rounding(q, K)
@@ -144,7 +145,7 @@ class Follower:
                 return q
             if step == STEPS:
                 break
-            dz = np.linalg.lstsq(K, e, rcond=1e-13)[0]
+            dz = np.linalg.lstsq(K, e, rcond=NULL)[0]
             longest = largest(dz)
             q = self.scales.move(q, -dz * min(1.0, LONGEST / longest) if longest else dz)
             before = size
@@ -164,7 +165,7 @@ class Follower:
         K = self.matrix(q, t)
         U, S, V = np.linalg.svd(K, full_matrices=False)
         right = U.T @ self.right(q, t, t1, y1)
-        small = 1e-13 * S[0]
+        small = NULL * S[0]
         rate = V.T @ np.divide(right, S, out=np.zeros_like(S), where=small < S)
         square = K[self._square]
         sign = float(np.linalg.slogdet(square)[0]) if len(square) == len(V) else 1.0
@@ -184,7 +185,7 @@ class Follower:
             found = self._kinematics(np.concatenate([self.led_values(q, t), y1, y2, q]), t=t)
             return found[n_q : n_q + n], found[n_q + n :]
         K = self.matrix(q, t)
-        v = self.scales.q * np.linalg.lstsq(K, self.right(q, t, 1.0, y1), rcond=1e-13)[0]
+        v = self.scales.q * np.linalg.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)[0]
         a = self._some_acceleration(t, q, v)
         if not all(self.in_tree):
             second = self._loop_values(q, t, v, a)[2]
@@ -193,7 +194,7 @@ class Follower:
             for k, (tree, column) in enumerate(zip(self.in_tree, self.columns, strict=True))
         ]
         right = np.concatenate([np.zeros(layout.n_c), np.array(gap, dtype=float) / self.led_scales])
-        a = a + self.scales.q * np.linalg.lstsq(K, right, rcond=1e-13)[0]
+        a = a + self.scales.q * np.linalg.lstsq(K, right, rcond=NULL)[0]
         return v, a
 
     def motions(self, t: Array, y: Array, y1: Array, y2: Array, guesses: Array) -> tuple[Array, Array, Array]:

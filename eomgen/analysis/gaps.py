@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limits.constraints import CONTRADICTION
 from ..numeric.closure import Equations, System, close
 from ..numeric.scales import Array
 from .following import Follower
-
-SHUT = 1e-8  #: scaled residual below which a joint counts as closed
 
 
 def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
@@ -53,10 +52,10 @@ def describe_gap(follower: Follower, t: float, y: Array, near: Array) -> str:
         what = "no finite value: look for a root or logarithm of a negative number, or a division by zero"
         return f"beyond, at t = {t:.6g} s, {', '.join(owners)} has {what}"
     place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(follower.led, y, strict=True)) or f"t = {t:.6g} s"
-    if not gaps.max() > SHUT:
+    if not gaps.max() > CONTRADICTION:
         return f"beyond, at {place}, it closes again: a driver's value jumps there, or it is out of reach in between"
     joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
-    if joints and gaps[joints].max() > SHUT:  # rather than the driver
+    if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
         worst = joints[int(np.argmax(gaps[joints]))]
     else:
         worst = int(np.argmax(gaps))

@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import MEASURED
+from ..limits.impacts import HELD, TOUCHING
+from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
 from ..runtime.signal_rates import drift, moving_inputs
@@ -25,9 +28,6 @@ from .tables import as_text
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-TOUCHING = 1e-8  #: gaps of a run at most this open, in lengths of the model or rad, take part in an impact
-CLOSED = 1e-6  #: the same of gaps that a user says are closed
-HELD = 1e-9  #: part of a normal, along which nothing is free to move, that is rounding
 ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
@@ -176,7 +176,7 @@ def _one_state(module: Module, t: float, x: ArrayLike) -> States:
 
 def _require_closed(gaps: Gaps, states: States) -> None:
     values = gaps.values(float(states.t[0]), states.x[:, 0])
-    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, CLOSED), strict=True):
+    for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, MEASURED), strict=True):
         if abs(value) > limit:
             how = "open" if value > 0.0 else "closed too far"
             unit = gaps.layout.unit(name)
@@ -222,7 +222,7 @@ def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[
                 f"{what} at the rate {rates[i]:.6g}, which drivers or constraints impose: no impulse changes it"
             )
     if B.shape[1]:
-        factor = np.linalg.cholesky(B.T @ M @ B)
+        factor = definite_factor(B.T @ M @ B, "an impact")
         H = np.where(fixed, 0.0, np.linalg.solve(factor, B.T @ rows.T))
         impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
         change = B @ np.linalg.solve(factor.T, z)

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
 from ..numeric.scales import Array
 
 ROUNDS = 1000  #: impacts that may follow each other at one instant
 FARTHEST = 1e5  #: change of the velocities, relative to the fastest approach, beyond which gaps cannot open together
-STILL = 1e-12  #: relative: rates that count as 0
-ENDLESS = 1e-3  #: part of the first approach that is left if the impacts of an instant do not die away
 
 
 def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[object]) -> tuple[Array, Array]:
@@ -61,11 +60,11 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
     if locks.shape[1]:
         change = np.asarray(np.linalg.lstsq(locks.T, -rates[count:], rcond=None)[0])
     left = np.abs(locks.T @ change + rates[count:])
-    if (left > rest[count:] + 1e-8 * np.abs(rates[count:]).max(initial=0.0)).any():
+    if (left > rest[count:] + LEFT * np.abs(rates[count:]).max(initial=0.0)).any():
         raise UsageError("no impulses obey the constraints: the locked coordinates cannot all stop")
     free = gaps - locks @ np.linalg.lstsq(locks, gaps, rcond=None)[0] if locks.shape[1] else gaps
     impulses = np.zeros(count)
-    live = np.linalg.norm(free, axis=0) > 1e-10
+    live = np.linalg.norm(free, axis=0) > FREE
     step = _need(rates[:count], e, rest[:count])
     wanted, now = step - gaps.T @ change, rates[:count]
     fastest = float(np.abs(now).max(initial=0.0))
@@ -122,7 +121,7 @@ def _least_change(H: Array, need: Array) -> tuple[Array, Array] | None:
     P = u > 0.0  # again from the gaps that push, to the last digits
     z_P = np.asarray(np.linalg.lstsq(H[:, P].T, need[P], rcond=None)[0])
     g_P = np.asarray(np.linalg.lstsq(H[:, P], z_P, rcond=None)[0])
-    slack = 1e-10 * max(most, float(np.abs(z_P).max(initial=0.0)))
+    slack = FREE * max(most, float(np.abs(z_P).max(initial=0.0)))
     if (g_P >= 0.0).all() and (H.T @ z_P >= need - slack).all():
         g[P], z = g_P, z_P
     return z, g
@@ -136,7 +135,7 @@ def _positive_least_squares(E: Array, y: Array) -> Array:
         w = E.T @ (y - E @ u)
         w[passive | barred] = -np.inf
         j = int(np.argmax(w))
-        if not w[j] > 1e-14:
+        if not w[j] > PUSHES:
             break
         passive[j] = True
         first = True

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SimulationError, UsageError
+from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from ..runtime.recording import Columns, describe, units_of
 from ..runtime.signals import Forcing
 from ..runtime.simulate import find_span, find_state
 from ..runtime.trajectory import Residuals, Trajectory
-from .impact import TOUCHING, Impact, strike_run
+from .impact import Impact, strike_run
 from .impact_gaps import Gaps, allowance, check_gaps
 from .impact_trajectory import ImpactRun
 from .impact_watch import Watch, first_missed
@@ -22,10 +24,7 @@ from .impact_watch import Watch, first_missed
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-REST = 1e-6  #: rate after an impact, relative to the largest rate at an impact so far, at which a gap counts as closed
-BEYOND = 1e-6  #: negative gaps of this size, in lengths of the model or rad, are an error
 IDLE = 50  #: closings in a row that bring neither an impact nor time
-MOMENT = 1e-6  #: (s) over which the acceleration of a gap is taken
 
 
 def run_with_impacts(
@@ -123,7 +122,7 @@ class _Run:
             t, x, fired = self._go_on(t, x, rates)
             if not fired.any():
                 return "event" if t < self.end else "end"
-            idle = idle + 1 if t - began <= 1e-14 * max(abs(t), 1.0) else 0
+            idle = idle + 1 if t - began <= INSTANT * max(abs(t), 1.0) else 0
             if idle > IDLE:
                 names = ", ".join(name for name, one in zip(self.gaps.names, fired, strict=True) if one)
                 raise SimulationError(f"the gap {names} closes again and again at t = {t:.6g} s without an impact")
@@ -150,7 +149,7 @@ class _Run:
 
     def _rests(self, t: float, x: Array, closed: NDArray[np.bool_], rates: Array) -> bool:
         """Whether a closed gap no longer opens and is pressed together, so that it would not stay 0 by itself."""
-        slow = closed & (rates <= max(REST * self.fastest, 1e-12 * self._speed(x)))
+        slow = closed & (rates <= max(RESTING * self.fastest, STILL * self._speed(x)))
         if not slow.any() or t >= self.end:
             return False
         x_rate = self.module.rhs(t, x, u=self.gaps.inputs(t, x))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..limits.impacts import FOUND, STARTED
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from .impact_gaps import Gaps
 from .roots import find_root
@@ -15,7 +17,6 @@ from .roots import find_root
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
-STARTED = 1e-5  #: of the size of a gap that counts as closed: what is added to one that begins at 0 and opens
 RESTING = 0.1  #: the same for one that does not open
 SAMPLES = 8  #: places in each step of the solver at which gaps are looked at afterwards
 CHUNK = 4096  #: steps at a time
@@ -97,7 +98,7 @@ def first_missed(watch: Watch, piece: Trajectory) -> tuple[float, NDArray[np.boo
             first = min(at for at, _ in found)
             fired = np.zeros(len(values), dtype=bool)
             for at, i in found:
-                fired[i] = at <= first + 1e-14 * max(abs(first), 1.0)
+                fired[i] = at <= first + INSTANT * max(abs(first), 1.0)
             return first, fired
     return None
 
@@ -124,7 +125,7 @@ def _first_zero(watch: Watch, piece: Trajectory, i: int, times: Array, values: A
 def _lowest(value: Callable[[float], float], left: float, at: float, right: float, best: float) -> tuple[float, float]:
     """The least value about, or any below 0, and where: golden section."""
     whole = right - left
-    while best >= 0.0 and right - left > 1e-7 * whole:
+    while best >= 0.0 and right - left > FOUND * whole:
         low = at - left > right - at
         t = at + GOLDEN * ((left if low else right) - at)
         f = value(t)

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, PartitionError, UsageError
+from ..limits.constraints import EXACT, UNMOVED
+from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
-from .singular import NEAR, Singular
+from .singular import Singular
 from .tracks import Track
 from .walking import Path
 
@@ -26,9 +28,7 @@ if TYPE_CHECKING:
     from ..runtime.initial import Initial
     from ..runtime.module import Module
 
-ALIGNED = 1e-12  #: relative difference of two directions that count as one
 LONGEST = 4000.0 * np.pi  #: radians or length scales walked at most, 2000 turns
-MOVES = 1e-12  #: scaled change below which a coordinate stands still
 
 
 class Range(NamedTuple):
@@ -194,7 +194,7 @@ def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[
         )
     result = (*names, *held)
     Q = Follower(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
-    if Q < NEAR:
+    if Q < SINGULAR:
         place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
         raise PartitionError(
             f"the initial position is singular ({place}): branches meet there; give an initial position beside it", t, q
@@ -237,7 +237,7 @@ def walk_in(follower: Follower, q: Array, start: tuple[float, Array], first: tup
     """
     (t, y), (t0, y0) = start, first
     length = largest(np.concatenate([(y0 - y) / follower.led_scales, [t0 - t]]))
-    if length <= MOVES:
+    if length <= UNMOVED:
         return q
     track = Track(follower, Path(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
     if track.stop is not None:
@@ -299,12 +299,12 @@ def _pieces(follower: Follower, asked: Range) -> list[tuple[int, int]]:
     pieces: list[tuple[int, int]] = []
     first, direction = 0, None
     for k in range(len(sizes)):
-        if sizes[k] <= MOVES:
+        if sizes[k] <= UNMOVED:
             continue
         here = steps[:, k] / sizes[k]
         if (
             direction is not None
-            and np.abs(here - direction).max() > ALIGNED + 1e-15 * np.abs(scaled[:, k]).max() / sizes[k]
+            and np.abs(here - direction).max() > ALIGNED + EXACT * np.abs(scaled[:, k]).max() / sizes[k]
         ):
             pieces.append((first, k))
             first = k

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.statics import COUPLED, STILL
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from .rounding import BALANCED
@@ -17,9 +18,6 @@ from .tables import as_html, as_text, number
 if TYPE_CHECKING:
     from ..runtime.layout import Layout
     from .tangent import Tangent
-
-STILL = 1e-7  #: scaled rates below which a state counts as an equilibrium
-COUPLED = 1e-8  #: entries of a matrix below this part of the largest count as zero
 
 
 class Linearisation:
@@ -151,7 +149,13 @@ class Linearisation:
         """
         if self.mass is None or self.tangent is None or self.own is None:
             return verdict(None, self.A, self.own)
-        return verdict(self._second(), self.A, self.own)
+        M, n = self.mass, len(self.position_names)
+        errors = np.zeros_like(self.A)
+        if M.size:
+            C_error = MARGIN * np.abs(M) @ np.abs(self.A[n:, n:])
+            errors[n:] = np.abs(np.linalg.inv(M)) @ np.hstack([self.stiffness_error, C_error])
+            errors[self.A == 0.0] = 0.0  # no force at all, or one that rounding has not touched
+        return verdict(self._second(), self.A, self.own, errors=errors)
 
     @property
     def stiffness_error(self) -> Array:

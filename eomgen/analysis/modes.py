@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.statics import SYMMETRIC
+from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from .linearisation import Linearisation
-from .stability import SYMMETRIC, symmetric_modes, uncertainty
+from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
@@ -72,7 +74,7 @@ class Modes:
     def damped(self) -> list[Damped]:
         """The modes with damping and gyroscopic terms, slow ones first."""
         values = self.linear.eigenvalues
-        tiny = 1e-9 * max(1.0, float(np.abs(values).max(initial=0.0)))
+        tiny = SYMMETRIC * max(1.0, float(np.abs(values).max(initial=0.0)))
         found = []
         for value in values:
             if value.imag < -tiny:
@@ -116,7 +118,7 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     """Squares of the frequencies and mode shapes."""
     if not M.size:
         return np.zeros(0), np.zeros((0, 0))
-    factor = np.linalg.cholesky(M)
+    factor = definite_factor(M, "modes")
     inverse = np.linalg.inv(factor)
     reduced = inverse @ K @ inverse.T
     if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.recording import Columns, describe, units_of
@@ -120,7 +121,9 @@ class KinematicAnalysis(Trajectory):
             d0, d1, dy = rate[k] * h, rate[k + 1] * h, y[k + 1] - y[k]
             cubic = np.array([d0 + d1 - 2 * dy, 3 * dy - 2 * d0 - d1, d0, y[k]])
             roots = np.roots(np.polyder(cubic)) if cubic[:3].any() else np.zeros(1)
-            inside = [float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < 1e-9 and -1e-9 <= r.real <= 1 + 1e-9]
+            inside = [
+                float(r.real) for r in np.atleast_1d(roots) if abs(r.imag) < SLACK and -SLACK <= r.real <= 1 + SLACK
+            ]
             if inside:
                 x = min(inside, key=lambda r: abs(r - d0 / (d0 - d1)) if d0 != d1 else r)
                 found.append((float(self.t[k] + x * h), float(np.polyval(cubic, x))))

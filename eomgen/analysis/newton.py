@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..limits.rounding import TINY
+from ..limits.statics import ARRIVED, CLOSE, SHORTEST
 from ..numeric.scales import Array
 from .rounding import BALANCED, EPS
 
@@ -19,11 +21,7 @@ if TYPE_CHECKING:
 
 STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
-SHORTEST = 1e-5  #: part of Newton's step below which it leads nowhere
-SMALL = 1e-12  #: scaled step at which Newton's iteration has arrived
-CLOSE = 1e-6  #: the same where rounding of the forces leaves no more
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
-DIFFERENCES = 1e-8  #: the same of central differences
 STIFFEST = 1e16  #: largest damping of a step
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
@@ -66,7 +64,7 @@ class Solver:
         rounding = BALANCED * numbers
         left = residual / self.sizes + self.J @ change
         answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
-        limit = max(SMALL, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
+        limit = max(ARRIVED, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
         return largest(self.shown(change)) <= limit and largest(left) <= rounding
 
 
@@ -90,14 +88,14 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
         if not np.isfinite(size):
             return point, step, False
         arrived = solver.arrived(residual, change, search.rounded(point))
-        if arrived and (size <= SMALL or size > CONTRACTS * last):
+        if arrived and (size <= ARRIVED or size > CONTRACTS * last):
             return _polished(search, point, solver, change), step, True
-        if size <= SMALL or largest(search.layout.place_scales.distance(point.q, start)) > reach:
+        if size <= ARRIVED or largest(search.layout.place_scales.distance(point.q, start)) > reach:
             return point, step, False
         most = 1.0 if plain else min(1.0, LONGEST / max(longest, LONGEST))
         if before is not None:
             apart = float(np.linalg.norm(before[1] - shown))
-            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, 1e-300)
+            part = float(np.linalg.norm(before[0]) * np.linalg.norm(before[1])) * before[2] / max(apart * size, TINY)
         part, retried = most if plain else min(most, part), False
         there, grown = None, None
         while part >= SHORTEST * most:
@@ -109,7 +107,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
             if plain:
                 break
             off = float(np.linalg.norm(left - (1.0 - part) * shown))
-            wanted = 0.5 * size * part**2 / max(off, 1e-300)
+            wanted = 0.5 * size * part**2 / max(off, TINY)
             if np.linalg.norm(left) > (1.0 - 0.25 * part) * size:
                 if arrived:  # rounding: no correction gets smaller
                     return _polished(search, point, solver, change), step, True
@@ -163,7 +161,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
             gain = -1.0
             if there is not None:
                 lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
-                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), 1e-300)
+                gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
             if gain > 1e-4:
                 damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
                 break

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import UNMOVED
 from ..numeric.scales import Array
 from .constrained import States, evaluate, prepare, solve_multipliers
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 CHUNK = 4_000_000  #: numbers held at once
-SEEN = 1e-7  #: smallest component of a unit self-stress that counts
 GROUND = -1
 
 
@@ -134,7 +134,7 @@ def along_free(free: Array, wrench: Array) -> tuple[Array, Array]:
     directions = np.moveaxis(free, -1, 0)  # (k, n, 6)
     forces = np.einsum("knj,jk->kn", directions, wrench)
     size = np.abs(directions).max(initial=0.0)
-    turning = np.abs(directions[:, :, 3:]).max(axis=(0, 2)) > 1e-12 * size
+    turning = np.abs(directions[:, :, 3:]).max(axis=(0, 2)) > UNMOVED * size
     slides, turns = directions[:, ~turning, :3], directions[:, turning, 3:]
     force = np.linalg.pinv(slides) @ forces[:, ~turning, None] if slides.size else np.zeros((len(forces), 3, 1))
     rest = forces[:, turning, None] - directions[:, turning, :3] @ force

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..limits.rounding import NEXT
+
 STEPS = 100
-CLOSE = 4e-16  #: width relative to the place at which to stop
 
 
 def find_root(value: Callable[[float], float], low: float, high: float, f_low: float, f_high: float) -> float:
@@ -17,7 +18,7 @@ def find_root(value: Callable[[float], float], low: float, high: float, f_low: f
         return low
     widths = [abs(high - low)] * 3
     for _ in range(STEPS):
-        if f_high == 0.0 or abs(high - low) <= CLOSE * max(abs(high), abs(low)):
+        if f_high == 0.0 or abs(high - low) <= NEXT * max(abs(high), abs(low)):
             break
         s = high - f_high * (high - low) / (f_high - f_low)
         if abs(high - low) > 0.5 * widths[0] or not min(low, high) < s < max(low, high):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..limits.rounding import TINY
 from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
@@ -21,11 +22,13 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 10.0 * EPS  #: relative error of the entries of a matrix that is exact but for rounding
 BALANCED = 100.0 * EPS  #: what rounding leaves of a balance, relative to what a unit displacement does to it
 ROUNDS = 30  #: of balancing, at most
+GAP = 10.0  #: between eigenvalues that are judged together and those apart
+NODES = 32  #: of the contour around them
 WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that are looked at
 SWEEPS = 12  #: of Jacobi's method, at most
 
 
-def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
+def judge(A: Array, own: Array | None = None, error: float = ROUNDING, errors: Array | None = None) -> str:
     """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
 
     Without states it is 'no freedom': what drivers and constraints hold entirely is neither.
@@ -39,6 +42,8 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
         forces far below them are rounding.
     error : float
         Relative error of A.
+    errors : (n, n) array, optional
+        Bounds for the errors of its entries, which can split a double zero by their root.
     """
     if not A.size:
         return "no freedom"
@@ -47,6 +52,11 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
     values = np.linalg.eigvals(balanced)
     far = error * float(np.linalg.norm(balanced, 2))
     zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
+    if errors is not None:
+        scale = _balance(np.maximum(np.abs(A), errors), own)  # so that what is but an error is not blown up
+        balanced, scaled = A * scale / scale[:, None], errors * scale / scale[:, None]
+        for k in np.flatnonzero(~zero & (values.real > 0.0)):
+            zero[k] = _reaches_axis_in_cluster(balanced, scaled, np.abs(values), complex(values[k]))
     if (values.real[~zero] > 0.0).any():
         return "unstable"
     return "marginal" if zero.any() else "asymptotically stable"
@@ -60,6 +70,30 @@ def _reaches_axis(A: Array, value: complex, far: float) -> bool:
     )
 
 
+def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: complex) -> bool:
+    """The same within the invariant subspace of an eigenvalue and all smaller ones, with the errors that it sees.
+
+    The subspace is that of the spectral projector, a contour integral of the resolvent (T. Kato, Perturbation Theory
+    for Linear Operators, 1980, section I.5.3), which no defective eigenvalue spoils.
+    """
+    sizes = np.sort(sizes)
+    wider = sizes[sizes > GAP * abs(value)]
+    if not wider.size:
+        return False
+    inner = sizes[sizes <= GAP * abs(value)]
+    radius = float(np.sqrt(inner[-1] * wider[0]))
+    nodes = radius * np.exp(2j * np.pi * (np.arange(NODES) + 0.5) / NODES)
+    identity = np.eye(len(A))
+    try:
+        projector = np.mean([z * np.linalg.inv(z * identity - A) for z in nodes], axis=0).real
+    except np.linalg.LinAlgError:
+        return False
+    basis = np.linalg.svd(projector)[0][:, : len(inner)]
+    left = basis.T @ projector
+    far = float(np.linalg.norm(np.abs(left) @ errors @ np.abs(basis), 2))
+    return _reaches_axis(left @ A @ basis, value, far)
+
+
 def _balance(A: Array, own: Array | None) -> Array:
     """Units of the states that make rows and columns alike; forces of the model keep rows from being blown up."""
     sizes = np.abs(A)
@@ -67,7 +101,7 @@ def _balance(A: Array, own: Array | None) -> Array:
         n = len(own)
         rows = np.arange(len(A) - n, len(A))
         sizes[rows, rows - n] = np.maximum(sizes[rows, rows - n], own)
-        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], 1e-300)
+        sizes[rows - n, rows] = np.maximum(sizes[rows - n, rows], TINY)
     np.fill_diagonal(sizes, 0.0)
     d = np.ones(len(A))
     for _ in range(ROUNDS):
@@ -121,7 +155,7 @@ def graded_modes(M: Array, K: Array, shapes: Array) -> tuple[Array, Array]:
         turned = False
         for i in range(len(T)):
             for j in range(i):
-                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + 1e-300:
+                if abs(T[i, j]) <= EPS * np.sqrt(abs(T[i, i] * T[j, j])) + TINY:
                     continue
                 angle = 0.5 * np.arctan2(2.0 * T[i, j], T[i, i] - T[j, j])
                 if T[i, i] < T[j, j]:  # the smaller of both turns

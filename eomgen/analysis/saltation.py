@@ -18,18 +18,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import NoDerivativeError, UsageError
+from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
 from ..runtime.events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
-from .impact import TOUCHING
 from .sensitivity_result import EventSlopes
 from .start import keep_consistent
 from .strike_slopes import after_impact, after_reset
 from .variations import Move, Variational
 
-ASIDE = 1e-7  #: part of the span by which the rates on one side of an event are looked at
-SMOOTH = 1e-9  #: part of the rates by which they may differ on both sides of an event and count as continuous
 GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
-INSTANT = 1e-12  #: part of the span within which events are simultaneous
 
 
 class Saltation:
@@ -124,7 +121,7 @@ class Saltation:
         layout = self.module.layout
         by_u = self._gradient(t, x, index)[0, self.n + 1 : self.n + 1 + layout.n_u]
         for j in np.flatnonzero(by_u):
-            if j in self.run.forcing.varying:
+            if j in self.run.forcing.varying and layout.u[j] not in layout.input_rates:
                 raise NoDerivativeError(
                     f"event {self.events.declared[index]['name']}: the gap moves with input {layout.u[j]}, and the "
                     "derivative of such an impact is not derived; write the motion into the gap's expression"
@@ -194,13 +191,13 @@ class Saltation:
     def _consistent(self, t: float, x: Array, S: Array) -> tuple[Array, Array]:
         """A state and its derivatives, brought onto the constraints."""
         module, forcing = self.module, self.run.forcing
-        x = np.asarray(module.project(x, t=t))
+        x = np.asarray(module.project(x, t=t, u=forcing(t, x)))
         slopes = self.run.inputs(t, x) if forcing else None
         return x, keep_consistent(module.bind(u=forcing(t, x)), t, x, S, self.run.columns, slopes)
 
     # -- what has no derivative -----------------------------------------------------------------------------------
     def _refuse_ends(self, t: float, own: int) -> None:
-        near = INSTANT * abs(self.span[1] - self.span[0])
+        near = SIMULTANEOUS * abs(self.span[1] - self.span[0])
         for end, what in ((self.span[0], "start"), (self.span[1], "end")):
             if abs(t - end) <= near:
                 raise NoDerivativeError(
@@ -220,9 +217,10 @@ class Saltation:
                 continue
             value, gradient = float(event.function(t, x)), self._gradient(t, x, index)
             rate = self._rate(t, x, index, f, self.names[other])
-            if (event.action == WAIT and rate > 0.0) or event.direction * rate < 0.0:
+            onward = rate if self.span[1] >= self.span[0] else -rate
+            if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:
                 continue  # it has just happened, and leaves
-            near = max(self._error(x, gradient), abs(rate) * INSTANT * abs(self.span[1] - self.span[0]))
+            near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
                 raise self._at_once(t, [self.names[own], self.names[other]])
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
+from ..limits.statics import DIFFERENCES, MOVING
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
 from .creeping import creep
-from .newton import DIFFERENCES, RANK, Linear, marquardt, newton
+from .newton import RANK, Linear, marquardt, newton
 from .rounding import own_accelerations
 from .tangent import displacement_names
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
-MOVING = 1e-9  #: scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it
 
 
 class Point(NamedTuple):
@@ -213,15 +213,17 @@ class Search:
         ]
         if not self.names:
             ways.insert(0, lambda: creep(self, start))
+        ends = [start, first]
         for way in ways:
             point, more, found = way()
+            ends.append(point)
             steps += more
             if not found:
                 point, more, found = newton(self, point)
                 steps += more
             if found:
                 return point, steps
-        raise self._failure(first)
+        raise self._failure(min(ends, key=lambda end: float(np.abs(self.residual(end.here, end.here)).max())))
 
     def _failure(self, point: Point) -> EquilibriumError:
         here, layout = point.here, self.layout

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from ..limits.constraints import BALANCE as RANK
+from ..limits.statics import SEEN
 from ..numeric.scales import Array
 from .constrained import States
-from .reactions import GROUND, SEEN, Geometry, along_free, free_of, shift, transmitted
+from .reactions import GROUND, Geometry, along_free, free_of, shift, transmitted
 
 
 def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:

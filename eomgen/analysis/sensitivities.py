@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SimulationError, UsageError
+from ..errors import SimulationError
 from ..numeric.scales import Array, Indices
 from ..runtime.analyses import require_projection, require_velocities
 from ..runtime.events import Events, warn_of_unknown
@@ -22,7 +22,7 @@ from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
-from ..runtime.simulate import DEFAULTS, find_span, ordered_times
+from ..runtime.simulate import DEFAULTS, find_span, find_state, ordered_times
 from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .start import held_names, keep_consistent, split_columns, start_sensitivity
@@ -58,15 +58,13 @@ def differentiate_run(
     layout = bound.layout
     declared: Any = bound.metadata.get("simulation", {}).get("end") or DEFAULTS["end"]
     start, stop = find_span(span, float(declared))
+    corners = forcing.corners(start, stop)
+    nodes = [start, *corners, stop]
+    forcing.enter(*nodes[:2])
+    x0 = find_state(bound, initial, start, forcing)
+    here = bound.bind(u=forcing(start, x0))
     given = initial if isinstance(initial, Mapping) else None
-    if initial is None or given is not None:
-        x0 = bound.x0(given, t=start)
-    else:
-        x0 = np.array(initial, dtype=float)
-        if x0.shape != (layout.n_x,):
-            raise UsageError(f"initial must name values or have shape ({layout.n_x},), not {x0.shape}")
-        x0 = bound.project(x0, t=start)
-    held = held_names(bound, start, x0, given) if hold is None else _checked(bound, hold)
+    held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
@@ -75,11 +73,10 @@ def differentiate_run(
     if watched:
         alone = bound.simulate((start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
-    S0 = start_sensitivity(bound.bind(u=forcing(start, x0)), start, x0, held, columns, _inputs(run, start, x0))
+    S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
     times = None if t_eval is None else ordered_times(t_eval, start, stop)
     z0 = run.joined(x0, S0)
-    corners = forcing.corners(start, stop)
     salts = Saltation(run, watched, (start, stop), (rtol, atol), corners)
     fail, title = bound.kernels.fail, solver.__name__
     longest = float(options.get("max_step", np.inf))
@@ -87,7 +84,7 @@ def differentiate_run(
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, [start, *corners, stop], z0, solver, times, salts.watched, False, options, pace, salts.reset
+                run, nodes, z0, solver, times, salts.watched, False, options, pace, salts.reset, forcing.enter
             )
     except Crawling as crawl:
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())

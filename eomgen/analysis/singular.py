@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.motions import BLOCKED, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .bridging import Bridge, build_bridge
 from .following import Follower, Tangent
 from .roots import find_root
-from .walking import LEAPS, Point, Walk
+from .walking import Point, Walk
 
-NEAR = 1e-6  #: quality below which a position counts as singular
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
 NARROW = 0.02  #: scaled motion to which a change of sign is narrowed by steps
@@ -79,7 +79,7 @@ def cross(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | Non
             break
         middle = 0.5 * (before.s + after.s)
         found = walk.solve(middle, Bridge([before, after], scales).at(middle)[0])
-        if found is None or found.tangent.quality < NEAR:
+        if found is None or found.tangent.quality < SINGULAR:
             break
         before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
     rough = Bridge([before, after], scales)
@@ -91,7 +91,7 @@ def cross(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | Non
     middle = _root(walk, bridge, low, high)
     t = walk.path.at(middle)[0]
     quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
-    return (bridge, middle) if quality < NEAR else None
+    return (bridge, middle) if quality < SINGULAR else None
 
 
 def _root(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
@@ -150,10 +150,10 @@ def find_stop(walk: Walk, last: Point) -> tuple[float, Point]:
             if found is None:
                 return last.s, last
             q = found
-            if abs(step) < 1e-13:
+            if abs(step) < BLOCKED:
                 break
         s = float((follower.led_values(q, t)[k] - walk.path.y[k]) / y1[k])
-        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < 1e-6:
+        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < UNJUDGED:
             return s, Point(s, q, follower.tangent(t, q, 0.0, y1))
     return last.s, last
 
@@ -195,7 +195,7 @@ def touch(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | Non
         third = (after.s - before.s) / 3.0
         found = [walk.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
         one, other = found
-        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < NEAR:
+        if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
             break
         before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
     bridge = build_bridge(walk, before, after, 0.5 * (before.s + after.s))
@@ -204,7 +204,7 @@ def touch(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | Non
     middle = _worst(walk, bridge, bridge.piers[1].s, bridge.piers[2].s)
     t = walk.path.at(middle)[0]
     quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
-    return (bridge, middle) if quality < NEAR else None
+    return (bridge, middle) if quality < SINGULAR else None
 
 
 def judge_walk(walk: Walk) -> tuple[list[tuple[Bridge, float]], list[Singular]]:

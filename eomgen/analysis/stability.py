@@ -16,7 +16,6 @@ import numpy as np
 from ..numeric.scales import Array
 from .rounding import EPS, ROUNDING, graded_modes, judge
 
-SYMMETRIC = 1e-9  #: relative difference up to which K counts as symmetric where its modes are asked for
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
 
 
@@ -72,7 +71,13 @@ def uncertainty(squares: Array, shapes: Array, K_error: Array) -> Array:
     return np.asarray(np.maximum(bound, ROUNDING * EPS * np.abs(squares).max(initial=0.0)))
 
 
-def verdict(second: SecondOrder | None, A: Array, own: Array | None = None, error: float = ROUNDING) -> str:
+def verdict(
+    second: SecondOrder | None,
+    A: Array,
+    own: Array | None = None,
+    error: float = ROUNDING,
+    errors: Array | None = None,
+) -> str:
     """The stability of s' = A s.
 
     Parameters
@@ -80,19 +85,19 @@ def verdict(second: SecondOrder | None, A: Array, own: Array | None = None, erro
     second : SecondOrder or None
         The same equations of second order, where they have that form: displacements z, then velocities z'.
     A : (n, n) array
-    own, error
+    own, error, errors
         As for :func:`~.rounding.judge`, which decides where the signs of K and C do not.
     """
     if second is None or not A.size or not _is_dissipative(second):
-        return judge(A, own, error)
+        return judge(A, own, error, errors)
     squares, shapes = symmetric_modes(second.M, 0.5 * (second.K + second.K.T))
     bound = uncertainty(squares, shapes, second.K_error)
     if (squares < -bound).any():
         gyroscopic = np.abs(second.C - second.C.T) > second.C_error + second.C_error.T
-        return judge(A, own, error) if gyroscopic.any() else "unstable"
+        return judge(A, own, error, errors) if gyroscopic.any() else "unstable"
     if (squares <= bound).any():
         return "marginal"
-    found = judge(A, own, error)
+    found = judge(A, own, error, errors)
     return found if found == "asymptotically stable" else "marginal"
 
 

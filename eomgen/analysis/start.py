@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.constraints import CONTRADICTION, STATE
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from ..runtime.input_slopes import Slopes
     from ..runtime.layout import Layout
     from ..runtime.module import Module
-
-CONSISTENT = 1e-8  #: scaled residual up to which held values and constraints can change together
 
 
 class Columns(NamedTuple):
@@ -163,9 +162,9 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     A, b = np.array(rows).reshape(len(rows), n), np.array(right).reshape(len(rows), count)
     if not A.size or not count:
         return np.zeros((n, count))
-    found = np.linalg.lstsq(A, b, rcond=1e-10)[0]
+    found = np.linalg.lstsq(A, b, rcond=STATE)[0]
     left = np.abs(A @ found - b).max(axis=0)
-    bad = np.flatnonzero(left > CONSISTENT * np.maximum(1.0, np.abs(b).max(axis=0)))
+    bad = np.flatnonzero(left > CONTRADICTION * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:
         raise UsageError(
             f"the start cannot follow a change of {columns.names[bad[0]]}: the constraints and the held values leave "

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import NoDerivativeError
+from ..limits.impacts import OFF
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from .constrained import free_motions, solve_multipliers
@@ -23,8 +24,6 @@ from .variations import Move, Variational
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-OFF = 1e-9  #: scaled distance from the constraints up to which coordinates of a reset count as on them
 
 
 class Strike:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
+from ..limits.descriptions import SHOWN_COMPLEX
+
 
 def number(value: complex, digits: int = 6) -> str:
     """A real or complex number as people read it."""
     value = complex(value)
-    if abs(value.imag) <= 1e-12 * max(1.0, abs(value)):
+    if abs(value.imag) <= SHOWN_COMPLEX * max(1.0, abs(value)):
         return f"{value.real:.{digits}g}"
     return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limits.motions import ALIGNED, POOR, SAME
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .bridging import Bridge
@@ -11,9 +12,7 @@ from .following import Follower
 from .singular import Singular, find_stop, judge_walk, name_singular
 from .walking import Path, Point, Walk
 
-POOR = 1e-3  #: quality below which a bridge gives more digits than the equations
 ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean another branch
-SAME = 1e-10  #: parameters relative to the path that count as one
 
 
 class Track:
@@ -148,11 +147,11 @@ class Track:
         t1, path = self.path.t1, self.path.y1
         nothing = np.full_like(first, np.nan)
         if t1:
-            if np.allclose(y1, path / t1, rtol=1e-12, atol=0.0) and not y2.any():
+            if np.allclose(y1, path / t1, rtol=ALIGNED, atol=0.0) and not y2.any():
                 return q, first / t1, second / t1**2
             return q, nothing, nothing
         k = int(np.argmax(np.abs(path / self.follower.led_scales)))
         speed, gain = y1[k] / path[k], y2[k] / path[k]
-        if np.allclose(y1, speed * path, rtol=1e-12) and np.allclose(y2, gain * path, rtol=1e-12):
+        if np.allclose(y1, speed * path, rtol=ALIGNED) and np.allclose(y2, gain * path, rtol=ALIGNED):
             return q, speed * first, speed**2 * second + gain * first
         return q, nothing, nothing

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.motions import BLOCKED, LEAPS, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .following import Follower, Tangent
@@ -22,9 +23,6 @@ JUMP = 0.5  #: largest scaled motion in one step
 OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction
 FEWEST = 50  #: steps of a walk
-REST = 1e-6  #: scaled motion too small to judge
-LEAPS = (1e-3, 4e-3, 1.6e-2, 6e-2)  #: scaled motion on either side of a singular position, tried in order
-SMALLEST = 1e-13  #: of the path's parameter, before the way counts as blocked
 STEPS = 200_000  #: of one walk
 
 
@@ -90,7 +88,7 @@ class Walk:
             found = self.forward(here, h, end if h == left else here.s + h)
             if found is None:
                 self.step = 0.5 * h
-                if self.step > SMALLEST * max(1.0, abs(here.s)):
+                if self.step > BLOCKED * max(1.0, abs(here.s)):
                     continue
                 found = self.leap(here)
                 if found is None:
@@ -113,9 +111,9 @@ class Walk:
         off = largest(scales.distance(found.q, ahead))
         move = largest(scales.distance(found.q, here.q))
         turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / scales.q)
-        if not (off <= max(OFF * move, REST) and turned <= max(TURNED * move, REST) and move <= JUMP):
+        if not (off <= max(OFF * move, UNJUDGED) and turned <= max(TURNED * move, UNJUDGED) and move <= JUMP):
             return None
-        worst = max(off / max(OFF * move, REST), turned / max(TURNED * move, REST))
+        worst = max(off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED))
         if h >= 0.999 * self.step:
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
         return found

@@ -12,15 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..numeric.scales import Array
 from .roots import find_root
-from .singular import NEAR, SHARE, Singular
+from .singular import SHARE, Singular
 from .workspace_grid import Index
 from .workspace_walk import OUT, Flood, Stage
-
-ROUNDING = 1e-9  #: smallest over largest singular value of J, from which on it counts as singular
-
-NEGLIGIBLE = 1e-10  #: of det J at the neighbours, that counts as 0 between them
 
 
 class WorkspaceSingular(NamedTuple):
@@ -107,7 +104,7 @@ class Reader:
         K = self.follower.matrix(q, t)
         U, S, W = np.linalg.svd(K, full_matrices=False)
         R = np.array([self.follower.right(q, t, *self.stage.along(k)) for k in range(len(self.stage.grid.names))]).T
-        V = W.T @ np.divide(U.T @ R, S[:, None], out=np.zeros((len(S), R.shape[1])), where=S[:, None] > 1e-13 * S[0])
+        V = W.T @ np.divide(U.T @ R, S[:, None], out=np.zeros((len(S), R.shape[1])), where=S[:, None] > NULL * S[0])
         return self.follower.scales.q[:, None] * V, float(S[-1] / S[0])
 
     def jacobian(self, q: Array, t: float, V: Array) -> Array:
@@ -162,12 +159,12 @@ def judge(stage: Stage, reader: Reader, filled: Flood) -> Conditions:
         for k in np.flatnonzero(reader.wraps):
             y[index][k] += 2 * np.pi * np.round((y[parent][k] - y[index][k]) / (2 * np.pi))
         V, quality[index] = reader.motion(q, t)
-        if quality[index] < NEAR:
+        if quality[index] < SINGULAR:
             singular[index] = lost[index] = True
             continue
         A = J[index] = reader.jacobian(q, t, V)
         U, S, _ = np.linalg.svd(A)
-        if not S[-1] > ROUNDING * S[0]:
+        if not S[-1] > DEGENERATE * S[0]:
             singular[index] = lost[index] = True
             found.append(_lost(stage, index, stage.at(index), q, U[:, len(S) - 1]))
     if n_y == n_x:
@@ -244,4 +241,4 @@ def _locate(stage: Stage, reader: Reader, filled: Flood, one: Index, other: Inde
     A = reader.jacobian(here, t, reader.motion(here, t)[0])
     U, S, _ = np.linalg.svd(A)
     near = one if s <= 0.5 * length else other
-    return _lost(stage, near, path.at(s), here, U[:, -1]) if S[-1] < 1e-6 * S[0] else None
+    return _lost(stage, near, path.at(s), here, U[:, -1]) if S[-1] < SINGULAR * S[0] else None

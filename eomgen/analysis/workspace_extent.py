@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.motions import FLAT_CELL, SLACK
 from ..numeric.scales import Array
 
 CHUNK = 2_000_000  #: raster cells looked at in one go
@@ -76,7 +77,7 @@ def _draw(raster: np.ndarray[Any, Any], corners: Array) -> None:
     """Mark raster cells whose centres lie in simplices (n, d + 1, d), in units of cells."""
     d = raster.ndim
     edges = corners[:, 1:] - corners[:, :1]
-    solid = np.abs(np.linalg.det(edges)) > 1e-12
+    solid = np.abs(np.linalg.det(edges)) > FLAT_CELL
     corners, edges = corners[solid], edges[solid]
     low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, None).astype(int)
     high = np.minimum(np.floor(corners.max(axis=1) - 0.5).astype(int), np.array(raster.shape) - 1)
@@ -95,6 +96,6 @@ def _draw(raster: np.ndarray[Any, Any], corners: Array) -> None:
             place, cell[:, k] = np.divmod(place, sizes[chosen, k])
         cell += low[chosen]
         part = np.einsum("ni,nij->nj", cell + 0.5 - corners[chosen, 0], inverse[chosen])
-        inside = (part >= -1e-9).all(axis=1) & (part.sum(axis=1) <= 1.0 + 1e-9)
+        inside = (part >= -SLACK).all(axis=1) & (part.sum(axis=1) <= 1.0 + SLACK)
         raster[tuple(cell[inside].T)] = True
         first = last

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, PartitionError
+from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .following import Follower
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 FINEST = 1 / 40  #: of the way between neighbours: smaller steps are left to a walk that looks for singular positions
 TRIES = 64  #: grid points tried as the first one
 REACHED, LIMITED, OUT = "reached", "limits", "out of reach"
-SLACK = 1e-9  #: by which a limit may be passed, for rounding
 
 
 class Edge(NamedTuple):

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import click
 
 from ..errors import EomgenError
+from ..limits.constraints import UNMOVED
 from .failures import TOOLCHAIN, reports_failures
 from .options import json_option
 from .screen import print_json, readable_size
@@ -118,7 +119,7 @@ def _compiles() -> Finding:
     except (EomgenError, OSError) as error:
         what, _, rest = str(error).partition("\n")
         return Finding("small model", False, what, rest)
-    if abs(acceleration + 9.81 * sin(0.5)) > 1e-12:
+    if abs(acceleration + 9.81 * sin(0.5)) > UNMOVED:
         return Finding("small model", False, f"a pendulum accelerates by {acceleration}", "try another compiler by CC=")
     return Finding("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
 

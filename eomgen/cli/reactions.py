@@ -9,12 +9,12 @@ import click
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .options import require_folder
 from .screen import print_heading, print_json, print_table, stage
 
 COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
-NOISE = 1e-13  #: relative, of components shown as 0
 
 
 @click.command()
@@ -66,7 +66,7 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
         )
         return
     print_heading(f"reactions at t = {t:g} s" if end is None else f"largest reactions up to t = {end:g} s")
-    found = np.where(np.abs(found) < NOISE * np.abs(found).max(initial=0.0), 0.0, found)
+    found = np.where(np.abs(found) < SHOWN_FORCE * np.abs(found).max(initial=0.0), 0.0, found)
     lines = [
         [joint, *(f"{value:.6g}{'*' if mark else ''}" for value, mark in zip(row, stars, strict=True))]
         for joint, row, stars in zip(module.joint_names, found, marks, strict=True)

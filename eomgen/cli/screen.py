@@ -14,8 +14,9 @@ from typing import Any
 
 import click
 
+from ..limits.descriptions import SHOWN
+
 WIDTH = 120  #: of tables that do not go to a terminal
-NOISE = 1e-14  #: of the largest value of a unit: what is smaller is the rounding of a zero
 
 
 def print_json(value: Any) -> None:
@@ -57,7 +58,7 @@ def without_noise(
     largest = dict.fromkeys(units, 0.0)
     for unit, size in zip(units, sizes if sizes is not None else values, strict=True):
         largest[unit] = max(largest[unit], abs(size)) if isfinite(size) else largest[unit]
-    return [0.0 if abs(x) <= NOISE * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
+    return [0.0 if abs(x) <= SHOWN * largest[unit] else float(x) for x, unit in zip(values, units, strict=True)]
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> None:

@@ -11,13 +11,10 @@ from ..graph.core import Expr, atan2, cos, sin
 from ..graph.differentiate import jvp
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
+from ..limits.descriptions import CLOSING, EDGE, LAW, ZERO
 from ..records import dataclass
 
 TRIALS = 5
-CLOSE = 1e-9
-EDGE = 1e-10  #: how near to the ends of a turn they are looked at, inside it (rad)
-ROUNDING = 1e-12
-CLOSING = 1e-6  #: part of its range by which a law, or its slope, may miss its own beginning after a turn
 
 
 @dataclass(frozen=True)
@@ -67,9 +64,9 @@ class Profile:
             found = [np.broadcast_to(f, theta.shape) for f in evaluate(laws, {**values, name: theta})]
         if not np.isfinite(found).all():
             return None  # what it is elsewhere is judged elsewhere
-        rounding = ROUNDING * float(np.abs(found[0]).max())
+        rounding = LAW * float(np.abs(found[0]).max())
         for what, f, size in (("value", found[0], np.ptp(found[0])), ("slope", found[1], np.abs(found[1]).max())):
-            first, last = (0.0 if abs(x) < CLOSE * size else float(x) for x in f[:2])
+            first, last = (0.0 if abs(x) < ZERO * size else float(x) for x in f[:2])
             if abs(last - first) > CLOSING * float(size) + rounding:
                 return what, first, last
         return None
@@ -88,6 +85,6 @@ class Profile:
                     for k in (0, 1, -1)
                 )
             size = float(np.abs(here).max())
-            if not all(bool((np.abs(x - here) <= CLOSE * size).all()) for x in (there, back)):
+            if not all(bool((np.abs(x - here) <= ZERO * size).all()) for x in (there, back)):
                 return False
         return True

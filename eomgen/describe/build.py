@@ -29,7 +29,7 @@ from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
 from .input_rates import add_rates
 from .joint_data import check_display
-from .mechanism import Body, Input, Mechanism, Output, Parameter, Simulation
+from .mechanism import SUMS, Body, Input, Mechanism, Output, Parameter, Simulation
 from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .reading import Reader
@@ -97,7 +97,7 @@ def build(description: Description) -> Mechanism:
     if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
         faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
     _check_mass(reader, bodies)
-    inertia_notes = check_bodies(bodies, joints, numbers, faults)
+    negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
     check_turns(constraints, numbers, faults)
     check_energies(given, outputs, faults)
     if len(joints) == len(sections["joints"]):
@@ -127,6 +127,7 @@ def build(description: Description) -> Mechanism:
         lines=dict(description.lines),
         doc=doc,
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        negative=negative,
         notes=inertia_notes,
     )
 
@@ -208,7 +209,7 @@ def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
 
 def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
     """Note centres of mass and momenta asked of a mechanism without mass."""
-    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level > 2]
+    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
     if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
         what = ", ".join(name.removesuffix("()") for name in asked)
         message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"

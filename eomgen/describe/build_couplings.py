@@ -9,6 +9,7 @@ from ..constraints.base import POSITION, VELOCITY
 from ..graph.core import Expr, sin
 from ..graph.differentiate import gradient
 from ..graph.substitute import symbols_of
+from ..limits.descriptions import TENSOR
 from .constraint_element import Element
 from .coordinates import Found
 from .fields_constraints import WHEELS
@@ -147,7 +148,7 @@ def _wheels(e: Element, key: str) -> dict[str, Expr] | None:
     if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
         message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
         e.faults.add(path, message, "the sun stands inside the ring")
-    elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > 1e-9 * numbers["ring"]:
+    elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > TENSOR * numbers["ring"]:
         message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
         e.faults.add(path, message, "the wheels of a planetary set fit into each other; leave one out")
     return sizes

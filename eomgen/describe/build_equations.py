@@ -10,6 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
+from ..limits.descriptions import TENSOR
 from .checks import check_keys
 from .description import Faults, items
 from .fields import EQUATIONS, MOTION
@@ -197,7 +198,7 @@ def _check_mass_matrix(reader: Reader, rows: Sequence[Sequence[Expr]], v: Sequen
     for i in range(n):
         for j in range(i):
             gap = abs(numbers[i * n + j] - numbers[j * n + i])
-            if gap > 1e-9 * size:  # false where an entry is not finite there
+            if gap > TENSOR * size:  # false where an entry is not finite there
                 message = f"is not symmetric: entries ({i}, {j}) and ({j}, {i}) differ"
                 reader.faults.add(f"{PATH}.mass_matrix", message, "give M of M v' = f with f all forces, as it is")
                 return

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..graph.functions import Function
+from ..limits.descriptions import APART, PERIODIC
 from ..numeric.functions import Curve, Surface, Twin
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
 from .build_native import build_native
@@ -17,7 +18,6 @@ from .names import QUANTITIES, nearest
 from .reading import Reader, is_number
 
 POINTS = 20_000  #: of a table, those of a grid together
-CLOSED = 1e-12  #: relative difference of the first and the last value of a periodic table that counts as rounding
 
 Array = np.ndarray
 
@@ -81,7 +81,7 @@ def _table(reader: Reader, entry: Entry) -> Function | None:
     elif kind == "periodic":
         if len(x) < 3:
             faults.add(f"{path}.x", "a periodic table has at least three points", "the last repeats the first")
-        elif abs(y[-1] - y[0]) > CLOSED * np.max(np.abs(y)):
+        elif abs(y[-1] - y[0]) > PERIODIC * np.max(np.abs(y)):
             faults.add(
                 f"{path}.y", f"ends with {y[-1]:g} and begins with {y[0]:g}", "a periodic table ends as it begins"
             )
@@ -121,7 +121,7 @@ def _points(reader: Reader, path: str, given: Any) -> Array | None:
         k = int(np.argmax(~(steps > 0.0)))
         reader.faults.add(f"{path}[{k + 1}]", f"{x[k + 1]:g} follows {x[k]:g}", "the points of a table increase")
         return None
-    if not np.isfinite(x[-1] - x[0]) or (steps < 1e-12 * np.max(np.abs(x))).any():
+    if not np.isfinite(x[-1] - x[0]) or (steps < APART * np.max(np.abs(x))).any():
         reader.faults.add(path, "has points too near to each other, or too far apart, to be told apart in doubles")
         return None
     return x

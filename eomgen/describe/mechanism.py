@@ -16,6 +16,7 @@ from ..errors import ModelError, Problem
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
+from ..limits.runs import ATOL, RTOL
 from ..records import dataclass
 from .description import place_of
 
@@ -102,6 +103,7 @@ def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
+SUMS = (ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS)
 TURNING = (7, 8, 9, 10)  #: angular velocity in ground axes and in the marker's own, then their rates
 
 
@@ -184,8 +186,8 @@ class Simulation:
 
     end: float = 10.0
     method: str = "DOP853"
-    rtol: float = 1e-8
-    atol: float = 1e-10
+    rtol: float = RTOL
+    atol: float = ATOL
     step: float | None = None
 
 
@@ -214,6 +216,7 @@ class Mechanism:
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
     notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
 
     @property

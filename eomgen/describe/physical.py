@@ -11,23 +11,27 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
+from ..limits.descriptions import TENSOR, TENSOR_TERMS
 from ..limits.inertia import COMPUTED
-from ..numeric.inertia import SWITCH, fault_of_inertia, inertia_scales
+from ..numeric.inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales
 from .description import Faults
 from .mechanism import Body, JointSpec
 
 
 def check_bodies(
     bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float], faults: Faults
-) -> tuple[str, ...]:
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Note masses and inertias that no body can have, as far as the declared values of parameters tell.
 
     Returns
     -------
-    tuple of str
-        The same of bodies where they are taken with a note.
+    negative : tuple of str
+        Names of bodies with a negative mass or moment that are taken as they are.
+    notes : tuple of str
+        What of them is to be noted.
     """
     notes: list[str] = []
+    negative: dict[str, None] = {}
     masses = [_numbers([body.mass], values) for body in bodies]
     tensors = [_numbers([entry for row in body.inertia for entry in row], values) for body in bodies]
     scales = inertia_scales(
@@ -37,8 +41,6 @@ def check_bodies(
     )
     for body, mass, tensor, scale in zip(bodies, masses, tensors, scales, strict=True):
         path = f"bodies.{body.name}"
-        if body.check == "off":
-            continue
         found: list[tuple[str, str, str]] = []
         if mass is not None and mass[0] < 0:
             how = "" if body.mass.value is not None else " at the declared values"
@@ -54,8 +56,11 @@ def check_bodies(
             if body.check == "error":
                 faults.add(place, message, remedy)
             else:
-                notes.append(f"{place}: {message}; taken as it is")
-    return tuple(notes)
+                if remedy not in (EXCESS, ASYMMETRIC[1]):
+                    negative[body.name] = None
+                if body.check == "note":
+                    notes.append(f"{place}: {message}; taken as it is")
+    return tuple(negative), tuple(notes)
 
 
 def _longest(bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float]) -> float:
@@ -86,14 +91,14 @@ def is_symmetric(inertia: Mat3, tensor: Sequence[float] | None = None, computed:
         return True
     if tensor is not None:
         full = np.reshape(tensor, (3, 3))
-        atol = max(1e-12 * float(np.max(np.abs(full), initial=0.0)), computed)
-        return bool(np.allclose(full, full.T, rtol=1e-9, atol=atol))
+        atol = max(TENSOR_TERMS * float(np.max(np.abs(full), initial=0.0)), computed)
+        return bool(np.allclose(full, full.T, rtol=TENSOR, atol=atol))
     # written differently above and below the diagonal: equal if they agree wherever one looks
     flat = [x for pair in pairs for x in pair]
     names = sorted(symbols_of(flat))
     for seed in (1, 2, 3):
         draws = np.random.default_rng(seed).uniform(0.5, 1.5, len(names))
         result = np.asarray(evaluate(flat, dict(zip(names, draws.tolist(), strict=True))), dtype=float)
-        if not np.allclose(result[::2], result[1::2], rtol=1e-9, atol=1e-12):
+        if not np.allclose(result[::2], result[1::2], rtol=TENSOR, atol=TENSOR_TERMS):
             return False
     return True

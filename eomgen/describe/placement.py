@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, cos, sin
 from ..graph.vectors import Mat3
+from ..limits.rounding import QUARTER
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -30,7 +31,7 @@ def cosine_and_sine(angle: Expr) -> tuple[Expr, Expr]:
     value = angle.value
     if value is not None:
         quarter = round(value / (math.pi / 2))
-        if abs(value - quarter * (math.pi / 2)) <= 1e-15 * max(1, abs(quarter)):
+        if abs(value - quarter * (math.pi / 2)) <= QUARTER * max(1, abs(quarter)):
             c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
             return angle.graph.constant(c), angle.graph.constant(s)
     return cos(angle), sin(angle)

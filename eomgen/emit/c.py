@@ -97,6 +97,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "closed_at": closed_at(program, areas),
         "work_at": len(program.parameters) + len(program.hoisted),
         "rank": sizes.n_v - sizes.n_dof,
+        "indefinite": int(bool(program.metadata.get("indefinite"))),
         "helpers": [*used_helpers(program, roots), *declarations(program, used_calls(program))],
         "blocks": printed if program.hoisted else printed[1:],
         "drivers": drivers,

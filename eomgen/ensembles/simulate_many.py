@@ -216,9 +216,11 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
                 f"input {name} of simulate_many must be a number, (k,) numbers or a table (times, values), "
                 "a Signal or an expression as text, not a function"
             )
+    only = {name for name in layout.input_rates if name not in layout.u}
     rest = {name: x for name, x in inputs.items() if name not in tables}
     still = fill_rates(layout, inputs, lambda name, rate, value: 0.0)
-    return tables, {**rest, **{rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}} or None
+    held = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
+    return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
 
 
 def _positive(what: str, given: Any, default: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
@@ -107,6 +108,12 @@ class TreeEquations:
         self.system = system
         self.canonical = canonical
         self.turned = turned
+
+    def without_accelerations(self) -> TreeEquations:
+        """The same equations, to be solved with M."""
+        same = copy(self)
+        same.accelerations, same.pivots = None, ()
+        return same
 
     @property
     def mass_matrix(self) -> Rows:

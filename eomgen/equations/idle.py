@@ -11,6 +11,7 @@ from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
+from ..limits.constraints import UNMOVED
 from ..records import dataclass
 
 FAINT = 0.01  #: part of a motion, relative to its largest, that is left out of a message
@@ -72,7 +73,7 @@ class IdleMotion:
             moving, still = (np.array(evaluate(expressions, values | part), dtype=float) for part in (rates, {}))
             found.append((body.name, moving[3:].reshape(3, 3).T @ (moving[:3] - still[:3])))  # drivers turn bodies too
         largest = max((float(np.linalg.norm(w)) for _, w in found), default=0.0)
-        return [(name, clean(w)) for name, w in found if np.linalg.norm(w) > max(FAINT * largest, 1e-12)]
+        return [(name, clean(w)) for name, w in found if np.linalg.norm(w) > max(FAINT * largest, UNMOVED)]
 
 
 def clean(axis: np.ndarray) -> list[float]:

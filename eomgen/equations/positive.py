@@ -104,8 +104,11 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
             continue  # rank is lost here, and another configuration will do
         embedded = B.T @ M @ B
         sizes, modes = np.linalg.eigh(correlated(embedded))
-        if sizes[0] > LEAST:
+        if sizes[0] > LEAST or (m.negative and np.abs(sizes).min() > LEAST):
             return []
+        if m.negative:  # what is near 0 counts, not what is negative
+            order = np.argsort(np.abs(sizes), kind="stable")
+            sizes, modes = np.abs(sizes[order]), modes[:, order]
         if worst is None:  # the reference is what the message speaks of
             unit = 1.0 / np.sqrt(np.maximum(np.abs(embedded.diagonal()), TINY))
             alone = np.flatnonzero(np.abs(embedded.diagonal()) <= LEAST * np.abs(embedded).max(initial=TINY))

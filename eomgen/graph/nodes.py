@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from ..limits.rounding import TINY
 from .operations import COMMUTATIVE, EVEN, FOLD, ODD
 
 if TYPE_CHECKING:
@@ -206,7 +207,7 @@ class Nodes:
                 return a
             if x[0] == "const" and math.isfinite(x[1] / y[1]):
                 return self._const(x[1] / y[1])
-            if math.frexp(y[1])[0] in (0.5, -0.5) and abs(y[1]) > 1e-300:
+            if math.frexp(y[1])[0] in (0.5, -0.5) and abs(y[1]) > TINY:
                 return self.mul(self._const(1.0 / y[1]), a)
         if x[0] == "const" and x[1] == 0.0 and not (y[0] == "const" and y[1] == 0.0):
             return a

@@ -11,15 +11,14 @@ from ..describe.mechanism import Mechanism
 from ..errors import ModelError
 from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, Turn
 from ..frames import Marker
-from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
-from ..joints.rods import Distance, RevoluteSpherical
 from ..records import dataclass
 from .couplings import couple
 from .flaws import find_flaws
+from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
@@ -180,7 +179,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
-    length = _length_scale(mechanism)
+    length = length_scale(mechanism)
     constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
@@ -324,26 +323,3 @@ def _with_entries(load: Load, values: Iterator[Expr]) -> Load:
 
 def _entries(load: MarkerLoad | CoordinateLoad) -> list[Expr]:
     return [*load.force, *load.torque] if isinstance(load, MarkerLoad) else [load.value]
-
-
-def _length_scale(mechanism: Mechanism) -> Expr:
-    """Root mean square length of rods, and distance of joint markers from their bodies' origins; 1 if there is none.
-
-    Minimum-norm corrections compare lengths with angles; measured in this length, units do not matter.
-    """
-    graph = mechanism.graph
-    squares = []
-    for spec in mechanism.joints:
-        for marker in (spec.predecessor, spec.successor):
-            square = vec.dot(marker.frame.position, marker.frame.position)
-            if not square.is_zero:
-                squares.append(square)
-        if isinstance(spec.joint, Distance | RevoluteSpherical):
-            squares.append(spec.joint.length * spec.joint.length)
-    if not squares:
-        return graph.one
-    total = graph.zero
-    for square in squares:
-        total = total + square
-    size = graph.apply("sqrt", total / float(len(squares)))
-    return graph.apply("select", graph.apply("lt", size, 1e-9), 1.0, size)  # parameters may make all of them 0

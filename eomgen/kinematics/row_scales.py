@@ -20,12 +20,11 @@ from ..graph.core import Expr
 from ..graph.rounding import is_rounding, terms_of, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from ..limits.descriptions import BY_CHANCE, SMALL_LOOP
 from ..limits.rounding import ROUNDED, TINY_ROOT
 from .kinematics import Kinematics
 
 PLAIN = 4.0  #: a row whose gradient is a number within this factor of the kind's size keeps that
-SMALL = 1e-3  #: a gap whose gradient is below this part of its kind's size is of a loop that small
-LEAST = 1e-3  #: gradients at the initial values that are this part of those beside them vanish there by chance
 
 
 class Length(NamedTuple):
@@ -61,8 +60,8 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
         largest = max(first.value, second.value)
         if written and largest <= TINY_ROOT:
             found[i] = graph.constant(max(first.terms, second.terms) or 1.0)
-        elif written or TINY_ROOT < largest < SMALL * usual:
-            place = places[first.value < LEAST * second.value]
+        elif written or TINY_ROOT < largest < SMALL_LOOP * usual:
+            place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))
     return tuple(found)
 

@@ -11,9 +11,9 @@ from ..graph.differentiate import gradient
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
 from ..graph.vectors import Mat3
+from ..limits.descriptions import PLANE
 
 TRIALS = 3  #: random points at which an identity is tried
-CLOSE = 1e-9
 
 
 def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr, list[tuple[int, float]]] | None:
@@ -38,7 +38,7 @@ def sum_of_turns(graph: Graph, rotation: Mat3, q: Sequence[Expr]) -> tuple[Expr,
         with np.errstate(all="ignore"):
             found.append(np.array(evaluate(tried, values), dtype=float))
     steps = np.round(found[0][1:])
-    if any(not abs(x[0] - 1.0) < CLOSE or not (np.abs(x[1:] - steps) < CLOSE).all() for x in found):
+    if any(not abs(x[0] - 1.0) < PLANE or not (np.abs(x[1:] - steps) < PLANE).all() for x in found):
         return None
     terms = [(int(j), float(steps[j])) for j in np.flatnonzero(steps)]
     start = substitute([angle], dict.fromkeys(q, graph.zero))[0]

@@ -24,3 +24,4 @@ AHEAD = 1e-8  #: part of the run over which the rate of an event's value is take
 MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is differenced: the cube root of eps
 CONTINUOUS = 1e-9  #: part of the largest value or slope of a table by which it may jump and count as continuous
 DIFFERENCE = 1e-6  #: part of a variable over which a function of it is differenced
+LOCATED = 1e-12  #: part of an interval to which the jump of a text is located: beside it lie 4,000 numbers

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError
+from ..limits.constraints import CONTRADICTION, MEASURED
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
 from .closure import FAR, Equations, System, close, closed, remoteness
 from .projection import largest
@@ -172,7 +173,7 @@ class _Failure(NamedTuple):
             if not np.isfinite(J).all():
                 return ""
             out_of_reach = np.linalg.svd(J)[0][:, rank(J).rank :]
-            if largest(out_of_reach.T @ e) <= 1e-6:
+            if largest(out_of_reach.T @ e) <= MEASURED:
                 return ""
         names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)
         if len(gaps) == 1:
@@ -212,5 +213,5 @@ class _Failure(NamedTuple):
             found += list(y)
             labels += list(self.system.equations.names)
         worst = np.argsort(-np.abs(e), kind="stable")[:3].tolist()
-        order = [i for i in worst if not abs(e[i]) <= 1e-8] or worst[:1]
+        order = [i for i in worst if not abs(e[i]) <= CONTRADICTION] or worst[:1]
         return [(labels[i], abs(float(found[i]))) for i in order]

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.inertia import NOTHING, SINGULAR, STILL
+from ..errors import NonFiniteError, SingularMassMatrixError
+from ..limits.inertia import FAINT, NOTHING, SINGULAR, STILL
 from .scales import Array
 
 
@@ -30,6 +31,50 @@ def moves_inertia(pivot: float, B: Array, sizes: Array) -> bool:
         Diagonal of the scaled mass matrix of the tree.
     """
     return bool(pivot > STILL * sizes[B[:, 0] != 0.0].sum())
+
+
+def definite_factor(M: Array, what: str) -> Array:
+    """Cholesky's L (n, n) of a mass matrix M, for an analysis that holds for positive definite ones only.
+
+    Raises
+    ------
+    NonFiniteError
+        M is not finite.
+    SingularMassMatrixError
+        M is not positive definite; ``what`` names the analysis.
+    """
+    if not np.isfinite(M).all():
+        raise NonFiniteError(f"{what}: the mass matrix is not finite")
+    try:
+        return np.asarray(np.linalg.cholesky(M))
+    except np.linalg.LinAlgError:
+        least = float(np.linalg.eigvalsh(correlated(M))[0])
+        size = "negative inertia" if least < -SINGULAR else "no inertia"
+        raise SingularMassMatrixError(
+            f"{what}: some motion has {size} behind it (smallest eigenvalue {least:.2g}), and the mass matrix must be "
+            "positive definite"
+        ) from None
+
+
+def indefinite_factor(matrix: Array, sizes: Array) -> tuple[Array, Array]:
+    """L (n, n), 1 on its diagonal, and d (n,) with matrix = L diag(d) L^T, of a matrix that need not be definite.
+
+    Without pivoting, as in C (templates/c/drivers/ldl.c): what a pivot loses is told by the terms it is the sum of.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        A pivot is less than 1e-8 of the terms that it is the sum of.
+    """
+    n = len(matrix)
+    L, d = np.eye(n), np.zeros(n)
+    for j in range(n):
+        terms = L[j, :j] ** 2 * d[:j]
+        d[j] = matrix[j, j] - terms.sum()
+        if not abs(d[j]) > FAINT * (sizes[j] + np.abs(terms).sum()):
+            raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
+        L[j + 1 :, j] = (matrix[j + 1 :, j] - L[j + 1 :, :j] @ (L[j, :j] * d[:j])) / d[j]
+    return L, d
 
 
 def correlated(M: Array) -> Array:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
-from .definite import moves_inertia, safely_positive
+from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
 from .projection import largest, minimum_norm, project, tangent_projector
 from .scales import Array, GivenRates, Indices, Position, Rate, Scales
@@ -25,9 +25,10 @@ class Terms(NamedTuple):
     h: Array  #: (n,)
     C_q: Array  #: (m, n)
     gamma: Array  #: (m,)
+    indefinite: bool = False  #: whether M may have negative eigenvalues, where bodies with such inertias were asked for
 
 
-def unpack_terms(flat: Array, n: int, m: int) -> Terms:
+def unpack_terms(flat: Array, n: int, m: int, indefinite: bool = False) -> Terms:
     """The block ``terms`` [M lower triangle row by row | h | C_q | gamma] as arrays."""
     lower = n * (n + 1) // 2
     M = np.empty((n, n))
@@ -35,7 +36,7 @@ def unpack_terms(flat: Array, n: int, m: int) -> Terms:
     M[rows, columns] = flat[:lower]
     M[columns, rows] = flat[:lower]
     h, C_q, gamma = np.split(flat[lower:], [n, n + m * n])
-    return Terms(M, h, C_q.reshape(m, n), gamma)
+    return Terms(M, h, C_q.reshape(m, n), gamma, indefinite)
 
 
 class Embedded(NamedTuple):
@@ -43,16 +44,24 @@ class Embedded(NamedTuple):
 
     M: Array  #: (n, n) scaled mass matrix of the tree
     matrix: Array  #: (n_dof, n_dof) B^T M B
-    factor: Array  #: its Cholesky factor L
+    factor: Array  #: L of matrix = L S L^T, Cholesky's where S is 1
     split: Partition
+    signs: Array  #: (n_dof,) diagonal of S, 1 or -1
 
     def solve(self, f: Array) -> Array:
         """``B (B^T M B)^-1 B^T f``, f (n,) or (n, k)."""
         y = np.linalg.solve(self.factor, self.split.B.T @ f)
-        return np.asarray(self.split.B @ np.linalg.solve(self.factor.T, y))
+        return np.asarray(self.split.B @ np.linalg.solve(self.factor.T, (y.T * self.signs).T))
 
 
-def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence[int] | Indices) -> Embedded:
+def embed(
+    M: Array,
+    C_q: Array,
+    scales: Scales,
+    rank: int,
+    independent: Sequence[int] | Indices,
+    indefinite: bool = False,
+) -> Embedded:
     """Form and factorise the embedded mass matrix.
 
     Raises
@@ -67,6 +76,10 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     matrix = split.B.T @ scaled @ split.B
     if not np.isfinite(matrix).all():
         raise NonFiniteError("the mass matrix is not finite")
+    if indefinite:
+        size = (split.B**2 * np.abs(scaled.diagonal())[:, None]).sum(axis=0)
+        lower, pivots = indefinite_factor(matrix, size)
+        return Embedded(scaled, matrix, lower * np.sqrt(np.abs(pivots)), split, np.sign(pivots))
     try:
         factor: Array = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
     except np.linalg.LinAlgError:
@@ -77,7 +90,7 @@ def embed(M: Array, C_q: Array, scales: Scales, rank: int, independent: Sequence
     alone = len(size) == 1
     if not safely_positive(pivots, size) or (alone and not moves_inertia(pivots[0], split.B, scaled.diagonal())):
         raise SingularMassMatrixError("the mass matrix of the degrees of freedom is singular")
-    return Embedded(scaled, matrix, factor, split)
+    return Embedded(scaled, matrix, factor, split, np.ones(len(size)))
 
 
 def accelerate(terms: Terms, v: Array, scales: Scales, system: Embedded) -> Array:
@@ -112,7 +125,7 @@ def rhs(
     return np.concatenate(
         [
             scales.rates(q, v) if given is None else given.rates(q, v),
-            accelerate(here, v, scales, embed(here.M, here.C_q, scales, rank, independent)),
+            accelerate(here, v, scales, embed(here.M, here.C_q, scales, rank, independent, here.indefinite)),
         ]
     )
 
@@ -151,7 +164,7 @@ def jacobian(
     n, n_q, s = len(v), len(q), scales.q
     q, v = project(position, rate, q, v, scales, given)
     here = terms(q, v)
-    system = embed(here.M, here.C_q, scales, rank, independent)
+    system = embed(here.M, here.C_q, scales, rank, independent, here.indefinite)
     split = system.split
     a = accelerate(here, v, scales, system)
     multipliers = np.zeros(len(here.gamma))

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..limits.inertia import COMPUTED, DIGITS, TRIANGLE
+from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
@@ -95,6 +95,6 @@ def fault_of_inertia(
     size = max(abs(a), abs(c))
     if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a:.6g}", NEGATIVE
-    if b > max(1e-9 * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
+    if b > max(MOMENT * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
         return f"principal moments {a:.6g}, {b:.6g}, {c:.6g}: one exceeds the sum of the others", EXCESS
     return None

@@ -61,7 +61,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     Raises
     ------
     PartitionError
-        Fewer than `rank` good pivots: below 1e-10 of the largest entry of J, or 1e-8 if `strict`.
+        Fewer than `rank` good pivots: below STATE of the largest entry of J, or CHOSEN if `strict`.
     """
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)

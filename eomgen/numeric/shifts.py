@@ -50,7 +50,7 @@ def shift_jacobian(
     s = scales.q
     q, v = project(position, rate, q, v, scales)
     here = terms(q, v)
-    system = embed(here.M, here.C_q, scales, rank, independent)
+    system = embed(here.M, here.C_q, scales, rank, independent, here.indefinite)
     split = system.split
     a = accelerate(here, v, scales, system)
     multipliers = np.zeros(len(here.gamma))

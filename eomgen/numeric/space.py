@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import AssemblyError
+from ..limits.descriptions import UNIT
 
 Array: TypeAlias = NDArray[np.float64]
 Indices: TypeAlias = NDArray[np.intp]
-
-ROUNDING = 1e-6  #: how far given Euler parameters may be from length 1
 
 
 class Space(NamedTuple):
@@ -132,7 +131,7 @@ def settle(names: Sequence[str], kinds: Sequence[str], values: Mapping[str, floa
             continue
         e = np.array([values.get(name, 0.0) for name in four])
         length = float(np.sqrt(e @ e))
-        if not abs(length - 1.0) <= ROUNDING:
+        if not abs(length - 1.0) <= UNIT:
             shown = ", ".join(f"{name} = {x:.6g}" for name, x in zip(four, e, strict=True))
             raise AssemblyError(
                 f"the Euler parameters {shown} have length {length:.6g}, not 1 (those not given are 0): "

@@ -398,7 +398,8 @@ class BlockMaker:
         v, a = self._symbols(terms.v), self._symbols(terms.a)
         rates = jvp(terms.events, dict(zip(self._symbols(terms.q), terms.rates or v, strict=True)))
         time = terms.graph.symbol(terms.t)
-        drift = jvp(terms.events, {time: terms.graph.one})
+        moving = {terms.graph.symbol(u): terms.graph.symbol(rate) for u, rate in terms.input_rates}
+        drift = jvp(terms.events, {time: terms.graph.one} | moving)
         normals = jacobian(rates, v)
         change = jvp(terms.inverse_dynamics, {x: x for x in a})
         least = [x / (s * s) for x, s in zip(a, terms.coordinate_scales, strict=True)]

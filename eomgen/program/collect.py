@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from ..describe.input_names import chains, split_rate
+from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import Input, Output, Parameter
 from ..equations.equations import TreeEquations
 from ..equations.slopes import ForceSlopes, can_differentiate
@@ -80,6 +80,7 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         turned=equations.turned,
         events=tuple(resolved([e.expression for e in kinematics.mechanism.events], kinematics, equations)),
         resets=tuple(resolved([x for _, _, x in _resets(kinematics)], kinematics, equations)),
+        input_rates=tuple(_rate_pairs(kinematics)),
         impacts=any(e.restitution is not None for e in kinematics.mechanism.events),
         projects=c.stabilised is None,
         canonical=equations.canonical,
@@ -280,14 +281,29 @@ def _signals(kinematics: Kinematics, equations: TreeEquations) -> dict[str, Any]
 
 
 def _input_rates(kinematics: Kinematics) -> dict[str, list[tuple[str, int]]]:
-    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order."""
-    found = chains(kinematics.input_names)
-    rates = {rate for of in found.values() for rate in of}
-    return {
-        name: [(rate, split_rate(rate)[1] - split_rate(name)[1]) for rate in of]
-        for name, of in found.items()
-        if name not in rates
-    }
+    """Inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order.
+
+    Also of what stands in the equations by its rates only, such as the lift of a pivot by its acceleration.
+    """
+    known = {*kinematics.names, *kinematics.velocity_names, *kinematics.parameter_names}
+    known |= {output.name for output in kinematics.mechanism.outputs}
+    orders: dict[str, list[tuple[str, int]]] = {}
+    for name in kinematics.input_names:
+        stem, order = split_rate(name)
+        orders.setdefault(stem, []).append((name, order))
+    found: dict[str, list[tuple[str, int]]] = {}
+    for stem, of in orders.items():
+        of.sort(key=lambda pair: pair[1])
+        (first, lowest), rest = (of[0], of[1:]) if of[0][1] == 0 or stem in known else ((stem, 0), of)
+        if rest:
+            found[first] = [(name, order - lowest) for name, order in rest]
+    return found
+
+
+def _rate_pairs(kinematics: Kinematics) -> list[tuple[str, str]]:
+    """Inputs with the input that is their rate."""
+    names = kinematics.input_names
+    return [(name, rate_of(name)) for name in names if rate_of(name) in names]
 
 
 def _constraint_inputs(kinematics: Kinematics) -> list[str]:

@@ -76,6 +76,7 @@ class SystemTerms:
     turned: Turned | None = None  #: the tree's system in other velocities, in which it is solved; else None
     events: Row = ()  #: of (q, v): their zeros are the events of the model
     resets: Row = ()  #: of (q, v): new values of states after events
+    input_rates: tuple[tuple[str, str], ...] = ()  #: inputs with the input that is their rate
     impacts: bool = False  #: whether an event is a gap with a restitution
     projects: bool = True  #: whether rhs takes the projected state; not with Baumgarte's stabilisation
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..limits.rounding import QUARTER
 from ..records import dataclass
 
 Numbers = Sequence[float]
@@ -75,7 +76,7 @@ def placed(position: Numbers, rpy: Numbers, snap: float) -> Placement:
 def cosine_and_sine(angle: float, snap: float) -> tuple[float, float]:
     """cos and sin, exact 0 and +-1 within ``snap`` of a multiple of pi/2."""
     quarter = round(angle / (math.pi / 2))
-    if abs(angle - quarter * (math.pi / 2)) <= max(snap, 1e-15 * max(1, abs(quarter))):
+    if abs(angle - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
     return math.cos(angle), math.sin(angle)
 
@@ -106,7 +107,7 @@ def from_quaternion(w: float, x: float, y: float, z: float) -> np.ndarray:
         ]
     )
     nearest = np.round(matrix)
-    return nearest if np.abs(matrix - nearest).max() < 1e-15 else matrix
+    return nearest if np.abs(matrix - nearest).max() < QUARTER else matrix
 
 
 def about(axis: Numbers, angle: float) -> np.ndarray:

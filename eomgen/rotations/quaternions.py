@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..limits.rounding import TINY
 from .scalars import (
     Scalar,
     atan2,
@@ -105,7 +106,7 @@ def axis_angle_from_matrix(rotation: Any) -> tuple[Any, Scalar]:
     """Unit axis (3,) and angle in [0, pi]; for no rotation the axis is x."""
     e0, *v = entries(euler_parameters_from_matrix(rotation), 4, "")
     square = dot(v, v)
-    none = 1e-300
+    none = TINY
     size = sqrt(where_less(square, none, 1, square))
     axis = [where_less(square, none, float(k == 0), v[k] / size) for k in range(3)]
     return shaped(axis), 2 * atan2(where_less(square, none, 0, size), e0)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..graph.core import Expr
+from ..limits.descriptions import UNIT
 
 Scalar = Any  #: a number, an :class:`~eomgen.graph.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]
@@ -125,7 +126,7 @@ def require_rotation(R: list[list[Scalar]]) -> None:
         return
     numbers = np.array(R, dtype=float)
     determinant = float(np.linalg.det(numbers))
-    if not (np.abs(numbers @ numbers.T - np.eye(3)).max() < 1e-6 and determinant > 0.0):
+    if not (np.abs(numbers @ numbers.T - np.eye(3)).max() < UNIT and determinant > 0.0):
         raise ValueError(
             f"the matrix is not a rotation: its rows must be orthonormal and its determinant "
             f"1, which is {determinant:.6g}"

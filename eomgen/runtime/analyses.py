@@ -187,7 +187,9 @@ class Analyses(ForceAnalyses):
         hold: Mapping[str, float | None] | Sequence[str] = (),
         unknowns: Sequence[str] = (),
     ) -> Equilibrium:
-        """Find a position at rest in which all forces are in balance (virtual work, Newton's iteration).
+        """Find a position at rest in which all forces are in balance (virtual work) and nonholonomic rows allow rest.
+
+        Newton's iteration, then the motion in a viscous fluid, then Levenberg's and Marquardt's steps.
 
         Parameters
         ----------
@@ -211,7 +213,8 @@ class Analyses(ForceAnalyses):
         Raises
         ------
         EquilibriumError
-            None was found from the guess; the message names the coordinate with the largest force left.
+            None was found from the guess; the message names the coordinate with the largest force left, or one that
+            nonholonomic constraints move even at rest.
         AssemblyError
             The loops do not close with the held values.
         UsageError

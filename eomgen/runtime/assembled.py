@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
 from .layout import Layout, number
 
@@ -134,7 +135,7 @@ class Assembled:
         initial = self._initial(t, None, None)
         here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
         there = initial.side(initial.reference())
-        return 0 if abs(here) < 1e-8 else int(np.sign(here * (np.sign(there) or 1.0)))
+        return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 
     def _initial(self, t: float, p: Any, u: Any) -> Initial:
         from .initial import start_from

@@ -42,7 +42,7 @@ def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) 
     """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
     layout = module.layout
     C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
-    J = module.kernels.sizes[0].jacobian(C_q)
+    J = module.layout.scales.jacobian(C_q)
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values / np.maximum(values[:, :1], 1e-300))
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -124,8 +125,8 @@ class Dae:
         *,
         t_eval: Sequence[float] | Array | None = None,
         events: Any = None,
-        rtol: float = 1e-8,
-        atol: float = 1e-10,
+        rtol: float = RTOL,
+        atol: float = ATOL,
         **options: Any,
     ) -> Trajectory:
         """Integrate F = 0 by IDA of SUNDIALS, with the exact Jacobian; needs scikit-sundae.

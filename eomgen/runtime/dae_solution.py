@@ -131,6 +131,7 @@ class _Run:
     def _part(self, t: float, x: Array, end: float, jumped: bool) -> tuple[float, Array, list[int]]:
         """Integrate to an event, or to the end of this part; the time and state there, and what happened."""
         form, forcing, n_x = self.module.dae, self.forcing, self.module.n_x
+        forcing.enter(t, end)
         y, yp = form.initial(x, t, forcing(t, x))
         nodes = np.array([t, end])
         asked = np.empty(0)

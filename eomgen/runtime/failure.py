@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import STATUS, EvaluationError
+from ..limits.motions import FLAT, LOCKED
+from ..limits.rounding import TINY_ROOT
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
-LOCKED = 1e-4  #: distance from a singularity of Euler angles (rad) at which a failure is put down to it
-FLAT = 1e-3  #: sine of the angle between a disc's axle and its plane's normal below which it counts as flat
 LARGE = 1e150  #: a number whose square is beyond double precision
 SHOWN = 8  #: coordinates listed in a message
 
@@ -111,7 +111,7 @@ class Fail:
 def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     """Euler parameters whose squares are all zero at a state, and the remedy; None if there are none."""
     for i, _ in layout.balls:
-        if not np.abs(x[i : i + 4]).max() > 1e-150:
+        if not np.abs(x[i : i + 4]).max() > TINY_ROOT:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
             return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"
     return None

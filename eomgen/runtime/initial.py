@@ -55,7 +55,7 @@ class Initial:
         self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_g else None
         self._C = kernels.state("constraints", nan=True)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
-        self.scales, self.place = kernels.sizes
+        self.scales, self.place = layout.scales, layout.place_scales
         self._loop = kernels.motion("loop_coordinates") if layout.n_k else None
         self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
         self._alignment = kernels.state("alignment", nan=True) if layout.n_a else None

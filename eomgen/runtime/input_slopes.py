@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .layout import Layout
+from .signal_rates import TableRate
 from .signals import Forcing, Signal
 
 
@@ -38,13 +39,16 @@ class InputSlopes:
     def __init__(self, layout: Layout, forcing: Forcing, p: Array) -> None:
         self.layout = layout
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
-        self.tables: dict[int, Signal] = {}
+        self.forcing = forcing
+        chains = ((layout.u.index(name), of[0]) for name, of in layout.input_rates.items() if name in layout.u)
+        self.rates = {i: layout.u.index(rate) for i, (rate, times) in chains if times == 1}
+        self.tables: dict[int, TableRate] = {}
         self.functions: set[int] = set()
         for i, signal in forcing.varying.items():
             if i in self.formulas:
                 continue
-            if isinstance(signal, Signal):
-                self.tables[i] = signal
+            if isinstance(signal, Signal | TableRate):
+                self.tables[i] = signal.derivative()
             else:
                 self.functions.add(i)
                 forcing.varying[i] = OfTime(layout.u[i], signal)
@@ -55,15 +59,17 @@ class InputSlopes:
         return bool(self.formulas)
 
     def __call__(self, t: float, x: Array) -> Slopes:
-        """The derivatives; NaN by time for a Python function."""
+        """The derivatives; NaN by time for a Python function, unless its rate is an input too."""
         n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
         every = np.zeros((n_u, 1 + n_x + n_p))
         for i, slopes in self.formulas.items():
             every[i] = slopes(t, x)
+        within = self.forcing.within
         for i, table in self.tables.items():
-            every[i, 0] = table_rate(table, t)
+            every[i, 0] = table.beside(t, t if within is None else min(max(t, within[0]), within[1]))
         for i in self.functions:
-            every[i, 0] = np.nan
+            rate = self.rates.get(i)
+            every[i, 0] = np.nan if rate is None else self.forcing(t, x)[rate]
         return Slopes(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
 
 
@@ -96,16 +102,3 @@ class OfTime:
             f"input {self.name} is a Python function that reads the state, whose derivatives are not known: give it as "
             'an expression in a text, such as "-k*theta", or as a function of time alone'
         )
-
-
-def table_rate(table: Signal, t: float) -> float:
-    """The slope of a table at time t, to the right where it jumps."""
-    times = table.times
-    if table.order == 0 or len(times) < 2 or not times[0] <= t < times[-1]:
-        return 0.0
-    k = int(np.searchsorted(times, t, side="right")) - 1
-    if table.order == 1:
-        return float((table.values[k + 1] - table.values[k]) / (times[k + 1] - times[k]))
-    _, slope, bend, third = table.coefficients[k]
-    s = t - times[k]
-    return float(slope + s * (2.0 * bend + 3.0 * s * third))

@@ -7,7 +7,6 @@ makers ``timed``, ``state`` and ``motion``; see :class:`~.protocols.Core`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.inertia import SINGULAR
 from ..numeric.definite import correlated
-from ..numeric.scales import Array, Scales
+from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
 
@@ -48,18 +47,13 @@ class Kernels:
             self.context = core.context(p, u, UsageError)
         except UsageError as error:
             raise UsageError(layout.explain_constants(str(error), p)) from None
+        if p is not None and "scales" in core.names:
+            scales = core.state("scales", self.context, layout.shape("scales"), None, False, UsageError)
+            self.layout = layout = layout.sized(scales(np.empty(0)))
         self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
-
-    @cached_property
-    def sizes(self) -> tuple[Scales, Scales]:
-        """The scales of velocities and constraint rows, and those of positions, with these parameters."""
-        layout = self.layout
-        if "scales" not in self.core.names:
-            return layout.scales, layout.place_scales
-        return layout.sized(self.state("scales")(np.empty(0)))
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
@@ -108,6 +102,8 @@ class Kernels:
             if not np.isfinite(M).all():
                 return ""
             values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            if layout.metadata.get("indefinite"):
+                return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
             if values[0] > SINGULAR:
                 return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,8 @@ class Layout:
         self.n_resets: int = data.get("n_resets", 0)
         self.n_strike: int = data.get("n_strike", 0)
         self.n_e = len(self.fragile_forces)
-        #: inputs whose rates are inputs too: name -> (rate, how many times the input is derived), in order
+        #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
+        #: itself, or stands in the equations by its rates only.
         self.input_rates: dict[str, list[tuple[str, int]]] = {
             name: [(str(rate), int(times)) for rate, times in rates]
             for name, rates in data.get("input_rates", {}).items()
@@ -87,6 +89,7 @@ class Layout:
         kinds: Sequence[str] = data.get("velocity_kinds") or data["coordinate_kinds"]
         self.coordinate_kinds: tuple[str, ...] = tuple(data["coordinate_kinds"])
         self.velocity_kinds = tuple(kinds)
+        self.velocity_lengths = np.array([kind == "length" for kind in kinds], dtype=bool)
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
@@ -102,7 +105,8 @@ class Layout:
         ]
         self.loop_kinds = tuple(loop_kinds)
         self.loop_angles = np.array([kind == "angle" for kind in loop_kinds], dtype=bool)
-        self.loop_scales = np.array([self.length if kind == "length" else 1.0 for kind in loop_kinds])
+        self.loop_lengths = np.array([kind == "length" for kind in loop_kinds], dtype=bool)
+        self.loop_scales = np.where(self.loop_lengths, self.length, 1.0)
         self.initial: dict[str, float] = {k: float(v) for k, v in data.get("initial", {}).items() if v is not None}
         self.guess: dict[str, float] = {k: float(v) for k, v in data.get("guess", {}).items() if v is not None}
         self.limits: dict[str, dict[str, float]] = data.get("limits", {})
@@ -110,13 +114,20 @@ class Layout:
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
 
-    def sized(self, sizes: Array) -> tuple[Scales, Scales]:
-        """The scales, and those of positions, from typical sizes of velocities and rows (n_v + n_c,) at parameters that
-        may have other values than declared."""
-        scales = self.scales._replace(q=sizes[: self.n_v], c=sizes[self.n_v :])
-        if not self.given_rates:
-            return scales, scales
-        return scales, self.place_scales._replace(c=scales.c[: len(self.place_scales.c)])
+    def sized(self, sizes: Array) -> Layout:
+        """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values."""
+        s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
+        if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
+            return self
+        found = copy(self)
+        lengths = [*s_q[self.velocity_lengths], *s_c[self.scales.c == self.length]]
+        found.length = float(lengths[0]) if lengths else self.length
+        found.scales = self.scales._replace(q=s_q, c=s_c)
+        found.place_scales = found.scales
+        if self.given_rates:
+            found.place_scales = Scales.of_kinds(self.coordinate_kinds, s_c[: self.n_h].tolist(), found.length)
+        found.loop_scales = np.where(self.loop_lengths, found.length, 1.0)
+        return found
 
     def require_minimal_form(self) -> None:
         """Refuse a model whose positions do not follow from as many coordinates as there are degrees of freedom.

@@ -110,6 +110,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
 
     def _setup(self, core: Core, layout: Layout, p: Any, u: Any) -> None:
         self.kernels = kernels = Kernels(core, layout, p, u)
+        self.layout = layout = kernels.layout
         self.metadata = layout.metadata
         self.name, self.doc, self.limits = layout.name, str(layout.metadata.get("doc") or ""), layout.limits
         self.q_names, self.v_names, self.x_names = layout.q, layout.v, layout.x

@@ -123,7 +123,8 @@ class Drivers:
     def terms(self, t: float, u: Array, c: Array, q: Array, v: Array) -> embedded.Terms:
         """M, h, C_q, gamma."""
         flat = np.asarray(self.blocks["terms"](t, np.concatenate([q, v]), u, c), dtype=float)
-        return embedded.unpack_terms(flat, self.layout.n_v, self.layout.n_c)
+        indefinite = bool(self.layout.metadata.get("indefinite"))
+        return embedded.unpack_terms(flat, self.layout.n_v, self.layout.n_c, indefinite)
 
     def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:
         """The derivatives of the residuals."""

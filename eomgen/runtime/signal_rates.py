@@ -14,12 +14,12 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.rounding import TINY
-from ..limits.runs import CONTINUOUS, MOMENT
+from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
+from .layout import Layout, number
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .layout import Layout
     from .signals import Forcing
 
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
@@ -103,7 +103,7 @@ def require_smooth(forcing: Forcing, start: float, end: float) -> None:
     """
     layout = forcing.layout
     for rate, (name, times, _) in forcing.derived.items():
-        table: Any = forcing.varying.get(layout.u.index(name))
+        table: Any = forcing.values[name]
         if not hasattr(table, "jumps"):
             continue
         found = [t for t in table.jumps(times - 1) if min(start, end) < t < max(start, end)]
@@ -117,9 +117,11 @@ def require_smooth(forcing: Forcing, start: float, end: float) -> None:
     zero = np.zeros(layout.n_x)
     for first, of in layout.input_rates.items():
         for name, rate in pairwise([first, *(rate for rate, _ in of)]):
-            f, g = (forcing.formulas.get(layout.u.index(n)) for n in (name, rate))
+            f, g = (forcing.values.get(n) for n in (name, rate))
+            if not (isinstance(f, Formula | DeclaredSignal) and isinstance(g, Formula | DeclaredSignal)):
+                continue
             follows = rate in forcing.derived or (isinstance(f, DeclaredSignal) and isinstance(g, DeclaredSignal))
-            if f is None or g is None or not follows or not f.branches or start == end:
+            if not follows or not f.branches or start == end:
                 continue  # conditions have slope 0: only they can hide a jump
             what = f"input {name}: the equations need its rate {rate}"
             if f.depends_on_state:
@@ -152,7 +154,7 @@ def find_jump(
         left, right = a, b
         while gap(left, right) > allowed:
             middle = 0.5 * (left + right)
-            if right - left <= 1e-12 * (high - low) or not left < middle < right:
+            if right - left <= LOCATED * (high - low) or not left < middle < right:
                 return middle
             left, right = (left, middle) if gap(left, middle) > gap(middle, right) else (middle, right)
     return None
@@ -169,11 +171,9 @@ def moving_inputs(layout: Layout, u: Array) -> Array:
     """Rates (n_u,) of inputs whose rates are among the inputs u (n_u,); 0 of the others."""
     rates = np.zeros(layout.n_u)
     for name, of in layout.input_rates.items():
-        chain = [name, *(rate for rate, _ in of)]
-        orders = [0, *(times for _, times in of)]
-        for k in range(len(of)):
-            if orders[k + 1] == orders[k] + 1:
-                rates[layout.u.index(chain[k])] = u[layout.u.index(chain[k + 1])]
+        for (base, order), (rate, times) in pairwise([(name, 0), *of]):
+            if times == order + 1 and base in layout.u:
+                rates[layout.u.index(base)] = u[layout.u.index(rate)]
     return rates
 
 
@@ -189,12 +189,23 @@ def fill_rates(
         Inputs of a run, by name.
     derive : callable
         As :func:`derive`.
+
+    Raises
+    ------
+    UsageError
+        A rate is given of an input that is held.
     """
     found: dict[str, tuple[str, int, Any]] = {}
+    signals = layout.metadata.get("signals", {})
     for first, rates in layout.input_rates.items():
         last, order, value, at = (first, 0, given[first], 0) if first in given else ("", 0, None, 0)
+        led = first in given or first in signals or first not in layout.u
         for rate, times in rates:
+            led = led or rate in signals
             if rate in given:
+                if not led and not (isinstance(given[rate], int | float) and given[rate] == 0):
+                    raise UsageError(f"input {rate} is the rate of {first}, which is held; give {first} as well")
+                led = True
                 last, order, value, at = rate, times, given[rate], times
             elif last:
                 for _ in range(times - at):
@@ -217,8 +228,9 @@ def derive(name: str, rate: str, value: Any) -> Any:
     if isinstance(value, Formula):
         return value.derivative(name, rate)
     derivative = getattr(value, "derivative", None)
-    if callable(derivative):
-        return derivative()
+    found = derivative() if callable(derivative) else None
+    if found is not None:
+        return found if callable(found) else number(f"derivative of input {name}", found)
     raise UsageError(
         f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"

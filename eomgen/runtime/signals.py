@@ -160,20 +160,22 @@ class Forcing:
         given = inputs or {}
         if not isinstance(given, Mapping):
             raise UsageError(f"inputs must be a mapping of names, not {type(given).__name__}")
-        check_names("input", given, layout.u)
+        check_names("input", given, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
         self.layout = layout
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
         self.feedback = self.foreign = False
         self.formulas: dict[int, Formula | DeclaredSignal] = {}
-        values = {name: self._read(name, value) for name, value in given.items()}
+        values = self.values = {name: self._read(name, value) for name, value in given.items()}
         self.derived = fill_rates(layout, values, derive)
         for name, (_, _, value) in self.derived.items():
             values[name] = value
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in values:
-                values[name] = DeclaredSignal(tape, layout.metadata.get("signal_slopes", {})[name])
+                values[name] = DeclaredSignal(tape, layout.metadata["signal_slopes"][name])
         for name, value in values.items():
+            if name not in layout.u:
+                continue  # only its rates stand in the equations
             index = layout.u.index(name)
             if isinstance(value, Formula | DeclaredSignal):
                 self.formulas[index] = value
@@ -238,8 +240,8 @@ class Forcing:
     @property
     def state_dependent(self) -> list[int]:
         """Places in u of the inputs whose rates are inputs too and that depend on the state."""
-        bases = {self.layout.u.index(name) for name, _, _ in self.derived.values()}
-        return [i for i, formula in self.formulas.items() if i in bases and formula.depends_on_state]
+        bases = {name for name, _, _ in self.derived.values()}
+        return [i for i, formula in self.formulas.items() if self.names[i] in bases and formula.depends_on_state]
 
     @property
     def stepwise(self) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
@@ -71,6 +72,8 @@ def simulate(
         Tables are linear in between (a :class:`~.signals.Signal` may hold the last value, or be a cubic spline) and
         constant outside; their corners are stepped on exactly.  An expression is a text as in model files, of t,
         coordinates, velocities and parameters.
+        Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) follow from it; a function
+        of which none is known is refused unless they are given beside it.
     method : str or OdeSolver subclass, optional
         A method of SciPy: RK23, RK45, DOP853 (default), Radau (stiff), BDF, LSODA.  The first four run in compiled code
         with SciPy's steps unless there are inputs that are functions; in large mechanisms with loops (more than 8
@@ -329,7 +332,7 @@ def find_state(
             u = forcing(t, x)
             forcing.require_finite()
             x = find_state(module.bind(None, u), initial, t)
-            if np.allclose(forcing(t, x)[places], u[places], rtol=1e-13, atol=1e-13):
+            if np.allclose(forcing(t, x)[places], u[places], rtol=ALIKE, atol=ALIKE):
                 return x
         names = ", ".join(layout.u[i] for i in places)
         raise AssemblyError(f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s", [])

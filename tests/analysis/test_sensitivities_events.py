@@ -267,3 +267,43 @@ def test_a_jump_of_an_input_at_the_event_is_refused() -> None:
         mod.sensitivities(["s"], 2.0, {"s": 0.0, "s_dot": 1.0}, inputs=jump)
     later = mod.sensitivities(["s", "s_dot"], 2.0, {"s": 0.1, "s_dot": 1.0}, inputs=jump)
     np.testing.assert_allclose(later["s", "s"][-1], 1 - (1.0 - 3.0) * (-1.0) * -1.0, atol=1e-9)
+
+
+# -- inputs that move gaps, lengths and constraints --------------------------------------------------------------------
+def racket() -> tuple[eg.Model, dict[str, float]]:
+    m = eg.Model("racket", gravity=(0, -10, 0))
+    m.parameter("r", 0.5)
+    m.input("u")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="y", coordinate="s")
+    m.event("hit", "s - u", restitution=0.8)
+    return m, {"s": 1.0, "s_dot": 0.0}
+
+
+def string() -> tuple[eg.Model, dict[str, float]]:
+    th, thd, u, r = sympy.symbols("th th_dot u r")
+    L = u**2 * thd**2 / 2 + u * sympy.cos(th)
+    m = eg.Model.from_lagrangian("let_out", L, [th], inputs={u: 1.0}, parameters={r: 0.5})
+    return m, {"th": 0.3, "th_dot": 1.0}
+
+
+def ring() -> tuple[eg.Model, dict[str, float]]:
+    x, y, xd, yd, u, r = sympy.symbols("x y x_dot y_dot u r")
+    T = (xd**2 + yd**2) / 2 - r * y
+    m = eg.Model.from_lagrangian(
+        "ring", T, [x, y], constraints=[x**2 + y**2 - u**2], inputs={u: 1.0}, parameters={r: 0.5}
+    )
+    return m, {"x": 0.6, "x_dot": 0.8}
+
+
+@pytest.mark.parametrize("make", [racket, string, ring])
+def test_inputs_that_move_gaps_lengths_and_constraints(make: Any) -> None:
+    model, held = make()
+    mod, h, end = model.compile(target="numpy"), 1e-4, 0.9
+    moved = {"u": "r*t + 0.1*sin(4*r*t)" if make is racket else "1 + 0.3*r*t + 0.1*sin(3*t)"}
+    s = mod.sensitivities(["r"], end, held, inputs=moved, rtol=1e-10, atol=1e-12)
+    assert len(s.events) == (make is racket)
+    right, left = (
+        mod.simulate(end, held, {"r": 0.5 + d}, moved, rtol=1e-12, atol=1e-14).x[:, -1] for d in (h, -h)
+    )  # fmt: skip
+    np.testing.assert_allclose(s.dx[:, 0, -1], (right - left) / (2 * h), atol=1e-6)
+    assert np.abs(s.dx[:, 0, -1]).max() > 0.1

@@ -136,6 +136,14 @@ def test_functions_of_time_may_be_specified() -> None:
         method, "shaken", parameters={**values, a: 0.1, w: 3.0}, specified={lift: a * sympy.sin(w * t)}
     ).compile(target="numpy")
     assert driven.u_names == ()
+    given = {"lift": "0.1*sin(3*t)"}  # not an input itself: its rates follow
+    run, other = free.simulate(1.0, {"x": 0.1}, inputs=given), driven.simulate(1.0, {"x": 0.1})
+    assert np.abs(run.x[:, -1] - other.x[:, -1]).max() < 1e-12
+    assert run["T"][-1] == pytest.approx(other["T"][-1], rel=1e-12)
+    many = free.simulate_many(1.0, {"x": [0.1, 0.2]}, inputs=given)
+    assert many["x"][0] == pytest.approx(run["x"][-1], abs=1e-8)
+    with pytest.raises(eg.UsageError, match="its rate lift_dot, which is not known of a function"):
+        free.simulate(1.0, inputs={"lift": lambda t, x: 0.0})
     assert driven.rhs(0.7, [0.1, 0.0])[1] == pytest.approx(-15.0 * 0.1 + 0.9 * np.sin(2.1))
 
 

@@ -123,3 +123,21 @@ def test_a_run_with_c_code_that_has_no_python_twin_tells_that_its_power_balance_
     run = call(*words, "--json").json
     assert run["energy"]["power_balance"] is None
     assert abs(run["final"]["q_dot"] - np.exp(-0.5)) < 1e-7  # w' = -w/2 with the inertia m l^2 = 1
+
+
+def test_the_work_of_an_input_that_changes_over_time_is_counted(call: Call, tmp_path: Path) -> None:
+    model = tmp_path / "model.yaml"
+    model.write_text(
+        'name: pushed\ninputs: {u: {value: 0, signal: "sin(3*t)"}}\nbodies: {b: {mass: 1}}\n'
+        "joints: {s: {type: prismatic, between: [ground, b], axis: x}}\n"
+        "forces: {f: {type: torque, joint: s, value: u}}\nsimulation: {end: 2}\ninitial: {s_dot: 0}\n",
+        encoding="utf-8",
+    )
+    words = ["run", model, "--target", "numpy"]
+    energy = call(*words, "--json").json["energy"]
+    speed = (1.0 - np.cos(6.0)) / 3.0  # s' = (1 - cos 3t)/3
+    assert abs(energy["work"] - speed**2 / 2.0) < 1e-9
+    assert energy["power_balance"] < 1e-8
+    out = call(*words).out
+    assert "work of forces and inputs" in out
+    assert "kept to" not in out

@@ -120,3 +120,22 @@ def test_kernels_stay_what_they_were(arm: Any) -> None:
     kernels, x = arm.kernels, np.array([0.3, -0.4, 1.0, 2.0])
     doubled = Doubled("rhs", kernels.context, (4,), kernels.fail, False, eg.UsageError)
     np.testing.assert_array_equal(doubled(0.0, x, u=[1.0, 0.0]), 2.0 * arm.rhs(0.0, x, u=[1.0, 0.0]))
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_state_that_cannot_be_projected_names_the_gap_with_the_values_of_the_call(target: str) -> None:
+    import sympy as sp
+
+    x, y, x_dot, y_dot, l, r = sp.symbols("x y x_dot y_dot l r")
+    row = x**2 + y**2 + r - l**2
+    mod = eg.Model.from_lagrangian(
+        "ring", (x_dot**2 + y_dot**2) / 2, [x, y], constraints=[row], inputs={l: 1.0}, parameters={r: 0.0}
+    ).compile(target=target)
+    state = np.array([0.6, 0.8, 0.0, 0.0])
+    for given in ({"p": [5.0]}, {"p": [5.0 + 1.0], "u": [np.sqrt(2.0), 0.0, 0.0]}, {"u": [0.0, 0.0, 0.0], "p": [4.0]}):
+        size = given["p"][0] + 1.0 - given.get("u", [1.0])[0] ** 2
+        for states in (state, np.array([state, state]).T):
+            with pytest.raises(eg.EvaluationError, match=rf"largest residual at constraint_1, {size:.3g};"):
+                mod.project(states, **given)
+            with pytest.raises(eg.EvaluationError, match=rf"largest residual at constraint_1, {size:.3g};"):
+                mod.rhs(0.0, states, **given)

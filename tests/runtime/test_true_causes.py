@@ -15,9 +15,7 @@ def four_bar() -> eg.Model:
     for name, value in (("w", 4.0), ("k", 1.0)):
         m.parameter(name, value)
     m.input("tau")
-    a, b, c = (
-        m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker")
-    )
+    a, b, c = (m.body(name, mass="sqrt(w)", inertia={"zz": "0.001*sqrt(w)"}) for name in ("crank", "coupler", "rocker"))
     m.revolute("A", m.ground, a, coordinate="theta")
     m.revolute("B", a.at(0.04, 0, 0), b, coordinate="bend")
     m.revolute("C", b.at(0.12, 0, 0), c.at(0.08, 0, 0))
@@ -69,3 +67,12 @@ def test_a_tree_without_mass_is_told_by_its_parameter() -> None:
         module = m.compile(target=target)
         with pytest.raises(eg.EomgenError, match="m_b is the mass of body 'b'|moving A meets no inertia"):
             module.bind(p={"m_b": 0.0}).rhs(0.0, [0.0, 0.0])
+
+
+def test_momenta_at_a_singularity_of_angles_name_the_angles() -> None:
+    m = eg.Model("ball", gravity=(0, 0, -9.81))
+    m.spherical("s", m.ground, m.body("b", mass=1, com=(0, 0, 1), inertia=(0.1, 0.1, 0.1)))
+    canonical = m.compile(method="hamilton", target="numpy").canonical
+    z = np.array([0.1, np.pi / 2, 0.2, 0, 0, 0])
+    with pytest.raises(eg.EvaluationError, match="the Euler angles of joint 's' are singular here"):
+        canonical.expand(z)

@@ -6,18 +6,25 @@ static double embedded_sizes(const double *restrict B, const double *restrict ma
     for (int k = 0; k < F; k++) {
         sizes[k] = 0.0;
         for (int i = 0; i < N; i++) {
-            sizes[k] += B[i * F + k] * B[i * F + k] * mass[i * N + i];
+            sizes[k] += B[i * F + k] * B[i * F + k] * fabs(mass[i * N + i]);
         }
         largest = sizes[k] > largest ? sizes[k] : largest;
     }
     if (F == 1) {
         double reach = 0.0;
         for (int i = 0; i < N; i++) {
-            reach += B[i] != 0.0 ? mass[i * N + i] : 0.0;
+            reach += B[i] != 0.0 ? fabs(mass[i * N + i]) : 0.0;
         }
         largest = fmax(largest, INERTIA_STILL / INERTIA_NOTHING * reach);
     }
     return largest;
+}
+
+/* Whether a pivot is lost in the rounding of its own entry, or is what rounding leaves of a zero; of an indefinite matrix
+   (numeric/definite.py, FAINT) it must keep half of its digits. NaN shows in the result. */
+static int pivot_lost(double d, double size, double largest)
+{
+    return INDEFINITE ? fabs(d) <= INERTIA_FAINT * size : d <= INERTIA_SINGULAR * size || d <= INERTIA_NOTHING * largest;
 }
 
 /* M_e = L D L^T in place, lower triangle of the F x F matrix; status 2 where a pivot is lost in rounding, of its own entry
@@ -29,9 +36,11 @@ static int ldl_factor(const double *restrict B, const double *restrict mass, dou
     for (int j = 0; j < F; j++) {
         double d = a[j * F + j];
         for (int k = 0; k < j; k++) {
-            d -= a[j * F + k] * a[j * F + k] * a[k * F + k];
+            const double term = a[j * F + k] * a[j * F + k] * a[k * F + k];
+            d -= term;
+            sizes[j] += INDEFINITE ? fabs(term) : 0.0;
         }
-        if (d <= INERTIA_SINGULAR * sizes[j] || d <= INERTIA_NOTHING * largest) { /* NaN shows in the result */
+        if (pivot_lost(d, sizes[j], largest)) {
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         a[j * F + j] = d;

@@ -5,18 +5,20 @@ static int tree_factor(double *restrict H, const double *restrict s)
 {
     double largest = 0.0, own[N];
     for (int k = 0; k < N; k++) {
-        own[k] = H[k * (k + 1) / 2 + k];
+        own[k] = fabs(H[k * (k + 1) / 2 + k]);
         const double entry = own[k] * s[k] * s[k];
         largest = entry > largest ? entry : largest;
     }
     for (int k = N - 1; k >= 0; k--) {
         double *const row = H + k * (k + 1) / 2;
-        if (row[k] <= INERTIA_SINGULAR * own[k] || row[k] * s[k] * s[k] <= INERTIA_NOTHING * largest) { /* NaN shows in the result */
+        const int lost = row[k] <= INERTIA_SINGULAR * own[k] || row[k] * s[k] * s[k] <= INERTIA_NOTHING * largest;
+        if (INDEFINITE ? fabs(row[k]) <= INERTIA_FAINT * own[k] : lost) { /* NaN shows in the result */
             return EOMGEN_SINGULAR_MASS_MATRIX;
         }
         for (int i = PARENT[k]; i >= 0; i = PARENT[i]) {
             double *const above = H + i * (i + 1) / 2;
             const double ratio = row[i] / row[k];
+            own[i] += INDEFINITE ? fabs(ratio * row[i]) : 0.0;
             for (int j = i; j >= 0; j = PARENT[j]) {
                 above[j] -= ratio * row[j];
             }

@@ -1,0 +1,53 @@
+"""Stage kinematics: Mechanism -> its length scale, by which lengths are compared with angles."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from ..describe.mechanism import Mechanism
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.rounding import settled_vector, size_of
+from ..graph.vectors import Vec3
+from ..joints.rods import Distance, RevoluteSpherical
+from ..limits.descriptions import NO_LENGTH
+
+PAIRS = 12  #: joints of a body up to which all distances between them count, beyond it those from the first to all
+
+
+def length_scale(mechanism: Mechanism) -> Expr:
+    """Root mean square of the lengths of rods and of the distances between joints on one body.
+
+    Where there is none, of the distances from joints to centres of mass; 1 if there is none of these either.
+    Minimum-norm corrections compare lengths with angles; measured in this length, neither units nor frames of bodies
+    matter.
+    """
+    graph = mechanism.graph
+    points: dict[int, list[Vec3]] = {}
+    squares = []
+    for spec in mechanism.joints:
+        for marker in (spec.predecessor, spec.successor):
+            points.setdefault(marker.body, []).append(marker.frame.position)
+        if isinstance(spec.joint, Distance | RevoluteSpherical):
+            squares.append(spec.joint.length * spec.joint.length)
+    for places in points.values():
+        pairs = combinations(places, 2) if len(places) <= PAIRS else ((places[0], x) for x in places[1:])
+        squares += [_square(a, b) for a, b in pairs]
+    squares = [x for x in squares if not x.is_zero]
+    if not squares:
+        bodies = [k for k, places in points.items() if k >= 0 and not mechanism.bodies[k].mass.is_zero and places]
+        squares = [_square(mechanism.bodies[k].com, x) for k in bodies for x in points[k]]
+        squares = [x for x in squares if not x.is_zero]
+    if not squares:
+        return graph.one
+    total = graph.zero
+    for square in squares:
+        total = total + square
+    size = graph.apply("sqrt", total / float(len(squares)))
+    return graph.apply("select", graph.apply("lt", size, NO_LENGTH), 1.0, size)  # parameters may make all of them 0
+
+
+def _square(a: Vec3, b: Vec3) -> Expr:
+    """The square of a distance, exactly 0 where it is rounding of the places."""
+    apart = settled_vector(vec.sub(a, b), size_of(a, b))
+    return vec.dot(apart, apart)

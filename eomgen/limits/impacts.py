@@ -1,0 +1,37 @@
+"""Limits: impacts and sensitivities through events."""
+
+from __future__ import annotations
+
+#: Scaled distance from the constraints up to which coordinates of a reset count as on them
+OFF = 1e-9
+#: Gaps of a run at most this open, in lengths of the model or rad, take part in an impact: event times keep
+#: eight digits
+TOUCHING = 1e-8
+#: Part of a normal, along which nothing is free to move, that is rounding
+HELD = 1e-9
+#: Relative: rates that count as 0
+STILL = 1e-12
+#: Part of the first approach that is left if the impacts of an instant do not die away
+ENDLESS = 1e-3
+#: Rate after an impact, relative to the largest so far, at which a gap counts as closed
+RESTING = 1e-6
+#: Negative gaps of this size, in lengths of the model or rad, are an error
+BEYOND = 1e-6
+#: (s) over which the acceleration of a gap is differenced
+MOMENT = 1e-6
+#: Of the size of a gap that counts as closed: what is added to one that begins at 0 and opens
+STARTED = 1e-5
+#: Part of the span by which the rates on one side of an event are looked at
+ASIDE = 1e-7
+#: Part of the rates by which they may differ on both sides of an event and count as continuous
+SMOOTH = 1e-9
+#: Part of the span within which events are simultaneous
+SIMULTANEOUS = 1e-12
+#: Part of the rates that may be left against the constraints after an impact.
+LEFT = 1e-8
+#: Length of a normal, in the metric of the mass matrix, above which something is free to move along it.
+FREE = 1e-10
+#: Inverse mass along a normal below which an impulse moves nothing.
+PUSHES = 1e-14
+#: Part of a step to which the least of a gap is found by bisection: its value there is known to the square.
+FOUND = 1e-7

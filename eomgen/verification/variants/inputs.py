@@ -1,0 +1,78 @@
+"""Stage verification, inputs: one course over time as table, function, text of the model, and as a parameter.
+
+The course of each input is a straight line, of which a table is exact; a parameter stands for a constant input.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..finding import Finding
+from .compare import compare_module
+from .states import Original, compiled
+from .texts import number_of
+from .variant import Variant
+from .visit import copied
+
+if TYPE_CHECKING:
+    from ...describe.model import Model
+
+#: Tolerances of the runs, and what two runs with them may differ by, relative to the size of the state.
+RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
+SLOPE = 0.3
+
+
+def input_findings(check: str, model: Model, original: Original, random: Any) -> Finding:
+    """All ways to give the inputs of a model."""
+    entries = original.description.sections["inputs"]
+    if not entries:
+        return Finding.skipped(check, "the model has no inputs")
+    if any("signal" in entry.values for entry in entries):
+        return Finding.skipped(check, "the inputs have courses of their own")
+    still = _as_parameters(check, original)
+    end = duration(original)
+    start = {e.name: number_of(e.values.get("value", 0.0), {}) for e in entries}
+    slope = {name: SLOPE * (abs(value) + 1.0) for name, value in start.items()}
+    x, times = original.states[:, 0], np.linspace(0.0, end, 5)
+
+    def line(name: str) -> Any:
+        return lambda t, x: start[name] + slope[name] * t
+
+    course = {name: line(name) for name in start}
+    table = {name: (times, start[name] + slope[name] * times) for name in start}
+    runs = {
+        "function": original.module.simulate((0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),
+        "table": original.module.simulate((0.0, end), x, inputs=table, t_eval=times, rtol=RTOL, atol=ATOL),
+    }
+    made = copied(original.description)
+    for entry in made.sections["inputs"]:
+        entry.values["signal"] = f"{start[entry.name]!r} + {slope[entry.name]!r}*t"
+    runs["text"] = compiled(made).simulate((0.0, end), x, t_eval=times, rtol=RTOL, atol=ATOL)
+    worst, where = still.worst * RUNS / still.limit, still.where
+    for way in ("table", "text"):
+        size = np.abs(runs["function"].x).max(axis=1, initial=1.0)
+        same = runs[way].x.shape == runs["function"].x.shape
+        error = float((np.abs(runs[way].x - runs["function"].x).max(axis=1) / size).max()) if same else np.inf
+        if not error <= worst:
+            worst, where = (error if np.isfinite(error) else np.inf), f"as {way}, up to t = {end:.3g} s"
+    return Finding(check, worst, RUNS, where, 4)
+
+
+def _as_parameters(check: str, original: Original) -> Finding:
+    """Inputs as parameters of the same values."""
+    made = copied(original.description)
+    for entry in made.sections["inputs"]:
+        value = number_of(entry.values.get("value", 0.0), {})
+        made.add("parameters", entry.name, {"value": value})
+    made.sections["inputs"] = []
+    return compare_module(check, original, Variant(made), compiled(made))
+
+
+def duration(original: Original) -> float:
+    """A time in which the motion of the first state goes on a little: a fifth of a radian or of the size."""
+    n = original.module.n_q
+    rates = original.module.rhs(0.0, original.states[:, 0])
+    fast = max(float(np.abs(rates[:n]).max(initial=0.0)), float(np.abs(rates[n:]).max(initial=0.0)) ** 0.5, 1.0)
+    return float(0.2 / fast)

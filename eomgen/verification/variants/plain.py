@@ -1,0 +1,68 @@
+"""Stage verification, the plain form: Model or Description -> numbers, texts and mappings only, defaults written out.
+
+A round trip through the text of a model file makes it plain, whether the model came from Python, YAML or a robot's
+file.  Data that enter no equation (shapes, limits) are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...describe.description import GROUND_NAME, Description, Entry
+from ...describe.model import Model
+from ...describe.write_yaml import yaml_text
+from ...describe.yaml_file import describe_yaml
+from .visit import Visitor, visit
+
+#: Type of constraint -> the key whose marker is ground unless given.
+_ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
+_DATA = {"joints": ("limits", "dry_friction"), "bodies": ("display",)}
+
+
+def plain(model: Model | Description) -> Description:
+    """The plain form of a model.
+
+    Raises
+    ------
+    UsageError
+        It has values that no model file can hold, such as functions of Python.
+    """
+    given = model.description if isinstance(model, Model) else model
+    result = describe_yaml(yaml_text(given))
+    folders = {entry.name: entry for entry in given.sections["functions"]}
+    for entry in result.sections["functions"]:
+        entry.trusted, entry.folder = folders[entry.name].trusted, folders[entry.name].folder
+    for section, keys in _DATA.items():
+        for entry in result.sections[section]:
+            for key in keys:
+                entry.values.pop(key, None)
+    if not any(entry.name == GROUND_NAME for entry in result.sections["bodies"]) and result.sections["bodies"]:
+        result.add("bodies", GROUND_NAME, {})
+    for entry in result.sections["bodies"]:
+        _write_placements(entry)
+    for entry in result.sections["constraints"]:
+        side = _ON_GROUND.get(entry.values["type"])
+        if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
+            entry.values[side] = GROUND_NAME
+    result = visit(result, _Placed())
+    result.lines.clear()
+    return result
+
+
+def _write_placements(entry: Entry) -> None:
+    """Markers as mappings of at and rpy; solids and points with their place."""
+    markers = entry.values.get("markers", {})
+    entry.values["markers"] = {
+        name: dict(placed) if isinstance(placed, Mapping) else {"at": list(placed)} for name, placed in markers.items()
+    }
+    for solid in entry.values.get("solids", ()):
+        solid.setdefault("at", [0, 0, 0])
+
+
+class _Placed(Visitor):
+    """Writes ``at`` and ``rpy`` out wherever a placement is given."""
+
+    def placement(self, body: str, placed: Mapping[str, Any], slot: Any) -> dict[str, Any]:
+        at = list(placed.get("at", (0, 0, 0)))
+        return {"at": at} if slot.key == "points" else {"at": at, "rpy": list(placed.get("rpy", (0, 0, 0)))}

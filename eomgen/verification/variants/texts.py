@@ -1,0 +1,106 @@
+"""Stage verification, texts: expressions of a plain description, with other names, other axes or other units.
+
+Values of a plain description are numbers and texts.  Texts are changed by their tokens, never evaluated as code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ...describe.expressions import parse
+from ...describe.names import QUANTITIES
+from ...graph.core import Graph
+from ...graph.evaluate import evaluate
+
+_TOKEN = re.compile(
+    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
+    r"\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)?)\s*\)"
+    r"|(?P<name>[A-Za-z_]\w*)"
+)
+
+Rename = Callable[[str], str]
+Locate = Callable[[str, str], str]
+
+
+def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
+    """A value with every name, and every motion of a marker such as ``vx(rod.tip)``, replaced; numbers stay."""
+    if not isinstance(value, str):
+        return value
+
+    def one(found: re.Match[str]) -> str:
+        if found["number"] is not None:
+            return found[0]
+        if found["quantity"] is not None:
+            return locate(found["quantity"], found["marker"])
+        return name(found[0])
+
+    return _TOKEN.sub(one, value)
+
+
+def names_of(value: Any) -> set[str]:
+    """Names in a text, markers aside."""
+    found: set[str] = set()
+
+    def note(name: str) -> str:
+        found.add(name)
+        return name
+
+    rewritten(value, note, lambda quantity, marker: f"{quantity}({marker})")
+    return found
+
+
+def markers_of(value: Any) -> set[tuple[str, str]]:
+    """Quantity and marker of every motion in a text."""
+    found: set[tuple[str, str]] = set()
+
+    def note(quantity: str, marker: str) -> str:
+        found.add((quantity, marker))
+        return f"{quantity}({marker})"
+
+    rewritten(value, lambda name: name, note)
+    return found
+
+
+def is_zero(value: Any) -> bool:
+    """Whether a value is the number 0."""
+    return not isinstance(value, str) and float(value) == 0.0
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """A value times a number."""
+    if not isinstance(value, str):
+        return float(value) * factor
+    return value if factor == 1.0 else f"{factor!r}*({value})"
+
+
+def total(factors: Sequence[float], values: Sequence[Any]) -> Any:
+    """The sum of factor times value; a number if all values are numbers."""
+    known = sum(f * float(v) for f, v in zip(factors, values, strict=True) if not isinstance(v, str))
+    texts = [scaled(v, f) for f, v in zip(factors, values, strict=True) if isinstance(v, str) and f != 0.0]
+    if not texts:
+        return float(known)
+    return " + ".join([*(["" + repr(float(known))] if known else []), *(f"({text})" for text in texts)])
+
+
+def product(a: Any, b: Any) -> Any:
+    """The product of two values."""
+    if not isinstance(a, str):
+        return scaled(b, float(a))
+    return scaled(a, float(b)) if not isinstance(b, str) else f"({a})*({b})"
+
+
+def negative(value: Any) -> Any:
+    """A value with its sign changed."""
+    return scaled(value, -1.0) if not isinstance(value, str) else f"-({value})"
+
+
+def number_of(value: Any, parameters: Mapping[str, float]) -> float:
+    """The number of a value at given parameters; KeyError if it depends on anything else."""
+    if not isinstance(value, str):
+        return float(value)
+    graph = Graph()
+    expression = parse(value, graph, graph.symbol)
+    return float(evaluate([expression], parameters)[0])

@@ -1,0 +1,259 @@
+"""Inputs that move: closed forms of motions in which the rates of inputs count, whatever way the input is given."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
+
+import eomgen as eg
+from eomgen.pipeline import generate
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+th, th_dot, l, x, y, x_dot, y_dot = sp.symbols("th th_dot l x y x_dot y_dot")
+GRID = np.linspace(0.0, 1.0, 9)
+#: An input 1 + t over one second, as it can be given.
+WAYS: dict[str, Any] = {
+    "text": "1 + t",
+    "line": ([0.0, 1.0], [1.0, 2.0]),
+    "beyond the run": eg.Signal([-1.0, 3.0], [0.0, 4.0]),
+    "many points": (GRID, 1.0 + GRID),
+    "spline": eg.Signal(GRID, 1.0 + GRID, "cubic"),
+    "without corners": eg.Signal(GRID, 1.0 + GRID, corners=False),
+}
+
+
+class Rated:
+    """A function of time that knows its derivatives."""
+
+    def __init__(self, *functions: Any) -> None:
+        self.functions = functions
+
+    def __call__(self, t: float, state: Any) -> float:
+        return float(self.functions[0](t))
+
+    def derivative(self) -> Rated | None:
+        return Rated(*self.functions[1:]) if self.functions[1:] else None
+
+
+@pytest.fixture(scope="module", params=["cython", "numpy"])
+def winch(request: Any) -> Any:
+    """A mass on a string of length l, without gravity: l^2 th' stays."""
+    return eg.Model.from_lagrangian("winch", l**2 * th_dot**2 / 2, [th], inputs={l: 1.0}).compile(target=request.param)
+
+
+@pytest.fixture(scope="module", params=["cython", "numpy"])
+def ring(request: Any) -> Any:
+    """A mass on a circle of radius l about the origin: its angular momentum x y' - y x' stays."""
+    m = eg.Model.from_lagrangian(
+        "ring", (x_dot**2 + y_dot**2) / 2, [x, y], constraints=[x**2 + y**2 - l**2], inputs={l: 1.0}
+    )
+    return m.compile(target=request.param)
+
+
+def on_the_ring(run: Any) -> None:
+    """The closed form for l = 1 + t from START: th = th_0 + h (1 - 1/l), with h = x y' - y x' = 0.5."""
+    t, (x, y, x_dot, y_dot) = run.t, run.x
+    angle = np.arctan2(0.8, 0.6) + 0.5 * (1.0 - 1.0 / (1.0 + t))
+    assert np.abs(np.hypot(x, y) - (1.0 + t)).max() < 1e-12
+    assert np.abs((x * x_dot + y * y_dot) / np.hypot(x, y) - 1.0).max() < 1e-12
+    assert np.abs(np.unwrap(np.arctan2(y, x)) - angle).max() < 1e-8
+
+
+START = {"x": 0.6, "y": 0.8, "x_dot": 0.6 - 0.8 * 0.5, "y_dot": 0.8 + 0.6 * 0.5}  # outwards 1, along the circle 0.5
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_momentum_of_a_string_that_is_let_out(winch: Any, way: str) -> None:
+    run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": WAYS[way]}, **TIGHT)
+    assert np.abs(run["l"] ** 2 * run["th_dot"] - 1.0).max() < 1e-9
+    assert np.abs(run["l_dot"] - 1.0).max() < 1e-12  # at both ends too
+    assert abs(run["th_ddot"][-1] + 2.0 / 8.0) < 1e-8  # th'' = -2 l'/l^3
+
+
+@pytest.mark.parametrize("method", ["RK45", "Radau", "LSODA", "BDF"])
+def test_every_stepper_takes_the_rates_and_stops_at_a_bend(winch: Any, method: str) -> None:
+    held = ([0.2, 0.7], [1.0, 1.5])  # let out for half a second
+    run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": held}, method=method, rtol=1e-9, atol=1e-11)
+    assert abs(run["th_dot"][-1] - 1.0 / 1.5**2) < 1e-7
+    assert run["l_dot"][[0, -1]].tolist() == [0.0, 0.0]
+    assert {0.2, 0.7} <= set(run.t.tolist())
+    back = winch.simulate((1.0, 0.0), run.x[:, -1], inputs={"l": held}, method=method, rtol=1e-9, atol=1e-11)
+    assert abs(back["th_dot"][-1] - 1.0) < 1e-7
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_ring_that_widens_as_its_closed_form_says(ring: Any, way: str) -> None:
+    run = ring.simulate(1.0, START, inputs={"l": WAYS[way]}, dense_output=True, **TIGHT)
+    on_the_ring(run)
+    assert 0.0 < run.residuals.raw_position < 1e-8
+    assert run.residuals.position < 1e-14
+    between = run.at(np.linspace(0.0, 1.0, 33))
+    on_the_ring(between)
+    assert np.abs(between["l_ddot"]).max() < 1e-9
+
+
+def test_functions_give_their_rates_or_are_given_beside_them(ring: Any) -> None:
+    own = Rated(lambda t: 1.0 + t, lambda t: 1.0, lambda t: 0.0)
+    on_the_ring(ring.simulate(1.0, START, inputs={"l": own}, **TIGHT))
+    functions = {"l": lambda t, x: 1.0 + t, "l_dot": lambda t, x: 1.0, "l_ddot": 0.0}
+    on_the_ring(ring.simulate(1.0, START, inputs=functions, **TIGHT))
+    on_the_ring(ring.simulate(1.0, START, inputs={"l": lambda t, x: 1.0 + t, "l_dot": "1"}, **TIGHT))
+
+
+def test_a_run_begins_on_the_constraints_of_its_own_inputs(ring: Any) -> None:
+    run = ring.simulate((1.0, 2.0), {"x": 0.5, "x_dot": 0.3}, inputs={"l": "1 + t"}, **TIGHT)
+    assert (run["x"][0], run["x_dot"][0]) == (0.5, 0.3)
+    assert np.abs(np.hypot(run["x"], run["y"]) - 1.0 - run.t).max() < 1e-12
+    held = ring.simulate(1.0, {"x": 1.5, "x_dot": 0.3}, inputs={"l": 2.0}, **TIGHT)
+    assert np.abs(np.hypot(held["x"], held["y"]) - 2.0).max() < 1e-12
+    assert not held["l_dot"].any()
+
+
+def test_direct_calls_have_rates_as_inputs(ring: Any) -> None:
+    assert ring.u_names == ("l", "l_dot", "l_ddot")
+    assert ring.u.tolist() == [1.0, 0.0, 0.0]
+    given = {"l": 2.0, "l_dot": 0.5, "l_ddot": 3.0}
+    state = ring.x0(x=2.0, y=0.0, y_dot=0.0, u=given)
+    assert np.abs(state - [2.0, 0.0, 0.5, 0.0]).max() < 1e-14
+    assert np.abs(ring.rhs(0.0, state, u=[*given.values()]) - [0.5, 0.0, 3.0, 0.0]).max() < 1e-12
+    assert np.abs(ring.bind(u=given).input_jacobian(0.0, state)[2] - [0.0, 0.0, 1.0]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (lambda t, x: 1.0 + t, ["input l", "l_dot", "not known of a function", "give l_dot beside it"]),
+        (Rated(lambda t: 1.0 + t, lambda t: 1.0), ["input l", "l_ddot", "not known"]),
+        (([0.0, 0.5], [1.0, 1.5]), ["l_ddot", "its slope jumps", "linear table at t = 0.5 s", '"cubic"']),
+        (eg.Signal([0.0, 0.5], [1.0, 2.0], "zero-order"), ["l_dot", "its value jumps", "t = 0.5 s"]),
+        ("1 + 0.1*x_dot", ["l_dot", "'1 + 0.1*x_dot'", "acceleration"]),
+        ("1 + 0.1*x", ["l_ddot", "x_dot", "acceleration"]),
+        ("1 + max(0, t - 0.25)", ["L", "l_ddot", "jumps at t = 0.25 s"]),
+        ("1 + (t > 0.3)", ["l_dot", "jumps at t = 0.3 s"]),
+    ],
+)
+def test_a_rate_that_is_not_known_is_refused(ring: Any, given: Any, words: list[str]) -> None:
+    with pytest.raises(eg.UsageError) as caught:
+        ring.simulate(1.0, START, inputs={"l": given})
+    assert all(word in str(caught.value) for word in words[words[0] == "L" :])
+
+
+def test_a_rate_without_its_input_is_refused(ring: Any) -> None:
+    for given in (0.5, "t", ([0.0, 1.0], [0.0, 1.0])):
+        with pytest.raises(eg.UsageError, match="input l_dot is the rate of l, which is held; give l as well"):
+            ring.simulate(1.0, START, inputs={"l_dot": given})
+    run = ring.simulate(1.0, {"x": 0.6, "x_dot": -0.4}, inputs={"l_dot": 0.0}, **TIGHT)
+    assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
+
+
+def test_a_text_may_bend_where_one_rate_is_enough(winch: Any) -> None:
+    run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + max(0, t - 0.25)"}, **TIGHT)
+    assert abs(run["th_dot"][-1] - 1.0 / 1.75**2) < 1e-8
+    run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + 0.5*sin(th)"}, **TIGHT)
+    assert np.abs(run["l"] ** 2 * run["th_dot"] - 1.0).max() < 1e-8  # d/dt (l^2 th') = 0 along the motion
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK45", "Radau"])
+def test_ensembles_take_the_rates(winch: Any, ring: Any, method: str) -> None:
+    speeds = np.array([1.0, 2.0, 3.0, -1.0, 0.5])
+    for way in ("text", "line", "spline"):
+        options = {"method": method, "rtol": 1e-9, "atol": 1e-11}
+        many = winch.simulate_many(1.0, {"th_dot": speeds}, inputs={"l": WAYS[way]}, **options)
+        assert np.abs(many["th_dot"] - speeds / 4.0).max() < 1e-7
+        assert abs(winch.simulate(1.0, **many.case(1), **TIGHT)["th_dot"][-1] - 0.5) < 1e-9
+        runs = ring.simulate_many(1.0, START, inputs={"l": WAYS[way]}, count=3, t_eval=[0.0, 1.0], **options)
+        assert np.abs(np.hypot(runs["x"], runs["y"]) - [[1.0], [2.0]]).max() < 1e-12
+    held = winch.simulate_many(1.0, {"th_dot": 1.0}, inputs={"l": [1.0, 2.0]}, method=method)
+    assert held["th_dot"].tolist() == [1.0, 1.0]
+
+
+def test_the_differential_algebraic_form_takes_the_rates(ring: Any) -> None:
+    run = ring.dae.solve(1.0, START, inputs={"l": "1 + t"}, rtol=1e-10, atol=1e-12)
+    on_the_ring(run)
+
+
+def test_rows_of_velocities_take_one_rate() -> None:
+    """y' = u x' without forces: x' sqrt(1 + u^2) stays (a blade that turns)."""
+    u = sp.Symbol("u")
+    m = eg.Model.from_lagrangian(
+        "blade", (x_dot**2 + y_dot**2) / 2, [x, y], constraints=[y_dot - u * x_dot], inputs={u: 0.0}
+    )
+    mod = m.compile(target="numpy")
+    assert mod.u_names == ("u", "u_dot")
+    for given in ("2*t", ([0.0, 1.0], [0.0, 2.0]), ([0.0, 0.5], [0.0, 2.0])):
+        run = mod.simulate(1.0, {"x_dot": 1.0}, inputs={"u": given}, **TIGHT)
+        assert np.abs(run["x_dot"] * np.sqrt(1.0 + run["u"] ** 2) - 1.0).max() < 1e-9
+        assert run.residuals.velocity < 1e-14
+    with pytest.raises(eg.AssemblyError, match="the inputs u change with the state"):
+        mod.simulate(1.0, {"x_dot": 1.0}, inputs={"u": lambda t, s: 0.5 if s[3] > s[2] else 1.5, "u_dot": 0.0})
+
+
+def test_sympy_functions_of_time_are_inputs_with_both_rates() -> None:
+    X, Y, f = dynamicsymbols("x y f")
+    t = dynamicsymbols._t
+    method = LagrangesMethod((X.diff(t) ** 2 + Y.diff(t) ** 2) / 2, [X, Y], hol_coneqs=[X**2 + Y**2 - f**2])
+    method.form_lagranges_equations()
+    mod = eg.from_sympy(method, "hoop", inputs={f: 1.0}, initial={X: 0.6, Y: 0.8}).compile(target="numpy")
+    assert mod.u_names == ("f", "f_dot", "f_ddot")
+    on_the_ring(mod.simulate(1.0, START, inputs={"f": "1 + t"}, **TIGHT))
+
+
+def test_a_symbol_or_derivative_of_an_input_in_a_lagrangian_is_its_rate() -> None:
+    angle, f = dynamicsymbols("th f")
+    t, own = dynamicsymbols._t, sp.Symbol("l_dot")
+    length = 1 + sp.Symbol("t") ** 2
+    energies = [
+        (f**2 * angle.diff(t) ** 2 + f.diff(t) ** 2 * sp.cos(angle)) / 2,
+        (l**2 * th_dot**2 + own**2 * sp.cos(th)) / 2,
+        (length**2 * th_dot**2 + sp.diff(length, sp.Symbol("t")) ** 2 * sp.cos(th)) / 2,
+    ]
+    given: list[tuple[Any, dict[Any, float]]] = [(angle, {f: 1.0}), (th, {l: 1.0}), (th, {})]
+    ends = []
+    for energy, (q, inputs) in zip(energies, given, strict=True):
+        mod = eg.Model.from_lagrangian("swing", energy, [q], inputs=inputs).compile(target="numpy")
+        values = dict.fromkeys(mod.u_names[:1], "1 + t**2")
+        ends.append(mod.simulate(1.0, {"th": 0.3, "th_dot": 1.0}, inputs=values, **TIGHT).x[:, -1])
+    assert np.abs(np.array(ends) - ends[2]).max() < 1e-12
+
+
+def test_a_driver_by_an_input_throws_a_bead_outwards() -> None:
+    """r'' = u'^2 r on an arm at the angle u: r = cosh(w t) for u = w t; the torque on the arm is d/dt (r^2 u')."""
+    m = eg.Model("arm")
+    arm, bead = m.body("arm", mass=0.0), m.body("bead", mass=1.0)
+    m.input("u")
+    m.revolute("A", m.ground, arm, coordinate="phi")
+    m.prismatic("S", arm, bead, axis="x", coordinate="r")
+    m.driver("lead", coordinate="phi", value="u")
+    m.initial(r=1.0)
+    mod = m.compile(target="numpy")
+    for given in ("2*t", ([0.0, 1.0], [0.0, 2.0])):
+        run = mod.simulate(1.0, {"r": 1.0, "r_dot": 0.0}, inputs={"u": given}, **TIGHT)
+        assert np.abs(run["r"] - np.cosh(2.0 * run.t)).max() < 1e-7
+        assert np.abs(run["phi"] - 2.0 * run.t).max() < 1e-13
+    turned = mod.simulate(1.0, {"r": 1.0, "r_dot": 0.0}, inputs={"u": "t**2"}, **TIGHT)
+    assert np.abs(turned["phi_ddot"] - 2.0).max() < 1e-12
+
+
+def test_inputs_that_move_everything_are_integrated() -> None:
+    m = eg.Model.from_lagrangian("led", x_dot**2 / 2, [x], constraints=[x - l], inputs={l: 0.0})
+    mod = m.compile(target="numpy")
+    run = mod.simulate(1.0, inputs={"l": "t**3"}, **TIGHT)
+    assert np.abs(run["x"] - run.t**3).max() < 1e-12
+    assert np.abs(run["x_ddot"] - 6.0 * run.t).max() < 1e-9
+    with pytest.raises(eg.UsageError, match="leave method= out"):
+        mod.simulate(1.0, inputs={"l": "t**3"}, method="kinematic")
+
+
+def test_an_exported_package_takes_the_rates_of_tables(tmp_path: Path) -> None:
+    m = eg.Model.from_lagrangian("reel", l**2 * th_dot**2 / 2, [th], inputs={l: 1.0})
+    generate(m, tmp_path, target="numpy")
+    code = "import reel; print(reel.simulate(1.0, {'th_dot': 1.0}, inputs={'l': ([0, 1], [1, 2])})['th_dot'][-1])"
+    found = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert abs(float(found.stdout) - 0.25) < 1e-8
