@@ -32,7 +32,7 @@ def test_a_torsion_spring_and_a_stop(method: str) -> None:
     m = eg.Model("turn", gravity=(0, 0, 0))
     wheel = m.body("wheel", mass=1.0, inertia={"zz": inertia})
     m.revolute("J", m.ground, wheel, coordinate="a")
-    m.spring("S", joint="J", stiffness=c, length=rest)
+    m.torsional_spring("S", "J", stiffness=c, angle=rest)
     m.stop("end", joint="J", upper=limit, stiffness=K, exponent=n, dissipation=0.0)
     mod = m.compile(method=method, target="numpy")
     for a in (0.5, 1.1):
@@ -40,3 +40,17 @@ def test_a_torsion_spring_and_a_stop(method: str) -> None:
         V = c * (a - rest) ** 2 / 2 + K * d ** (n + 1) / (n + 1)
         assert mod.energy(np.array([a, 0.4]))[1] == pytest.approx(V, rel=1e-13)
         assert mod.rhs(0.0, np.array([a, 0.4]))[1] == pytest.approx(-(c * (a - rest) + K * d**n) / inertia, rel=1e-12)
+
+
+@pytest.mark.parametrize("side", ["lower", "upper"])
+@pytest.mark.parametrize("rate", [-0.8, 0.5])
+def test_a_lower_stop_brakes(side: str, rate: float) -> None:
+    """Hunt and Crossley: K d^n (1 + f d') of the penetration d and its rate, at either end."""
+    K, n, f, inertia = 400.0, 1.5, 0.6, 0.3
+    m = eg.Model("ends", gravity=(0, 0, 0))
+    m.revolute("J", m.ground, m.body("wheel", mass=1.0, inertia={"zz": inertia}), coordinate="a")
+    m.stop("end", joint="J", **{side: 0.0}, stiffness=K, exponent=n, dissipation=f)
+    mod = m.compile(target="numpy")
+    inward, d = (-1.0 if side == "lower" else 1.0), 0.2
+    push = K * d**n * (1.0 + f * inward * rate)
+    assert mod.rhs(0.0, np.array([inward * d, rate]))[1] == pytest.approx(-inward * push / inertia, rel=1e-12)

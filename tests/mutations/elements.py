@@ -105,42 +105,42 @@ FAULTS = (
     Fault(
         "body-force-axes", "eomgen/forces/elements.py",
         'vec.times(view.rotation(marker), value) if axes == "body"', 'vec.transpose_times(view.rotation(marker), value) if axes == "body"',
-        "a force in body axes is turned by the transposed rotation", ("tests/forces/test_loads.py",),
+        "a force in body axes is turned by the transposed rotation", ("tests/forces/test_axes_of_forces.py",),
     ),
     Fault(
         "bushing-drift", "eomgen/forces/bushing.py",
         "drift = vec.cross(w1, vec.sub(", "drift = vec.cross(vec.scale(view.graph.lift(0.0), w1), vec.sub(",
-        "damping of a bushing sees the turning of its first body as motion", ("tests/forces/test_motions.py", "tests/forces/test_loads.py"),
+        "damping of a bushing sees the turning of its first body as motion", ("tests/forces/test_loads.py::test_a_bushing",),
     ),
     Fault(
         "bushing-torque", "eomgen/forces/bushing.py",
         "vec.add(vec.scale(e0, moments), vec.cross(e, moments))", "vec.add(vec.scale(e0, moments), vec.cross(moments, e))",
-        "torque of a bushing at a large turn: the term e x m has the wrong sign", ("tests/forces/test_motions.py", "tests/forces/test_loads.py"),
+        "torque of a bushing at a large turn: the term e x m has the wrong sign", ("tests/forces/test_loads.py::test_a_bushing",),
     ),
     Fault(
         "contact-rate", "eomgen/forces/contact.py",
         "vec.sub(relative, vec.scale(parting, normal)), -parting", "vec.sub(relative, vec.scale(parting, normal)), parting",
-        "damping of a contact has the wrong sign", ("tests/forces/test_motions.py", "tests/forces/test_loads.py"),
+        "damping of a contact has the wrong sign", ("tests/forces/test_loads.py::test_contact_of_two_bodies",),
     ),
     Fault(
         "contact-arm", "eomgen/forces/contact.py",
         "MarkerLoad(self.first, vec.neg(force), vec.cross(force, first)),", "MarkerLoad(self.first, vec.neg(force), vec.cross(first, force)),",
-        "friction at a contact turns the first body the wrong way", ("tests/forces/test_loads.py", "tests/forces/test_motions.py"),
+        "friction at a contact turns the first body the wrong way", ("tests/forces/test_loads.py::test_contact_of_two_bodies",),
     ),
     Fault(
         "friction-stribeck", "eomgen/forces/friction.py",
         "self.dynamic + (self.static - self.dynamic) * fall", "self.static + (self.dynamic - self.static) * fall",
-        "static and dynamic friction are exchanged", ("tests/forces/test_loads.py", "tests/forces/test_motions.py"),
+        "static and dynamic friction are exchanged", ("tests/forces/test_loads.py::test_contact_of_two_bodies",),
     ),
     Fault(
         "muscle-tilt", "eomgen/forces/muscle.py",
         "+ self.damping * v) * tilt", "+ self.damping * v)",
-        "the pennation of a muscle does not lessen its pull", ("tests/forces/test_paths.py", "tests/forces/test_loads.py"),
+        "the pennation of a muscle does not lessen its pull", ("tests/forces/test_loads.py::test_a_muscle",),
     ),
     Fault(
         "stop-rate", "eomgen/forces/stops.py",
         "found.append((self.lower - value, -rate, 1.0))", "found.append((self.lower - value, rate, 1.0))",
-        "the lower stop's damping has the wrong sign", ("tests/forces/test_motions.py", "tests/forces/test_loads.py"),
+        "the lower stop's damping has the wrong sign", ("tests/forces/test_energies_of_springs.py::test_a_lower_stop_brakes",),
     ),
     Fault(
         "stop-energy", "eomgen/forces/normal_laws.py",
@@ -150,7 +150,7 @@ FAULTS = (
     Fault(
         "gravity-gradient", "eomgen/forces/attraction.py",
         "trace - 5.0 * along, u", "trace - 3.0 * along, u",
-        "force of a gravity gradient: 5 becomes 3", ("tests/forces/test_loads.py", "tests/forces/test_motions.py"),
+        "force of a gravity gradient: 5 becomes 3", ("tests/forces/test_loads.py::test_gravity_of_a_point_of_one_body_on_another",),
     ),
     Fault(
         "wrapped-path", "eomgen/forces/routes.py",

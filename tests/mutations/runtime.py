@@ -57,7 +57,7 @@ FAULTS = (
     ),
     Fault(
         "gap-rate-of-inputs", "eomgen/runtime/signal_rates.py",
-        "rates[layout.u.index(chain[k])] = u[layout.u.index(chain[k + 1])]", "rates[layout.u.index(chain[k])] = 0.0",
+        "rates[layout.u.index(base)] = u[layout.u.index(rate)]", "rates[layout.u.index(base)] = 0.0",
         "impacts: the rate of a gap that an input moves is dropped", (EVENTS, "tests/analysis/test_impact_runs.py"),
     ),
     Fault(
@@ -116,8 +116,8 @@ FAULTS = (
         "equilibria ignore what nonholonomic rows move", ("tests/analysis/test_rest_and_velocity_rows.py",),
     ),
     Fault(
-        "equilibrium-tolerance", "eomgen/analysis/newton.py",
-        "SMALL = 1e-12 ", "SMALL = 1e-3 ",
+        "equilibrium-tolerance", "eomgen/limits/statics.py",
+        "ARRIVED = 1e-12", "ARRIVED = 1e-3",
         "equilibria are found to three digits only", ("tests/analysis/test_equilibrium.py",),
     ),
     Fault(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eomgen.errors import PartitionError, ProjectionError
-from eomgen.numeric import Scales, correct_position, partition, rank
+from eomgen.numeric import Scales, correct_position, independent_rows, partition, rank, redundant_rows
 
 PLAIN = Scales(np.ones(2), np.ones(2))
 
@@ -56,3 +56,10 @@ def test_weak_rows_of_a_closed_state_are_held(weak: float) -> None:
     assert split.independent.tolist() == [2]
     with pytest.raises(PartitionError, match="rank 1 here"):
         partition(np.array([[1.0, 0.0, 0.0], [0.0, 3e-11, 0.0]]), 2, [2])
+
+
+def test_rows_that_repeat_earlier_ones_are_redundant() -> None:
+    a, b = np.array([1.0, 0.0, 2.0]), np.array([0.3, 0.2, 0.6])
+    J = np.array([a, 3.0 * a, b, a - 2.0 * b])
+    assert independent_rows(J, 2).tolist() == [0, 2]
+    assert redundant_rows(J, 2, ["first", "again", "second", "both"]) == ["again", "both"]
