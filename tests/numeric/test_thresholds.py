@@ -7,6 +7,7 @@ import pytest
 
 from eomgen.errors import PartitionError, ProjectionError
 from eomgen.numeric import Scales, correct_position, independent_rows, partition, rank, redundant_rows
+from eomgen.numeric.definite import safely_positive
 
 PLAIN = Scales(np.ones(2), np.ones(2))
 
@@ -63,3 +64,9 @@ def test_rows_that_repeat_earlier_ones_are_redundant() -> None:
     J = np.array([a, 3.0 * a, b, a - 2.0 * b])
     assert independent_rows(J, 2).tolist() == [0, 2]
     assert redundant_rows(J, 2, ["first", "again", "second", "both"]) == ["again", "both"]
+
+
+@pytest.mark.parametrize(("left", "sound"), [(1e-11, True), (1e-12, True), (1e-14, False), (-1e-12, False)])
+def test_inertia_that_is_left_of_a_large_one(left: float, sound: bool) -> None:
+    """A pivot is a difference of terms as large as its diagonal entry, known to some hundred roundings of that."""
+    assert safely_positive(np.array([3.0, left]), np.array([3.0, 1.0])) == sound
