@@ -57,9 +57,9 @@ def links(n: int, name: str) -> eg.Model:
     return m
 
 
-def five_bar() -> eg.Model:
+def five_bar(name: str = "fivebar") -> eg.Model:
     """Five links in a plane: two freedoms, of which neither is alone in M."""
-    m = eg.Model("fivebar", gravity=(0.0, -9.81, 0.0))
+    m = eg.Model(name, gravity=(0.0, -9.81, 0.0))
     l, torque = m.parameter("l", 0.5), m.input("torque", 0.3)
     bodies = [m.body(f"b{k}", mass=1.0 + 0.3 * k, com=(0.25, 0.01 * k, 0), inertia={"zz": 0.02}) for k in range(4)]
     m.revolute("A", m.ground, bodies[0])
@@ -80,6 +80,7 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
         "forces": (lambda: rods("reacting"), "newton_euler"),
         "twice": (lambda: rods("doubled", twice=True), "embedding"),
         "freedoms": (five_bar, "embedding"),
+        "straight": (lambda: five_bar("straightbar"), "embedding"),
         "tree": (lambda: links(4, "shortchain"), "embedding"),
         "columns": (lambda: links(5, "longchain"), "recursive"),
     }
@@ -92,7 +93,8 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
             kernels = KERNELS if name not in ("forces", "twice") else ["rhs", "project"]
             kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
             metadata = collect_metadata(kinematics, mobility, tree) | {"target": "c"}
-            limits = Limits(unrolled=0, unrolled_loops=0)  # the drivers are what is tried
+            straight = name == "straight"
+            limits = Limits() if straight else Limits(unrolled=0, unrolled_loops=0)  # the drivers are what is tried
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr("eomgen.program.collect.Limits", lambda: Limits(unrolled=4))  # as if long
                 terms = collect_terms(kinematics, mobility, tree)
@@ -128,7 +130,7 @@ def central(values: Callable[[float], np.ndarray], h: float) -> np.ndarray:
     return (8.0 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12.0 * h)
 
 
-@pytest.mark.parametrize("name", ["balls", "forces", "freedoms", "tree", "columns"])
+@pytest.mark.parametrize("name", ["balls", "forces", "freedoms", "straight", "tree", "columns"])
 def test_accelerations_are_those_of_a_solve_with_multipliers(make: Callable[[str], Case], name: str) -> None:
     case = make(name)
     module, x = case.module, case.x
@@ -143,6 +145,16 @@ def test_accelerations_are_those_of_a_solve_with_multipliers(make: Callable[[str
         K = np.block([[M, C_q.T], [C_q, np.zeros((len(C_q), len(C_q)))]])
         a = np.linalg.lstsq(K, -np.concatenate([h, gamma]), rcond=1e-12)[0][:n]
     np.testing.assert_allclose(x_dot[module.n_q :], a, rtol=1e-8, atol=1e-8 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("name", ["balls", "forces", "freedoms", "straight"])
+def test_rates_are_those_of_the_nearest_state_on_the_constraints(make: Callable[[str], Case], name: str) -> None:
+    library, module, x = make(name)
+    off = x + 0.02 * np.sin(np.arange(len(x)))
+    near = library.fine("project", off)
+    expected, found = library.fine("rhs", near), library.fine("rhs", off)
+    assert np.abs(module.velocity_constraints(near)).max() <= 1e-12
+    np.testing.assert_allclose(found[module.n_q :], expected[module.n_q :], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["balls", "freedoms", "tree", "columns"])

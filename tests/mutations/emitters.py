@@ -6,7 +6,10 @@ from mutations.fault import Fault
 
 LOOPS, STRAIGHT = "tests/emit/test_c_loops.py", "tests/emit/test_c_straight.py"
 SERIES, PROGRAM_LOOPS = "eomgen/emit/c_series.py", "eomgen/program/loops.py"
-RECURRENCE = "tests/runtime/test_taylor.py::test_every_recurrence"
+RECURRENCE = "tests/emit/test_c_series.py"
+MODELS = "tests/emit/test_c_models.py"
+STRAIGHT_SOLVE = f"{MODELS}::test_accelerations_are_those_of_a_solve_with_multipliers[straight]"
+NEAREST = f"{MODELS}::test_rates_are_those_of_the_nearest_state_on_the_constraints[straight]"
 SOLVE = f"{LOOPS}::test_rhs_equals_a_multiplier_solve_on_the_projected_state[plain]"
 
 FAULTS = (
@@ -38,12 +41,12 @@ FAULTS = (
     Fault(
         "straight-velocities", PROGRAM_LOOPS,
         "here = substitute([*terms.bias, *terms.gamma], dict(zip(v, moved, strict=True)))", "here = [*terms.bias, *terms.gamma]",
-        "straight-line loops: forces of the velocities before their projection", (SOLVE,),
+        "straight-line loops: forces of the velocities before their projection", (NEAREST,),
     ),
     Fault(
         "straight-determinant", PROGRAM_LOOPS,
         "x[l] = (p * b[1] - r * b[0]) * inverse", "x[l] = (p * b[1] + r * b[0]) * inverse",
-        "straight-line loops: Cramer's rule with a wrong sign", (SOLVE,),
+        "straight-line loops: Cramer's rule with a wrong sign", (STRAIGHT_SOLVE,),
     ),
     Fault(
         "straight-sound", PROGRAM_LOOPS,

@@ -67,7 +67,8 @@ def run(faults: Sequence[Fault], jobs: int) -> list[tuple[Fault, Outcome]]:
                 own.copy = spare.pop()
             outcome = own.copy.run_with(fault, fault.caught_by)
             caught = outcome.code == FAILED
-            print(f"{fault.id:32} {outcome.by if caught else 'SURVIVES':80} {outcome.seconds:5.1f}", flush=True)
+            sys.stdout.write(f"{fault.id:32} {outcome.by if caught else 'SURVIVES':80} {outcome.seconds:5.1f}\n")
+            sys.stdout.flush()
             if outcome.code not in (0, FAILED):
                 print(outcome.text[-3000:], flush=True)
             return fault, outcome

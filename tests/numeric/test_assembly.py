@@ -216,3 +216,9 @@ def test_rates_of_functions_that_change_by_themselves():
         np.zeros((0, 2)), np.zeros(0), Scales(np.ones(2), np.zeros(0)), guess=np.array([0.0, 0.7]), equations=wanted
     )
     np.testing.assert_allclose(found.v, [1.0, 0.7], atol=1e-14)
+
+
+def test_angles_to_be_reached_count_modulo_full_turns():
+    wanted = Equations(lambda q: (q, np.eye(2)), np.array([0.1, 0.1]), np.ones(2), [True, False], ["turn", "way"])
+    assert wanted.difference(np.array([0.3 + 4 * np.pi, 6.4])) == pytest.approx([0.2, 6.3])
+    assert wanted.difference(np.array([-3.2, -3.2])) == pytest.approx([2 * np.pi - 3.3, -3.3])
