@@ -17,7 +17,7 @@ from eomgen.emit import emit_c
 from eomgen.program import Limits, build_program
 from eomgen.program.collect import collect_metadata, collect_terms
 
-KERNELS = ["rhs", "jacobian", "project", "input_jacobian", "parameter_jacobian"]
+KERNELS = ["rhs", "jacobian", "project", "input_jacobian", "parameter_jacobian", "embedded_mass_matrix"]
 
 
 class Case(NamedTuple):
@@ -72,6 +72,33 @@ def five_bar(name: str = "fivebar") -> eg.Model:
     return m
 
 
+def carriage() -> eg.Model:
+    """A four-bar linkage on a sledge: a length and an angle are independent, and coupled."""
+    m = eg.Model("carriage", gravity=(0.0, -9.81, 0.0))
+    l, torque = m.parameter("l", 1.7), m.input("torque", 0.3)
+    sledge, *bars = (m.body(f"b{k}", mass=1.0 + 0.3 * k, com=(0.4, 0.1, 0), inertia={"zz": 0.2}) for k in range(4))
+    m.prismatic("S", m.ground, sledge, axis="x")
+    m.revolute("A", sledge, bars[0])
+    m.revolute("B", bars[0].at(0.8, 0, 0), bars[1])
+    m.revolute("C", bars[1].at(2.0, 0, 0), bars[2].at(1.5, 0, 0))
+    m.revolute("D", sledge.at(l, 0, 0), bars[2])
+    m.torque("drive", "A", torque)
+    m.guess = {"A": 1.0}
+    return m
+
+
+def toggle() -> eg.Model:
+    """A slider-crank of which the slider alone has inertia: at the dead centre nothing does."""
+    m = eg.Model("toggle", gravity=(0.0, -9.81, 0.0))
+    crank, rod, slider = (m.body(name, mass=mass) for name, mass in (("crank", 0.0), ("rod", 0.0), ("slider", 1.3)))
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(0.1, 0, 0), rod, coordinate="phi")
+    m.prismatic("D", m.ground, slider, axis="x", coordinate="s")
+    m.revolute("C", rod.at(0.35, 0, 0), slider)
+    m.guess = {"theta": 0.7}
+    return m
+
+
 @pytest.fixture(scope="module")
 def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Case]:
     """``make(name)``; each model is compiled once."""
@@ -80,6 +107,8 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
         "forces": (lambda: rods("reacting"), "newton_euler"),
         "twice": (lambda: rods("doubled", twice=True), "embedding"),
         "freedoms": (five_bar, "embedding"),
+        "lengths": (carriage, "embedding"),
+        "toggle": (toggle, "embedding"),
         "straight": (lambda: five_bar("straightbar"), "embedding"),
         "tree": (lambda: links(4, "shortchain"), "embedding"),
         "columns": (lambda: links(5, "longchain"), "recursive"),
@@ -90,11 +119,13 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
         if name not in known:
             model, method = models[name]
             equations = model().derive(method)
-            kernels = KERNELS if name not in ("forces", "twice") else ["rhs", "project"]
+            kernels = KERNELS if name not in ("forces", "twice", "toggle") else ["rhs", "project"]
             kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
             metadata = collect_metadata(kinematics, mobility, tree) | {"target": "c"}
             straight = name == "straight"
-            limits = Limits() if straight else Limits(unrolled=0, unrolled_loops=0)  # the drivers are what is tried
+            nodes = 0 if name == "columns" else Limits().jacobian_nodes
+            limits = Limits(unrolled=0, unrolled_loops=0, jacobian_nodes=nodes)  # the drivers are what is tried
+            limits = Limits() if straight else limits
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr("eomgen.program.collect.Limits", lambda: Limits(unrolled=4))  # as if long
                 terms = collect_terms(kinematics, mobility, tree)
@@ -214,3 +245,26 @@ def test_a_gap_that_is_left_is_reported(make: Callable[[str], Case]) -> None:
         if status == 0:
             residuals = module.bind(p=p).constraints(closed[: module.n_q], rows="all")
             assert np.abs(residuals).max() == pytest.approx(gap / 2, abs=1e-14)
+
+
+@pytest.mark.parametrize("name", ["freedoms", "lengths"])
+def test_the_embedded_mass_matrix_is_that_of_the_motions_left(make: Callable[[str], Case], name: str) -> None:
+    """B^T M B, where column k of B moves independent coordinate k alone and keeps the loops closed."""
+    library, module, x = make(name)
+    q = x[: module.n_q]
+    chosen = list(library.metadata["independent"])
+    rows = np.vstack([module.constraint_jacobian(q), np.eye(module.n_v)[chosen]])
+    right = np.vstack([np.zeros((len(rows) - len(chosen), len(chosen))), np.eye(len(chosen))])
+    B = np.linalg.lstsq(rows, right, rcond=1e-12)[0]
+    expected = B.T @ module.mass_matrix(q) @ B
+    assert abs(expected[0, 1]) > 0.01 * abs(expected).max()
+    found = library.fine("embedded_mass_matrix", q).reshape(expected.shape)
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_a_dead_centre_without_inertia_is_reported(make: Callable[[str], Case]) -> None:
+    """s' = -0.13 sin(theta) theta': the inertia of the only freedom is 1.3 s'^2, and at theta = 0 rounding."""
+    library, module, _ = make("toggle")
+    for theta, status in ((0.7, 0), (1e-6, 0), (0.0, 2)):
+        x = module.x0({"theta": theta})
+        assert library("rhs", x)[0] == status, theta

@@ -85,7 +85,7 @@ static void travel(const eomgen_method *method, eomgen_series known, const doubl
     eomgen_start(method, &run);
     for (int k = 0; k < STEPS && run.t < run.t_bound && eomgen_step(method, &run) == 0; k++) {
         printf("%.17g %.17g %.17g %.17g %.17g", run.t, run.y[0], run.y[1], run.y[2], run.h_abs);
-        for (int j = 1; j < 4; j++) {
+        for (int j = 1; j < 5; j++) {
             eomgen_between(method, &run, run.t_old + 0.25 * j * run.step, x);
             printf(" %.17g %.17g %.17g", x[0], x[1], x[2]);
         }
@@ -119,7 +119,7 @@ def jacobian(t: float, x: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[np.ndarray]:
-    """Of each method: rows of time, state, size of the next step, and the state at three times in the step."""
+    """Of each method: rows of time, state, size of the next step, and the state at four times in the step."""
     folder = tmp_path_factory.mktemp("steps")
     texts = {**read_layer(), "program.c": PROGRAM}
     texts |= {name: read_template(f"c/{name}") for name in ("eomgen.h", "eomgen_real.h")}
@@ -147,7 +147,7 @@ def test_steps_are_those_of_scipy(runs: list[np.ndarray], place: int, method: ty
     assert len(runs[place]) == STEPS
     for row in runs[place]:
         solver.step()
-        inside = solver.t_old + 0.25 * np.arange(1, 4) * (solver.t - solver.t_old)
+        inside = solver.t_old + 0.25 * np.arange(1, 5) * (solver.t - solver.t_old)
         np.testing.assert_allclose(row[4], solver.h_abs, rtol=1e-6)  # from an estimate in which digits cancel
         expected = [solver.t, *solver.y, *solver.dense_output()(inside).T.ravel()]
         np.testing.assert_allclose(np.delete(row, 4), expected, rtol=1e-9, atol=1e-9)
@@ -159,10 +159,11 @@ def test_taylors_method_keeps_its_tolerance(runs: list[np.ndarray]) -> None:
     assert rows[-1, 0] == 1.5
     assert len(rows) <= STEPS
     for row in rows:
-        times = np.array([row[0], *(before + 0.25 * np.arange(1, 4) * (row[0] - before))])
-        states = np.vstack([row[1:4], row[5:].reshape(3, 3)])
+        times = np.array([row[0], *(before + 0.25 * np.arange(1, 5) * (row[0] - before))])
+        states = np.vstack([row[1:4], row[5:].reshape(4, 3)])
         expected = np.column_stack([1.0 / (2.0 - times), np.exp(-times), times - 0.3])
         np.testing.assert_allclose(states, expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(row[14:], row[1:4], rtol=1e-14)  # the polynomial ends where the step does
         before = row[0]
 
 

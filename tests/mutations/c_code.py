@@ -67,7 +67,7 @@ FAULTS = (
     Fault(
         "c-embedded-mass-unit", f"{DRIVERS}/mass.c",
         "s[parts.independent[i]] * s[parts.independent[k]];", "s[parts.independent[i]] * s[parts.independent[i]];",
-        "the embedded mass matrix is scaled back by the wrong unit", (LOOPS, "tests/acceptance/test_any_units.py"),
+        "the embedded mass matrix is scaled back by the wrong unit", (f"{MODELS}::test_the_embedded_mass_matrix_is_that_of_the_motions_left[lengths]",),
     ),
     Fault(
         "c-strict-partition", f"{DRIVERS}/partition.c",
@@ -82,7 +82,7 @@ FAULTS = (
     Fault(
         "c-ldl-singular", f"{DRIVERS}/ldl.c",
         "largest = fmax(largest, INERTIA_STILL / INERTIA_NOTHING * reach);", "(void)reach;",
-        "a freedom that moves no inertia passes", (f"{LOOPS}::test_no_inertia_behind_the_only_motion_is_reported",),
+        "a freedom that moves no inertia passes", (f"{MODELS}::test_a_dead_centre_without_inertia_is_reported",),
     ),
     Fault(
         "c-tree-factor", f"{DRIVERS}/tree.c",
@@ -221,8 +221,8 @@ FAULTS = (
     ),
     Fault(
         "first-step", f"{STEPPERS}/control.c",
-        "0.01 * d0 / d1", "0.1 * d0 / d1",
-        "the first step is ten times as long", (STEPS,),
+        "pow(0.01 / d, 1.0 / (method->error_order + 1))", "pow(0.01 / d, 1.0 / method->error_order)",
+        "the first step is chosen for the wrong order", (STEPS,),
     ),
     Fault(
         "rejected-growth", f"{STEPPERS}/control.c",
@@ -295,18 +295,8 @@ FAULTS = (
         "tables are read in all lanes at the time of the first", (LANES,),
     ),
     Fault(
-        "lanes-first-steps", "templates/c/ensembles/lane_steps.c",
-        "run->f[i] = choose(begins, f1[i], run->f[i]);", "run->f[i] = f1[i];",
-        "a lane that begins gives the others its rates", (LANES,),
-    ),
-    Fault(
-        "lanes-taylor-carry", "templates/c/ensembles/lane_taylor.c",
-        "run->K[i] = choose(moved, run->after[i], run->K[i]);", "run->K[i] = run->after[i];",
-        "lanes that try a step again take the coefficients of others' next one", (LANES,),
-    ),
-    Fault(
-        "lanes-taylor-reach", "templates/c/ensembles/lane_taylor.c",
-        "choose(first < second, first, second) - TAYLOR_SAFETY", "choose(first < second, second, first) - TAYLOR_SAFETY",
-        "steps of Taylor's method in lanes follow the weaker of the last two terms", (LANES,),
+        "lanes-taylor-sums", "templates/c/ensembles/lane_taylor.c",
+        "taylor_sum(run, run->K, h, run->y, run->f);", "taylor_sum(run, run->after, h, run->y, run->f);",
+        "steps of Taylor's method in lanes sum the coefficients of the step before", (LANES,),
     ),
 )  # fmt: skip

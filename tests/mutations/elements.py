@@ -160,12 +160,12 @@ FAULTS = (
     Fault(
         "rotation-vector-series", "eomgen/rotations/rates.py",
         "(1 - s / 12 * (1 - s / 30 * (1 - s / 56 *", "(1 - s / 12 * (1 - s / 30 * (1 - s / 65 *",
-        "a digit pair of the series of (1 - cos a) / a^2 is swapped", ("tests/rotations/test_rotations.py",),
+        "a digit pair of the series of (1 - cos a) / a^2 is swapped", ("tests/rotations/test_series_of_rates.py",),
     ),
     Fault(
         "rotation-vector-rate", "eomgen/rotations/rates.py",
         "square / 60 + square * square / 2520", "square / 60 + square * square / 2250",
-        "a digit pair of the series for rates of rotation vectors is swapped", ("tests/rotations/test_rotations.py",),
+        "a digit pair of the series for rates of rotation vectors is swapped", ("tests/rotations/test_series_of_rates.py",),
     ),
     Fault(
         "quaternion-product", "eomgen/rotations/quaternions.py",

@@ -55,9 +55,9 @@ FAULTS = (
         "the least regularisation of J J^T, times 100", (GRAM,),
     ),
     Fault(
-        "gentle", "eomgen/limits/constraints.py",
-        "\nGENTLE = 1e-8", "\nGENTLE = 1e-6",
-        "the first regularisation of J J^T, times 100", (GRAM,),
+        "term-below", "eomgen/limits/constraints.py",
+        "\nBELOW = 1e-4", "\nBELOW = 1.0",
+        "the regularisation of J J^T is not lowered below weak rows", (GRAM,),
     ),
     Fault(
         "gram-noise", "eomgen/numeric/gram.py",
