@@ -204,7 +204,9 @@ def compile_equations(
     if target == "c":
         raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")
     if kernels is not None:
-        return Module(_load(equations, build(equations, target, kernels), target, options))
+        module = Module(_load(equations, build(equations, target, kernels), target, options))
+        module.equations = equations
+        return module
     with _timed(equations.seconds, "program"):
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = _load(equations, program, target, options, equations.seconds)
@@ -213,7 +215,9 @@ def compile_equations(
     def load_late() -> Core:
         return _load(equations, build(equations, target, late), target, options)
 
-    return Module(LateCore(core, late, load_late))
+    module = Module(LateCore(core, late, load_late))
+    module.equations = equations
+    return module
 
 
 def _load(
@@ -286,8 +290,12 @@ def generate(
     """
     from .emit import emit_package
     from .emit.write import write_package
+    from .verification.record import record
+    from .verification.recorded import FILE
 
     equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
-    sources = emit_package(program, target)
+    sources = dict(emit_package(program, target))
+    if target != "c":
+        sources[FILE] = record(program)
     return write_package(sources, Path(directory) / equations.name)

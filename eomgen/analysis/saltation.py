@@ -69,8 +69,18 @@ class Saltation:
 
     def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
         """z = [x; S] right after events that happened at time t."""
-        own, forcing = fired[0], self.run.forcing
-        index, event = self.listed[own]
+        changed: list[str] = []
+        for own in sorted(fired, key=lambda own: self.listed[own][1].action != GO_ON):
+            after = self._pass(t, z, own)
+            changed += [self.names[own]] if after is not z else []
+            z = after
+        if len(changed) > 1:
+            raise self._at_once(t, changed)
+        return z
+
+    def _pass(self, t: float, z: Array, own: int) -> Array:
+        """z right after one event; z itself where the event changes nothing."""
+        forcing, (index, event) = self.run.forcing, self.listed[own]
         raw, S = self.run.split(z)
         x, S = self._consistent(t, raw, S)
         before, after = self._sides(t, x)

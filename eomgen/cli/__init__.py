@@ -17,7 +17,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Raises
     ------
     SystemExit
-        Always: 0 fine; 1 the model is at fault; 2 usage or file not found; 3 compiler or package; 4 the integration.
+        Always: 0 fine; 1 the model is at fault; 2 usage or file not found; 3 compiler or package; 4 the integration;
+        5 a verification that failed.
     """
     from .command import run_command
 

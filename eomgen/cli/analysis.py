@@ -27,6 +27,7 @@ from .screen import stage
 
 if TYPE_CHECKING:
     from ..derivation import Equations
+    from ..describe import Model
     from ..runtime import Module
 
 
@@ -36,6 +37,7 @@ class Prepared(NamedTuple):
     equations: Equations
     module: Module  #: with the parameters and inputs of ``--set`` bound
     initial: dict[str, float]  #: the values of ``--set`` that are coordinates or rates
+    model: Model  #: as it was described
 
     def heading(self, t: float) -> dict[str, Any]:
         """What every result of --json begins with."""
@@ -98,7 +100,7 @@ def prepare(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    return Prepared(equations, module.bind(parameters, inputs), initial)
+    return Prepared(equations, module.bind(parameters, inputs), initial, described)
 
 
 def pairs(values: Any) -> list[list[float]]:

@@ -27,6 +27,7 @@ VERBS = {
     "reactions": "Forces and moments in all joints, and which are undetermined.",
     "inverse": "Forces of chosen drives that make a motion, loops closed.",
     "impact": "State after an impact, impulses and energy lost.",
+    "verify": "Compare a compiled model with everything independent of how it was made.",
     "generate": "Write a package that stands alone.",
     "convert": "Write a robot (URDF, MJCF) as a model file.",
     "examples": "List the example models, or copy one here.",

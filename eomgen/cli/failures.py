@@ -20,7 +20,7 @@ from ..errors import (
     UsageError,
 )
 
-MODEL, USAGE, TOOLCHAIN, INTEGRATION = 1, 2, 3, 4
+MODEL, USAGE, TOOLCHAIN, INTEGRATION, BREACH = 1, 2, 3, 4, 5
 
 #: What messages call an argument in Python, and the option it is here.
 OPTIONS = {

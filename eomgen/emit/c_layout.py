@@ -5,27 +5,20 @@ from __future__ import annotations
 from ..program import Program
 from ..program.blocks import SHIFTS
 
+CLOSE = ("scaled", "cholesky", "residual_sizes", "correct", "project", "close")
+PIVOT = ("eliminate", "pivots", "partition")
+ACCELERATE = (*CLOSE, *PIVOT, "embed", "ldl", "accelerate")
+SOLVE = ("system_balance", "system_factor", "system_substitute", "system_solve")
+DERIVE = ("correct_change", "jacobian_projection", "jacobian")
+#: from states on both sides of a change point
+PASSING = ("passing_curve", "passing_points", "passing", "passing_search")
+
 LOOPS: dict[str, tuple[str, ...]] = {
-    "project": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "project_drive"),
-    "rhs": (
-        "scaled",
-        "cholesky",
-        "residual_sizes",
-        "correct",
-        "project",
-        "close",
-        "eliminate",
-        "partition",
-        "embed",
-        "ldl",
-        "accelerate",
-        "rhs",
-    ),
-    "embedded_mass_matrix": ("scaled", "eliminate", "partition", "embed", "mass"),
-    "kinematics": ("scaled", "eliminate", "partition", "embed", "kinematics", "kinematics_drive"),
-    "outputs": ("scaled", "cholesky", "residual_sizes", "correct", "project", "close", "outputs_closed"),
+    "project": (*CLOSE, "is_closed", "project_drive"),
+    "embedded_mass_matrix": ("scaled", *PIVOT, "embed", "mass"),
+    "kinematics": ("scaled", *PIVOT, "embed", "kinematics", "kinematics_drive"),
+    "outputs": (*CLOSE, "outputs_closed"),
 }
-ACCELERATED = (*LOOPS["rhs"][:-1], "outputs_accelerated")
 
 TREES: dict[str, tuple[str, ...]] = {
     "rhs": ("tree", "tree_rhs"),
@@ -46,7 +39,21 @@ def shift_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
         return ("shift_columns", name)
     if not program.has_loops:
         return ("tree", "shift_tree", name)
-    return (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
+    return (*ACCELERATE, "multipliers", direct, "correct_change", "shift_projection", "shift_loops", name)
+
+
+def passes(program: Program) -> bool:
+    """Whether the right-hand side is taken from both sides of a change point where it is next to one."""
+    return program.has_loops and program.projects and not program.given_rates
+
+
+def rhs_files(program: Program) -> tuple[str, ...]:
+    """The files of the right-hand side of a mechanism with loops, but for its driver."""
+    if "system" in program.block_names:
+        here: tuple[str, ...] = (*CLOSE, *PIVOT, "embed", *SOLVE, "weakest", "system_rhs_here")
+    else:
+        here = (*ACCELERATE, "weakest", "rhs_here_direct" if "dynamics" in program.block_names else "rhs_here")
+    return (*here, *(PASSING if passes(program) else ()))
 
 
 def driver_files(program: Program) -> list[str]:
@@ -63,6 +70,8 @@ def driver_files(program: Program) -> list[str]:
             needed: tuple[str, ...] = ("dae_jacobian",)
         elif driver.name in SHIFTS:
             needed = shift_files(program, driver.name, direct)
+        elif passes(program) and driver.name in ("rhs", "project", "outputs", "jacobian"):
+            needed = _passing_files(program, driver.name, direct)
         elif "system" in driver.blocks:
             needed = _system_files(program, driver.name, direct)
         elif program.by_columns and "terms" not in driver.blocks:
@@ -72,26 +81,62 @@ def driver_files(program: Program) -> list[str]:
             needed = ("tree", *along)
         elif not program.has_loops:
             needed = TREES[driver.name]
-        elif driver.name == "rhs" and "dynamics" in driver.blocks:
-            needed = (*LOOPS["rhs"][:-1], "rhs_direct")
+        elif driver.name == "rhs":
+            needed = (*rhs_files(program), "rhs")
         elif driver.name == "jacobian":
-            needed = (*LOOPS["rhs"][:-1], "multipliers", direct, "correct_change", "jacobian_projection", "jacobian")
+            needed = (*rhs_files(program), "multipliers", direct, *DERIVE, "jacobian_plain")
         elif driver.name == "outputs" and "terms" in driver.blocks:
-            needed = ACCELERATED
+            needed = (*ACCELERATE, "outputs_accelerated")
         else:
             needed = LOOPS[driver.name]
         files.update(dict.fromkeys(needed))
     return list(files)
 
 
+def _passing_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
+    """Files of a driver of :func:`passes`."""
+    accelerates = {"system", "terms"} & {block for d in program.drivers if d.name == name for block in d.blocks}
+    if name == "jacobian":
+        return (*rhs_files(program), *ACCELERATE, "multipliers", direct, *DERIVE, "jacobian_passing")
+    if name == "project":
+        rates = any(d.name == "rhs" for d in program.drivers)
+        across = (*rhs_files(program), "rhs_across", "project_passing")
+        return (*CLOSE, "is_closed", *(across if rates else ("project_drive",)))
+    if name == "outputs" and not accelerates:
+        return LOOPS[name]
+    return (*rhs_files(program), "rhs_across", f"{name}_passing")
+
+
 def _system_files(program: Program, name: str, direct: str) -> tuple[str, ...]:
     """Files of a driver that solves the linear system of a method."""
-    solve = ("system_balance", "system_factor", "system_substitute", "system_solve")
     if name == "jacobian":
-        return (*solve, direct, "system_jacobian")
+        return (*SOLVE, direct, "system_jacobian")
     if program.has_loops and (program.projects or name == "outputs"):
-        return (*LOOPS["project"][:-1], *solve, f"system_{name}_closed")
-    return (*solve, f"system_{name}_given")
+        return (*rhs_files(program), "rhs") if name == "rhs" else (*CLOSE, *SOLVE, "system_outputs_closed")
+    return (*SOLVE, f"system_{name}_given")
+
+
+def passing_areas(program: Program) -> list[tuple[str, int]]:
+    """Areas of :data:`PASSING`."""
+    if not passes(program):
+        return []
+    n_q, n, f = program.sizes.n_q, program.sizes.n_v, program.sizes.n_dof
+    values = 2 * (n_q + n)
+    return [
+        ("STATE", n_q + n),  # q, v in the middle
+        ("NEXT", values),  # q, v, x' at a point
+        ("TANGENT", n * f),
+        ("INVERSE", f * (f + n)),
+        ("HEADING", f),
+        ("DIRECTION", n),
+        ("AWAY", n_q + n),
+        ("POINTS", 10 * n_q),
+        ("SUMS", 4 * values),
+        ("BEST", values),
+        ("KEPT", n_q + n),
+        ("RATED", n_q + n),
+        ("TURN", (n_q + n) ** 2 if "jacobian" in {d.name for d in program.drivers} else 0),
+    ]
 
 
 def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]], int]:
@@ -145,8 +190,9 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
             ("H", n),
             ("A", n),
             ("Y", f),
+            *passing_areas(program),
             ("CLOSING", n + 3 if "closing" in names else 0),
-            ("DYNAMICS", 2 * n + 1 if "dynamics" in names else 0),
+            ("DYNAMICS", 2 * n + 2 if "dynamics" in names else 0),
         ]
     if "system" in names and program.system is not None:
         size, places = len(program.system.unknowns), len(program.system.places)

@@ -34,7 +34,12 @@ FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces"
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", *ANALYSES)
+#: Files of verification/ that need no equations.
+VERIFICATION = (
+    *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
+    *("identities.py", "recorded.py", "selftest.py", "verify.py"),
+)
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
 
 
 def emit_package(program: Program, target: str) -> SourceSet:
@@ -95,18 +100,20 @@ def _c_library(program: Program) -> dict[str, str]:
 
 
 def _python_files(context: dict[str, Any]) -> dict[str, str]:
-    names = ("__init__.py", "__init__.pyi", "pyproject.toml", "README.md")
+    names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md")
     return {"py.typed": "", **{name: render(f"python/{name}.j2", context) for name in names}}
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, limits/, numeric/, runtime/, analysis/ and ensembles/ as they are in eomgen itself."""
+    """errors.py, limits/, numeric/, runtime/, analysis/, ensembles/, parts of verification/, as in eomgen itself."""
     root = files("eomgen")
     found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
     for folder in ("limits", "numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
+    for name in VERIFICATION:
+        found[f"verification/{name}"] = (root / "verification" / name).read_text(encoding="utf-8")
     return found
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 
-from . import constraints, inertia, rounding, runs, systems
+from . import constraints, crossings, inertia, rounding, runs, systems
 
 KINDS = {
     "ROUNDING": rounding,
     "CONSTRAINTS": constraints,
+    "CROSSINGS": crossings,
     "INERTIA": inertia,
     "SYSTEMS": systems,
     "RUNS": runs,

@@ -108,6 +108,28 @@ def accelerate(terms: Terms, v: Array, scales: Scales, system: Embedded) -> Arra
     return np.asarray(a)
 
 
+def motion(
+    terms: Callable[[Array, Array], Terms],
+    position: Position,
+    rate: Rate,
+    q: Array,
+    v: Array,
+    scales: Scales,
+    rank: int,
+    independent: Sequence[int] | Indices,
+    given: GivenRates | None = None,
+) -> tuple[Array, float]:
+    """[q, v, q', a] (2 n_x,) of the projected state, and the weakest pivot of the partition there.
+
+    See :func:`embed` and :func:`~.projection.project` for errors.
+    """
+    q, v = project(position, rate, q, v, scales, given)
+    here = terms(q, v)
+    system = embed(here.M, here.C_q, scales, rank, independent, here.indefinite)
+    rates = scales.rates(q, v) if given is None else given.rates(q, v)
+    return np.concatenate([q, v, rates, accelerate(here, v, scales, system)]), system.split.weakest
+
+
 def rhs(
     terms: Callable[[Array, Array], Terms],
     position: Position,
@@ -119,15 +141,8 @@ def rhs(
     independent: Sequence[int] | Indices,
     given: GivenRates | None = None,
 ) -> Array:
-    """x' = [q', a] (n_x,) of the projected state; see :func:`embed` and :func:`~.projection.project` for errors."""
-    q, v = project(position, rate, q, v, scales, given)
-    here = terms(q, v)
-    return np.concatenate(
-        [
-            scales.rates(q, v) if given is None else given.rates(q, v),
-            accelerate(here, v, scales, embed(here.M, here.C_q, scales, rank, independent, here.indefinite)),
-        ]
-    )
+    """x' = [q', a] (n_x,) of :func:`motion`."""
+    return motion(terms, position, rate, q, v, scales, rank, independent, given)[0][len(q) + len(v) :]
 
 
 class Residuals(NamedTuple):

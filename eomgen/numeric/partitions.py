@@ -28,6 +28,7 @@ class Partition(NamedTuple):
     inverse: Array  #: (r, r) inverse of J[rows, dependent]
     B: Array  #: (n, n - r) velocity transformation: v = B v_i (+ b_t), J B = 0
     pivot: float  #: smallest pivot divided by the largest entry of J: 1 is good, 0 is singular
+    weakest: float = 1.0  #: the same where no column is preferred
 
     def particular(self, y: Array) -> Array:
         """The x (n,) or (n, k) with J x = y on the pivot rows and x = 0 for the independent coordinates."""
@@ -70,7 +71,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     size = float(np.abs(J).max()) if J.size else 0.0
     rows = np.empty(rank, dtype=np.intp)
     dependent = np.empty(rank, dtype=np.intp)
-    smallest = size
+    smallest = weakest = size
     for step in range(rank):
         magnitude = np.abs(work)
         magnitude[rows[:step]] = 0.0
@@ -80,6 +81,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
             column = int(np.flatnonzero(preferred)[column])
         if not strict:
             row_any, column_any, best_any = _best(magnitude)
+            weakest = min(weakest, best_any)
             if not best >= PREFERENCE * best_any or best == 0.0:
                 row, column, best = row_any, column_any, best_any
         if not best > (STRICT if strict else RANK) * size:
@@ -101,7 +103,8 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     B = np.zeros((n, n - rank))
     B[kept, np.arange(n - rank)] = 1.0
     B[dependent] = -inverse @ J[np.ix_(rows, kept)]
-    return Partition(dependent, kept, rows, inverse, B, smallest / size if size else 1.0)
+    relative = (smallest / size, weakest / size) if size else (1.0, 1.0)
+    return Partition(dependent, kept, rows, inverse, B, *relative)
 
 
 def _best(magnitude: Array) -> tuple[int, int, float]:

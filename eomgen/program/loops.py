@@ -14,6 +14,7 @@ from functools import cached_property
 from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, VANISHED
+from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
 from .factor import exceeding
@@ -84,6 +85,8 @@ class LoopBlocks:
         self.h = len(terms.constraints)
         self.gentle = terms.n_v > LARGE
         self.lost = VANISHED if self.gentle else LOST
+        #: squares of a column of the dependent coordinates, and of its part across those before it
+        self._angles: dict[tuple[Expr, Expr], None] = {}
 
     @property
     def determined(self) -> bool:
@@ -140,7 +143,9 @@ class LoopBlocks:
     def _factor(self) -> tuple[Factor, tuple[int, int]]:
         """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
         if self.gentle:
-            return self._regularised(self.J, GENTLE)[0], PASSES
+            factor, term = self._regularised(self.J, GENTLE)
+            self._rows_size = term * (1.0 / GENTLE)
+            return factor, PASSES
         if len(self.J) > self.terms.n_v - self.terms.n_dof:  # redundant rows
             return self._regularised(self.J, TIKHONOV)[0], (2, 2)
         return factorize(gram(self.J)), (1, 1)
@@ -164,7 +169,9 @@ class LoopBlocks:
         return x
 
     def dynamics(self) -> tuple[list[Expr], list[Expr]]:
-        """Projected velocities (n,), accelerations (n,), 1 if the partition is sound; and checks of the inertia."""
+        """Projected velocities (n,), accelerations (n,), 1 if the partition is sound, 1 if no change point can be near;
+        and checks of the inertia.
+        """
         terms, graph, f = self.terms, self.terms.graph, range(self.terms.n_dof)
         v = [graph.symbol(name) for name in terms.v]
         rate = [x * i for x, i in zip(terms.constraint_rate, self.inverse, strict=True)]
@@ -197,7 +204,23 @@ class LoopBlocks:
             reach = dot({k: ratio * ratio for k, ratio in moving.items()}, diagonal)
             if reach is not None:
                 checks.append(graph.apply("lt", reach * STILL, factor.pivots[0]))
-        return [*moved, *a, sound], checks
+        return [*moved, *a, sound, self._far()], checks
+
+    def _far(self) -> Expr:
+        """1 where no change point can be near: by the columns of the dependent coordinates, which a dead centre of the
+        independent ones makes nearly parallel too, or by the rows of all, which tell only without redundant ones.
+        """
+        graph, far = self.terms.graph, self.terms.graph.one
+        for size, part in self._angles:
+            condition = graph.apply("lt", size * NEAR_SQUARE, part)
+            far = condition if far == graph.one else graph.apply("and", far, condition)
+        if self.gentle and far != graph.one and len(self.J) == self.terms.n_v - self.terms.n_dof:
+            pivots = self._factor[0].pivots
+            least = pivots[0]
+            for pivot in pivots[1:]:
+                least = graph.apply("min", least, pivot)
+            far = graph.apply("or", far, graph.apply("lt", self._rows_size * NEAR_SQUARE, least))
+        return far
 
     # -- partition ------------------------------------------------------------------------------------------------
     def _partition(self, y: list[Expr] | None, conditions: list[Expr]) -> tuple[list[Row], list[Expr], Expr]:
@@ -255,9 +278,9 @@ class LoopBlocks:
             (i, j), (k, l) = block.rows, block.columns
             p, q, r, t = (rows[m].get(c, graph.zero) for m in (i, j) for c in (k, l))
             determinant = p * t - q * r
-            conditions.append(
-                graph.apply("lt", (p * p + r * r) * (q * q + t * t) * self.lost, determinant * determinant)
-            )
+            sizes, across = (p * p + r * r) * (q * q + t * t), determinant * determinant
+            conditions.append(graph.apply("lt", sizes * self.lost, across))
+            self._angles[sizes, across] = None
             inverse = 1.0 / determinant
             x[k] = (t * b[0] - q * b[1]) * inverse
             x[l] = (p * b[1] - r * b[0]) * inverse
@@ -274,6 +297,7 @@ class LoopBlocks:
         for i, pivot in enumerate(factor.pivots):
             if not (pivot - E[i][i]).is_zero:
                 conditions.append(graph.apply("lt", E[i][i] * self.lost, pivot))
+                self._angles[E[i][i], pivot] = None
         found = []
         for b in right:
             x = factor.solve(times(columns, b))

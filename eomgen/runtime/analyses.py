@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..analysis.modes import Modes
     from ..analysis.sensitivity_result import Sensitivities
     from ..numeric.scales import Array
+    from ..verification.finding import Verification
     from .kernels import Kernels
     from .layout import Layout
     from .protocols import Timed
@@ -87,6 +88,39 @@ class Analyses(ForceAnalyses):
         nearest one on them.  Exact at states on the constraints; others are projected first.
         """
         return self._derivative("parameter_jacobian")
+
+    def verify(self, *, states: int = 6, seed: int = 0) -> Verification:
+        """Compare this module with everything that is independent of how it was made.
+
+        Parameters
+        ----------
+        states : int
+            Number of random states on the constraints, near the declared initial position.
+        seed : int
+            Of the states.
+
+        Returns
+        -------
+        Verification
+            ``ok``, ``table``, ``findings``, ``breaches``; printed, it is a table of the worst figures, their limits and
+            where they are.
+
+        Raises
+        ------
+        AssemblyError
+            The loops do not close at the declared initial values.
+        MissingDependencyError
+            mpmath or SciPy is not installed.
+
+        Notes
+        -----
+        A module that was compiled here is compared with its graph, with the graph in 50 digits, with Newton's and
+        Euler's equations of every body and with SciPy.  One of an exported package is compared with the figures that
+        came with it, and with itself.
+        """
+        from ..verification.verify import verify
+
+        return verify(self, states=states, seed=seed)  # type: ignore[arg-type]
 
     def _derivative(self, name: str) -> Timed:
         layout = self.kernels.layout

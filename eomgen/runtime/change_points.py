@@ -1,27 +1,34 @@
-"""Stage runtime: the states of a run -> where the mobility itself changes on the way.
+"""Stage runtime: the steps of a run -> where the mobility itself changes on the way.
 
 At a change point the constraint Jacobian loses rank: a parallelogram lies flat and could go on as an antiparallelogram.
-Between stored states the run is followed by Runge-Kutta's method in short steps.
+The steps of the integrator are looked at, whatever times were stored, and between them Hermite's polynomial through
+their ends, so closely that no pass falls between two looks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..errors import EvaluationError
 from ..limits.constraints import PASSED as SINGULAR
+from ..limits.rounding import TINY
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .module import Module
 
+SPACING = (
+    0.15  #: scaled motion between two looks, of coordinates that the constraints hold; a pass takes pi, or half of it
+)
+MOST = 200_000  #: looks at a run
 DIP = 0.5  #: a smallest singular value that falls below this part of its largest over the run is looked at
-SUBSTEPS = 24  #: between stored states
-LEVELS = 3  #: times that the neighbourhood of the smallest value is looked at more closely
+ENTRIES = 2_000_000  #: of constraint Jacobians held at a time
+PARTS = 24  #: of the neighbourhood of a dip, again and again
+LEVELS = 7  #: times that it is looked at more closely
+SAME = 1e-3  #: of a neighbourhood: dips closer together are one
 
 
 class ChangePoint(NamedTuple):
@@ -38,13 +45,23 @@ class ChangePoint(NamedTuple):
         return f"t = {self.time:.6g} s, {freedoms} at {shown}{more}"
 
 
-def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
-    """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
+def scaled_jacobians(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
+    """Scaled constraint Jacobians (k, m, n) at times (k,), states (n_x, k) and inputs (n_u, k)."""
     layout = module.layout
     C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
-    J = module.layout.scales.jacobian(C_q)
-    values = np.linalg.svd(J, compute_uv=False)
-    return np.asarray(values / np.maximum(values[:, :1], 1e-300))
+    return np.asarray(layout.scales.jacobian(C_q))
+
+
+def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
+    """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
+    block = max(1, ENTRIES // (module.layout.n_c * module.layout.n_v))
+    found = []
+    for k in range(0, len(t), block):
+        p = slice(k, k + block)
+        J = scaled_jacobians(module, t[p], x[:, p], None if u is None else u[:, p])
+        found.append(np.linalg.svd(J, compute_uv=False))
+    values = np.concatenate(found)
+    return np.asarray(values / np.maximum(values[:, :1], TINY))
 
 
 def find_change_points(module: Module, t: Array, x: Array, u: Array) -> list[ChangePoint]:
@@ -55,94 +72,130 @@ def find_change_points(module: Module, t: Array, x: Array, u: Array) -> list[Cha
     module : Module
         With the parameters of the run.
     t : (n_t,) array
+        Of the integrator's steps; a time that comes twice is that of an event that resets the state.
     x : (n_x, n_t) array
-        Projected.
     u : (n_u, n_t) array
 
     Returns
     -------
     list of ChangePoint
     """
-    rank = module.layout.rank
-    if not rank or len(t) < 2:
+    if not module.layout.rank or len(t) < 2:
         return []
-    led = bool(module.layout.constraint_inputs)
-    least = singular_values(module, t, x, u if led else None)[:, rank - 1]
-    padded = np.concatenate([[np.inf], least, [np.inf]])
-    dips = np.flatnonzero((least <= padded[:-2]) & (least <= padded[2:]) & (least < DIP * least.max()))
-    found: list[ChangePoint] = []
-    for k in dips.tolist():
-        first, last = max(k - 1, 0), min(k + 1, len(t) - 1)
-        times, states = _follow(module, t[first : last + 1], x[:, first], u[:, first : last + 1])
-        point = _closest(module, times, states, partial(_between, t, u) if led else None)
-        if point is not None and not (found and abs(point.time - found[-1].time) <= 1e-9 + 1e-6 * abs(point.time)):
-            found.append(point)
-    return found
+    ends = [0, *(np.flatnonzero(np.diff(t) == 0.0) + 1).tolist(), len(t)]
+    looks = [Looks(module, t[a:b], x[:, a:b], u[:, a:b]) for a, b in pairwise(ends) if b - a > 1]
+    largest = max((look.least.max() for look in looks), default=0.0)
+    return [point for look in looks for point in look.find(DIP * largest)]
 
 
-def _follow(module: Module, t: Array, x: Array, u: Array) -> tuple[Array, Array]:
-    """States at SUBSTEPS times per stored step, from the first on."""
-    rhs = module.kernels.timed("rhs", nan=True)
-    times = np.concatenate([np.linspace(a, b, SUBSTEPS, endpoint=False) for a, b in pairwise(t)])
-    times = np.append(times, t[-1])
+class Curve:
+    """States between steps: coordinates by Hermite's polynomial, of degree five where accelerations are known.
 
-    def slope(at: float, state: Array) -> Array:
-        if not len(u):
-            return np.asarray(rhs(at, state))
-        return np.asarray(rhs(at, state, u=np.array([np.interp(at, t, row) for row in u])))
+    Parameters
+    ----------
+    module : Module
+    t : (k,) array
+    x : (n_x, k) array
+    u : (n_u, k) array
+    """
 
-    states = [np.array(x)]
-    for a, b in pairwise(times):
-        h, y = b - a, states[-1]
-        k1 = slope(a, y)
-        k2 = slope(a + h / 2, y + h / 2 * k1)
-        k3 = slope(a + h / 2, y + h / 2 * k2)
-        k4 = slope(b, y + h * k3)
-        following = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        if not np.isfinite(following).all():  # exactly on the spot: go past it on the tangent
-            following = y + h * np.where(np.isfinite(k1), k1, 0.0)
-        states.append(following)
-    return times, np.array(states).T
+    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
+        self.t, self.x, self.n_q = t, x, module.layout.n_q
+        slopes = module.kernels.timed("rhs", nan=True)(t, x, **({"u": u} if len(u) else {}))
+        known = bool(np.isfinite(slopes).all())
+        self.rates = slopes[: self.n_q] if known else np.where(np.isfinite(slopes), slopes, 0.0)[: self.n_q]
+        self.bends = slopes[self.n_q :] if known and self.n_q == module.layout.n_v else None
 
-
-def _between(t: Array, u: Array, times: Array) -> Array:
-    """Inputs (n_u, k) at times (k,) between those stored."""
-    order = np.argsort(t, kind="stable")
-    return np.array([np.interp(times, t[order], row[order]) for row in u])
-
-
-def _closest(
-    module: Module, times: Array, states: Array, inputs: Callable[[Array], Array] | None
-) -> ChangePoint | None:
-    """The state nearest to a loss of rank, if it is one."""
-    rank = module.layout.rank
-    n = module.n_q
-    for _ in range(LEVELS):
-        values = singular_values(module, times, states, inputs and inputs(times))
-        k = int(np.argmin(values[:, rank - 1]))
-        first, last = max(k - 1, 0), min(k + 1, len(times) - 1)
-        if np.unique(times[first : last + 1]).size < last - first + 1:
-            break  # as near as times can be told apart
-        part = np.linspace(0.0, 1.0, 4 * SUBSTEPS + 1)
-        between = times[first] + (times[last] - times[first]) * part
-        states = np.array([np.interp(between, times, row) for row in states]) if last - first < 2 else _parabola(
-            times[first : last + 1], states[:, first : last + 1], between
-        )  # fmt: skip
-        times = between
-    values = singular_values(module, times, states, inputs and inputs(times))
-    k = int(np.argmin(values[:, rank - 1]))
-    if values[k, rank - 1] > SINGULAR:
-        return None
-    freedoms = module.layout.n_v - int(np.count_nonzero(values[k] > 10.0 * SINGULAR))
-    return ChangePoint(float(times[k]), freedoms, dict(zip(module.q_names, states[:n, k].tolist(), strict=True)))
+    def __call__(self, times: Array) -> Array:
+        """States (n_x, k) at times (k,)."""
+        t, forward = self.t, 1.0 if self.t[-1] >= self.t[0] else -1.0
+        k = np.clip(np.searchsorted(forward * t, forward * times, side="right") - 1, 0, len(t) - 2)
+        h = t[k + 1] - t[k]
+        s = (times - t[k]) / h
+        q0, q1 = self.x[: self.n_q, k], self.x[: self.n_q, k + 1]
+        d0, d1 = self.rates[:, k] * h, self.rates[:, k + 1] * h
+        q = q0 + s * d0 + s**2 * (3.0 * (q1 - q0) - 2.0 * d0 - d1) + s**3 * (d0 + d1 - 2.0 * (q1 - q0))
+        if self.bends is not None:  # what the second derivatives at the ends lack
+            b0 = self.bends[:, k] * h**2 - 6.0 * (q1 - q0) + 4.0 * d0 + 2.0 * d1
+            b1 = self.bends[:, k + 1] * h**2 + 6.0 * (q1 - q0) - 2.0 * d0 - 4.0 * d1
+            q = q + 0.5 * (s * (1.0 - s)) ** 2 * (b0 * (1.0 - s) + b1 * s)
+        v = self.x[self.n_q :, k] * (1.0 - s) + self.x[self.n_q :, k + 1] * s
+        return np.concatenate([q, v])
 
 
-def _parabola(t: Array, x: Array, at: Array) -> Array:
-    """The parabola through three states."""
-    a, b, c = t
-    w = np.array([
-        (at - b) * (at - c) / ((a - b) * (a - c)),
-        (at - a) * (at - c) / ((b - a) * (b - c)),
-        (at - a) * (at - b) / ((c - a) * (c - b)),
-    ])  # fmt: skip
-    return np.asarray(x @ w)
+class Looks:
+    """The smallest singular value along a part of a run without resets.
+
+    Parameters
+    ----------
+    module, t, x, u
+        As for :func:`find_change_points`.
+    """
+
+    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
+        self.module, self.t, self.u = module, t, u
+        layout = module.layout
+        self.rank, self.n_q = layout.rank, layout.n_q
+        self.curve = Curve(module, t, x, u)
+        ends = scaled_jacobians(module, t[[0, -1]], x[:, [0, -1]], self._inputs(t[[0, -1]]))
+        held = np.abs(ends).any(axis=(0, 1))
+        speed = np.abs(x[self.n_q :] / layout.scales.q[:, None])[held].max(axis=0, initial=0.0)
+        motion = np.abs(np.diff(t)) * np.maximum(speed[1:], speed[:-1])
+        parts = np.maximum(1.0, np.ceil(motion / max(SPACING, float(motion.sum()) / MOST))).astype(int)
+        pieces = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(t[:-1], t[1:], parts, strict=True)]
+        self.times = np.append(np.concatenate(pieces), t[-1])
+        values = singular_values(module, self.times, self.curve(self.times), self._inputs(self.times))
+        self.least = values[:, self.rank - 1]
+
+    def _inputs(self, times: Array) -> Array | None:
+        """Inputs (n_u, k) at times (k,) where constraints depend on them."""
+        if not self.module.layout.constraint_inputs:
+            return None
+        return np.array([np.interp(times, *_rising(self.t, row)) for row in self.u])
+
+    def find(self, limit: float) -> list[ChangePoint]:
+        """The change points where the smallest singular value falls below a limit, in order."""
+        padded = np.concatenate([[np.inf], self.least, [np.inf]])
+        dips = np.flatnonzero((self.least <= padded[:-2]) & (self.least <= padded[2:]) & (self.least < limit))
+        found: list[ChangePoint] = []
+        for k in dips.tolist():
+            first, last = self.times[max(k - 1, 0)], self.times[min(k + 1, len(self.times) - 1)]
+            point = self._closest(float(first), float(last))
+            if point is not None and not (found and abs(point.time - found[-1].time) <= SAME * abs(last - first)):
+                found.append(point)
+        return found
+
+    def _closest(self, first: float, last: float) -> ChangePoint | None:
+        """The state between two times nearest to a loss of rank, if it is one."""
+        ends = np.array([first, last])
+        u = np.array([np.interp(ends, *_rising(self.t, row)) for row in self.u]).reshape(-1, 2)
+        curve = Curve(self.module, ends, self._closed(ends), u)
+        for _ in range(LEVELS):
+            times = np.linspace(first, last, PARTS + 1)
+            states = curve(times)
+            values = singular_values(self.module, times, states, self._inputs(times))
+            k = int(np.argmin(values[:, self.rank - 1]))
+            first, last = times[max(k - 1, 0)], times[min(k + 1, PARTS)]
+            if first == last or values[k, self.rank - 1] == 0.0:
+                break  # as near as times can be told apart
+        if values[k, self.rank - 1] > SINGULAR:
+            return None
+        freedoms = self.module.layout.n_v - int(np.count_nonzero(values[k] > 10.0 * SINGULAR))
+        coordinates = dict(zip(self.module.q_names, states[: self.n_q, k].tolist(), strict=True))
+        return ChangePoint(float(times[k]), freedoms, coordinates)
+
+    def _closed(self, times: Array) -> Array:
+        """States at times, on the constraints; one that cannot be brought there stays as it is."""
+        states = self.curve(times)
+        for k, at in enumerate(times):
+            try:
+                u = self._inputs(times[k : k + 1])
+                states[:, k] = self.module.project(states[:, k], t=float(at), u=None if u is None else u[:, 0])
+            except EvaluationError:
+                continue
+        return states
+
+
+def _rising(t: Array, row: Array) -> tuple[Array, Array]:
+    """Times in ascending order and what belongs to them."""
+    return (t, row) if t[-1] >= t[0] else (t[::-1], row[::-1])

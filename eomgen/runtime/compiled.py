@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import Events, warn_of_unknown
-from .integrate import Solution
+from .integrate import KEPT, Solution
 from .names import check_names
 from .signals import Forcing
 from .tolerances import check_tolerances
@@ -121,6 +121,7 @@ def integrate_compiled(
     events = events if events is not None and len(events) else None
     plan = {
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
+        "trail": KEPT if module.layout.rank else 0,
         "watch": None if watch is None else watch.look, "pace": None if pace is None else pace.look,
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)
@@ -152,6 +153,7 @@ def integrate_compiled(
             MESSAGES.get(status, TOO_SMALL),
             {"nfev": journey.evaluations, "njev": journey.differentiations, "nlu": journey.factorizations},
             (start, journey.t),
+            None if (trail := journey.trail()) is None else (trail[:, 0], np.ascontiguousarray(trail[:, 1:].T)),
         ),
         journey.failure,
         journey.raised,

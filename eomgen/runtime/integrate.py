@@ -17,6 +17,7 @@ from .names import require, unknown
 from .pace import Pace, watch_steps
 from .resets import Resets
 
+KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -32,6 +33,7 @@ class Solution(NamedTuple):
     message: str
     counts: dict[str, int]
     ends: tuple[float, float]  #: first and last time reached
+    steps: tuple[Array, Array] | None = None  #: (k,), (n_x, k) of every step, where others are stored; k = 0: too many
 
 
 class Interrupted(KeyboardInterrupt):
@@ -141,6 +143,7 @@ def integrate(
     t_events: list[list[Array]] = [[] for _ in events]
     x_events: list[list[Array]] = [[] for _ in events]
     pieces: list[Any] = []
+    walked: list[tuple[float, Array]] = []
     counts = {"nfev": 0, "njev": 0, "nlu": 0}
     x, k, start, jumped = x0, 0, nodes[0], True
     resets = Resets(events, rhs, nodes[0], nodes[-1])
@@ -167,8 +170,11 @@ def integrate(
             raise Interrupted(_cut_short(times, states, trail, t_events, x_events, nodes[0], counts)) from interrupt
         for key in counts:
             counts[key] += int(getattr(part, key, 0) or 0)
+        if part.status == 1:
+            _complete(part, events, trail)
         t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
         fired: list[int] = []
+        over = False
         for e, event in enumerate(events):
             t_events[e].append(np.asarray(part.t_events[e]))
             x_events[e].append(np.asarray(part.y_events[e]).reshape(len(part.t_events[e]), len(x0)).T)
@@ -176,12 +182,16 @@ def integrate(
             if event.action != GO_ON and part.status == 1 and happened:
                 fired.append(e)
             if event.terminal:
-                over = happened >= event.terminal
+                over = over or happened >= event.terminal
                 event.terminal = max(event.terminal - happened, 1)
-                fired = [] if over else fired
+        fired = [] if over else fired
         if dense and part.sol is not None:
             pieces.append(part.sol)
         ended = float(part.t_events[fired[0]][-1]) if fired else float(span[1])
+        if t_eval is not None:
+            walked += trail[0 if jumped else 1 :]
+            if part.status == 1:  # an event, beyond which the last step went
+                walked[-1] = _stopped(part, nodes[-1] >= nodes[0])
         done = (last and not fired) or part.status == -1 or (part.status == 1 and not fired)
         if t_eval is None:
             skip = 0 if jumped else 1  # a part starts where the last one ended
@@ -223,7 +233,42 @@ def integrate(
         str(part.message),
         counts,
         ends,
+        _columns(walked, len(x0)) if t_eval is not None else None,
     )
+
+
+def _complete(part: Any, events: Sequence[Event], trail: Sequence[tuple[float, Array]]) -> None:
+    """Add the events of the same instant to that at which SciPy stopped: it tells of one alone.
+
+    An event whose value has changed sign since the beginning of the step, and that was not found before, is at that
+    instant, but for rounding; so is one that is to change it within the rounding of the time.
+    """
+    sign = 1.0 if trail[-1][0] >= trail[0][0] else -1.0
+    found = [(sign * times[-1], k) for k, times in enumerate(part.t_events) if len(times)]
+    latest, first = max(found)
+    t, x = sign * latest, np.array(part.y_events[first][-1])
+    began, state = next((point for point in reversed(trail) if sign * point[0] < latest), (t, x))
+    step, instant = abs(t - began), 1e-14 * max(abs(t), 1e-3)
+    for e, event in enumerate(events):
+        if len(part.t_events[e]) and sign * part.t_events[e][-1] > sign * began:
+            continue
+        a, b = event(began, state), event(t, x)
+        crossed = a * b <= 0.0 or abs(b) * step <= instant * abs(a - b)
+        if crossed and ((a < 0.0 and event.direction >= 0) or (a > 0.0 and event.direction <= 0)):
+            part.t_events[e] = np.append(part.t_events[e], t)
+            part.y_events[e] = np.vstack([np.asarray(part.y_events[e]).reshape(-1, len(x)), x])
+
+
+def _columns(walked: Sequence[tuple[float, Array]], n: int) -> tuple[Array, Array]:
+    """Times (k,) and states (n, k) of steps; none where they are more than KEPT."""
+    kept = walked if len(walked) * (1 + n) <= KEPT else []
+    return np.array([t for t, _ in kept]), np.array([x for _, x in kept]).reshape(len(kept), n).T
+
+
+def _stopped(part: Any, forward: bool) -> tuple[float, Array]:
+    """Time and state of the event that ended a part, which is the last of all."""
+    found = [(float(t[-1]), x[-1]) for t, x in zip(part.t_events, part.y_events, strict=True) if len(t)]
+    return max(found, key=lambda pair: pair[0] if forward else -pair[0])
 
 
 def _cut_short(

@@ -81,6 +81,9 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
     """
 
+    #: what it was made from; None for a module of an exported package, or from a pickle
+    equations: Any = None
+
     rhs: Timed
     jacobian: Timed
     bias: Timed
@@ -163,7 +166,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """
         layout = self.layout
         other = object.__new__(type(self))
-        other.core, other.layout = self.core, layout
+        other.core, other.layout, other.equations = self.core, layout, self.equations
         new_p = layout.values("parameter", layout.p, p, self.p)
         other._setup(self.core, layout, new_p, layout.values("input", layout.u, u, self.u))
         return other

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..errors import SingularMassMatrixError
+from ..errors import PartitionError, SingularMassMatrixError, UnsolvedError
+from ..limits.crossings import NEAR
 from ..limits.inertia import SINGULAR
-from ..numeric import embedded, projection
+from ..numeric import embedded, passing, projection
 from ..numeric.definite import correlated
 from ..numeric.dependent import kinematics as kinematics_of
+from ..numeric.partitions import partition
 from ..numeric.scales import Array, GivenRates, Scales
 from ..numeric.shifts import Shifts, shift_jacobian
 from ..numeric.system import Balanced, Pattern
@@ -40,6 +42,10 @@ NEEDS = {
 #: derivatives by something other than the state -> the residuals along it, and the accelerations where those are known
 SHIFTS = {"input_jacobian": "input_shift", "parameter_jacobian": "parameter_shift"}
 SHIFTED = {"input_jacobian": "input_acceleration", "parameter_jacobian": "parameter_acceleration"}
+
+
+#: (t, x, u, c) -> [x, x', anything] of the projected state, and the weakest pivot there
+Motion: TypeAlias = Callable[[float, Array, Array, Array], tuple[Array, float]]
 
 
 class Drivers:
@@ -168,13 +174,59 @@ class Drivers:
     # drivers
 
     def _rhs(self, t: float, x: Array, u: Array, c: Array) -> Array:
-        n, layout = self.layout.n_q, self.layout
+        layout = self.layout
+        if "system" in self.blocks and not (layout.n_c and layout.projects):
+            return np.concatenate([layout.scales.rates(x[: layout.n_q], x[layout.n_q :]), self._solve(t, x, u, c)[0]])
+        return self._across(self._motion, t, x, u, c)[layout.n_x :]
+
+    def _motion(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, float]:
+        """[x, x'] of the projected state, and the weakest pivot there."""
+        n, layout, scales = self.layout.n_q, self.layout, self.scales(c)
         if "system" in self.blocks:
-            x = self._project(t, x, u, c) if layout.n_c and layout.projects else x
-            return np.concatenate([layout.scales.rates(x[:n], x[n:]), self._solve(t, x, u, c)[0]])
+            x, weakest = self._closed(t, x, u, c)
+            return np.concatenate([x, scales.rates(x[:n], x[n:]), self._solve(t, x, u, c)[0]]), weakest
         terms, position, rate = self._bound(t, u, c)
         given = self.given(t, u, c)
-        return embedded.rhs(terms, position, rate, x[:n], x[n:], self.scales(c), layout.rank, layout.independent, given)
+        return embedded.motion(terms, position, rate, x[:n], x[n:], scales, layout.rank, layout.independent, given)
+
+    def _closed(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, float]:
+        """The projected state, and the weakest pivot there."""
+        layout, n, scales = self.layout, self.layout.n_q, self.scales(c)
+        _, position, rate = self._bound(t, u, c)
+        q, v = projection.project(position, rate, x[:n], x[n:], scales, self.given(t, u, c))
+        weakest = 1.0
+        if layout.n_c:
+            try:
+                weakest = partition(scales.jacobian(position(q)[1]), layout.rank, layout.independent).weakest
+            except PartitionError:
+                weakest = 0.0
+        return np.concatenate([q if layout.space is None else layout.space.normalised(q), v]), weakest
+
+    def _across(self, function: Motion, t: float, x: Array, u: Array, c: Array) -> Array:
+        """What a function makes of a state; next to a change point from states on both sides of it."""
+        try:
+            values, weakest = function(t, x, u, c)
+        except (PartitionError, UnsolvedError):
+            better = self._better(function, t, x, u, c, self._closed(t, x, u, c)[1])
+            if better is None:
+                raise
+            return better
+        better = self._better(function, t, x, u, c, weakest)
+        return values if better is None else better
+
+    def _better(self, function: Motion, t: float, x: Array, u: Array, c: Array, weakest: float) -> Array | None:
+        """The same from states on both sides of a change point, where that is better."""
+        layout, n, scales = self.layout, self.layout.n_q, self.scales(c)
+        if not layout.n_c or layout.given_rates or not weakest < NEAR:
+            return None
+        around = passing.Around(
+            lambda at: partial(self.position, at, u, c), scales, layout.rank, layout.independent,
+            t, x[:n], x[n:], bool(self.rate(t, u, c, x[:n]).any()),
+        )  # fmt: skip
+        found = passing.across(around, lambda at, q, v: function(at, np.concatenate([q, v]), u, c)[0], weakest)
+        if found is not None and layout.space is not None:
+            found[:n] = layout.space.normalised(found[:n])
+        return found
 
     def _jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
         n, layout = self.layout.n_q, self.layout
@@ -186,12 +238,19 @@ class Drivers:
             return np.vstack([dv if space is None else space.change(x[:n], dq, x[n:, None], dv), changes])
         if not layout.projects:
             return self._jacobian_given(t, x, u, c)
+        return self._across(self._derivative, t, x, u, c)[2 * layout.n_x :].reshape(layout.n_x, layout.n_x)
+
+    def _derivative(self, t: float, x: Array, u: Array, c: Array) -> tuple[Array, float]:
+        """[x, x', dx'/dx row by row] of the projected state, and the weakest pivot there."""
+        n, layout = self.layout.n_q, self.layout
+        values, weakest = self._motion(t, x, u, c)
         terms, position, rate = self._bound(t, u, c)
         residuals = partial(self.residuals, t, u, c)
         given, scales = self.given(t, u, c), self.scales(c)
-        return embedded.jacobian(
+        slopes = embedded.jacobian(
             terms, residuals, position, rate, x[:n], x[n:], scales, layout.rank, layout.independent, given
         )
+        return np.concatenate([values, slopes.ravel()]), weakest
 
     def _input_jacobian(self, t: float, x: Array, u: Array, c: Array) -> Array:
         return self._shift("input_jacobian", self.layout.n_u, t, x, u, c)
@@ -282,10 +341,10 @@ class Drivers:
         return np.asarray(self.position(t, u, c, q)[1] @ v + self.rate(t, u, c, q))
 
     def _project(self, t: float, x: Array, u: Array, c: Array) -> Array:
-        n, space = self.layout.n_q, self.layout.space
-        _, position, rate = self._bound(t, u, c)
-        q, v = projection.project(position, rate, x[:n], x[n:], self.scales(c), self.given(t, u, c))
-        return np.concatenate([q if space is None else space.normalised(q), v])
+        closed, weakest = self._closed(t, x, u, c)
+        moves = "rhs" in self.names and self.layout.projects and (closed != x).any()
+        better = self._better(self._motion, t, x, u, c, weakest) if moves else None
+        return closed if better is None else better[: self.layout.n_x]
 
     def _outputs(self, t: float, x: Array, u: Array, c: Array) -> Array:
         x = self._project(t, x, u, c)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UsageError
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .integrate import Solution
@@ -31,10 +32,19 @@ class Columns:
     x : (n_x, n_t) array
         Projected.
     u : (n_u, n_t) array
+    steps : callable, optional
+        Gives t, x and u of the integrator's steps, where other times are stored.
     """
 
-    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
-        self.module, self.t, self.x, self.u = module, t, x, u
+    def __init__(
+        self,
+        module: Module,
+        t: Array,
+        x: Array,
+        u: Array,
+        steps: Callable[[], tuple[Array, Array, Array]] | None = None,
+    ) -> None:
+        self.module, self.t, self.x, self.u, self._steps = module, t, x, u, steps
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
         self.names = _names(module.layout)
@@ -108,7 +118,13 @@ class Columns:
         """Where the mobility changes on the way."""
         from .change_points import find_change_points
 
-        return find_change_points(self.module, self.t, self.x, self.u)
+        t, x, u = (self.t, self.x, self.u) if self._steps is None else self._steps()
+        if self._steps is not None and not len(t):
+            raise UsageError(
+                "the run took too many steps for all to be kept besides t_eval: run it without t_eval, "
+                "or in parts, for its change points"
+            )
+        return find_change_points(self.module, t, x, u)
 
 
 def record(
@@ -139,7 +155,11 @@ def record(
         "residuals": residuals._asdict(),
         "event_names": list(event_names),
     }
-    columns = Columns(module, solution.t, x, forcing.sample(solution.t, x))
+    steps: Callable[[], tuple[Array, Array, Array]] | None = None
+    if solution.steps is not None:
+        walked = solution.steps
+        steps = lambda: (*walked, forcing.sample(*walked))  # noqa: E731
+    columns = Columns(module, solution.t, x, forcing.sample(solution.t, x), steps)
     header["units"] = _units(module.layout)
     events = [
         project(module, t, found, forcing)[1] for t, found in zip(solution.t_events, solution.x_events, strict=True)

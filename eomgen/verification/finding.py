@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from math import isnan, nan
-from typing import NamedTuple
+from math import isfinite, isnan, nan
+from textwrap import wrap
+from typing import Any, NamedTuple
+
+WIDTH = 118  #: of the table
+HEADER = ("", "check", "worst", "limit", "where")
 
 
 class Finding(NamedTuple):
@@ -26,6 +30,19 @@ class Finding(NamedTuple):
         """Whether the check does not apply to this model; `note` says why."""
         return isnan(self.worst) and isnan(self.limit)
 
+    @property
+    def verdict(self) -> str:
+        """``ok``, ``BREACH`` or ``-`` for a check that was left out."""
+        return "-" if self.left_out else "ok" if self.ok else "BREACH"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as JSON has them: figures that are no numbers are None."""
+        figures = {
+            key: value if isfinite(value) else None for key, value in (("worst", self.worst), ("limit", self.limit))
+        }
+        own = {"check": self.check, "ok": self.ok, "left_out": self.left_out}
+        return own | figures | {"where": self.where, "cases": self.cases, "note": self.note}
+
     @classmethod
     def skipped(cls, check: str, why: str) -> Finding:
         """A check that does not apply."""
@@ -37,8 +54,47 @@ class Verification(NamedTuple):
 
     name: str  #: of the model
     findings: tuple[Finding, ...]
+    seconds: float = 0.0  #: that it took
 
     @property
     def ok(self) -> bool:
         """Whether every check that applies keeps its limit."""
         return all(finding.ok for finding in self.findings)
+
+    @property
+    def breaches(self) -> tuple[Finding, ...]:
+        """The checks that do not keep their limits."""
+        return tuple(finding for finding in self.findings if not finding.ok)
+
+    @property
+    def table(self) -> str:
+        """One line for each check: verdict, worst figure, limit, where; notes below the lines they belong to."""
+        rows = [HEADER, *(_cells(finding) for finding in self.findings)]
+        widths = [max(len(row[k]) for row in rows) for k in range(len(HEADER) - 1)]
+        lines = []
+        for row, note in zip(rows, ("", *(f.note for f in self.findings)), strict=True):
+            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
+            lines.append("  ".join([*cells, row[-1]]).rstrip())
+            indent = " " * (widths[0] + 4)
+            lines += wrap(note, WIDTH, initial_indent=indent, subsequent_indent=indent)
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        checked = [f for f in self.findings if not f.left_out]
+        left_out = len(self.findings) - len(checked)
+        ending = f"{len(checked)} checks, {len(self.breaches)} breaches"
+        ending += f", {left_out} left out" if left_out else ""
+        return f"verification of {self.name}\n\n{self.table}\n\n{'ok' if self.ok else 'BREACH'}: {ending}"
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as JSON has them."""
+        return {"name": self.name, "ok": self.ok, "findings": [f.as_dict() for f in self.findings]}
+
+
+def _cells(finding: Finding) -> tuple[str, ...]:
+    if finding.left_out:
+        return "-", finding.check, "", "", ""
+    return finding.verdict, finding.check, f"{finding.worst:.1e}", f"{finding.limit:.1e}", finding.where

@@ -47,7 +47,9 @@ cdef extern from "eomgen_loop.h" nogil:
         double *pieces
         long notes_room
         double *notes
-        long node, done, stored, n_pieces, n_notes, resets
+        long trail_room
+        double *trail
+        long node, done, stored, n_pieces, n_notes, n_trail, resets
         int begun
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
@@ -101,7 +103,7 @@ cdef class Journey(Stepper):
         As for Stepper.
     plan : dict
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
-        watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
+        trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
         tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
         resets: rows (event, state) of the model's kernel.
 
@@ -115,16 +117,16 @@ cdef class Journey(Stepper):
     cdef eomgen_events events
     cdef object watch, pace, outside
     cdef long seen
-    cdef cnp.ndarray times, states, notes, pieces
+    cdef cnp.ndarray times, states, notes, pieces, walked
     cdef list stored
     cdef double looked
-    cdef long stride
+    cdef long stride, most
     cdef readonly object raised
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef eomgen_journey *journey = &self.journey
-        self.stored, self.raised, self.stride = [[], [], [], []], None, 8
+        self.stored, self.raised, self.stride = [[], [], [], [], []], None, 8
         nodes = self.keep(plan["nodes"], float)
         journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(<cnp.ndarray>nodes), len(nodes)
         journey.span, journey.n_eval = abs(t_bound - t0), -1
@@ -132,6 +134,8 @@ cdef class Journey(Stepper):
             asked = self.keep(plan["t_eval"], float)
             journey.t_eval, journey.n_eval = <const double *>cnp.PyArray_DATA(<cnp.ndarray>asked), len(asked)
         journey.pieces_room = 256 if plan["dense"] else 0
+        self.most = plan.get("trail", 0)
+        journey.trail_room = 256 if self.most > 0 and journey.n_eval >= 0 else 0
         if plan["events"] is not None:
             self.expect(**plan["events"])
         self.allocate(512)
@@ -195,6 +199,10 @@ cdef class Journey(Stepper):
             j.pieces_room = max(room, 256)
             self.pieces = rows(j.pieces_room, 3 + n * (1 + self.method.rows_F))
             j.pieces = <double *>cnp.PyArray_DATA(self.pieces)
+        if j.trail_room > 0:
+            j.trail_room = min(2 * j.trail_room, 1 << 16)
+            self.walked = rows(j.trail_room, 1 + n)
+            j.trail = <double *>cnp.PyArray_DATA(self.walked)
         if j.events != NULL:
             j.notes_room = 4 * self.events.n + room // 4
             self.notes = rows(j.notes_room, 2 + n)
@@ -213,6 +221,14 @@ cdef class Journey(Stepper):
         if j.n_notes:
             self.stored[3].append(self.notes[:j.n_notes])
             j.n_notes = 0
+        if j.n_trail:
+            self.most -= j.n_trail * (1 + self.run.n)
+            if self.most >= 0:
+                self.stored[4].append(self.walked[:j.n_trail])
+            else:  # too many
+                self.stored[4] = [self.walked[:0]]
+                j.trail_room = 0
+            j.n_trail = 0
 
     def travel(self):
         """Go on without the GIL until the end (1), a terminal event (2), an event that waits (3), or a failure (< 0)."""
@@ -231,7 +247,8 @@ cdef class Journey(Stepper):
         cdef cnp.ndarray state = vector(x, self.run.n, "x", ValueError)
         cdef int status
         memcpy(self.run.y, cnp.PyArray_DATA(state), self.run.n * sizeof(double))
-        if self.journey.n_eval < 0 and self.journey.stored + 2 > self.journey.room:
+        if (self.journey.n_eval < 0 and self.journey.stored + 2 > self.journey.room) or (
+                self.journey.trail_room > 0 and self.journey.n_trail + 2 > self.journey.trail_room):
             self.take()
             self.allocate(self.journey.room)
         with nogil:
@@ -258,6 +275,10 @@ cdef class Journey(Stepper):
         notes = np.concatenate(self.stored[3]) if self.stored[3] else np.empty((0, 2 + self.run.n))
         times, states = [parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in pair[:2]]
         return times, states, notes
+
+    def trail(self):
+        """Rows (t, state) of every step, after results(); none if too many, None if they were not to be kept."""
+        return np.concatenate(self.stored[4]) if self.stored[4] else None
 
     def dense(self):
         """The solution between steps, after results(); None if there is none."""

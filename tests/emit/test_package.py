@@ -13,6 +13,7 @@ import pytest
 
 import eomgen.errors
 from eomgen.emit import SourceSet, emit_c, emit_numpy, emit_package
+from eomgen.emit.package import VERIFICATION
 from eomgen.layer import LAYER
 
 ROOT = Path(eomgen.errors.__file__).parent
@@ -88,7 +89,8 @@ def test_the_files_of_each_target(packages):
         for d in ("limits", "numeric", "runtime", "analysis", "ensembles")
         for p in (ROOT / d).glob("*.py")
     }
-    python = {"__init__.py", "__init__.pyi", "model.json", "pyproject.toml", "README.md", "py.typed"}
+    copied |= {f"verification/{name}" for name in VERIFICATION}
+    python = {"__init__.py", "__init__.pyi", "selftest.py", "model.json", "pyproject.toml", "README.md", "py.typed"}
     assert files["numpy"] == copied | python | {"_core.py"}
     assert files["cython"] == copied | python | set(LAYER) | {"setup.py"} | c_files
     for name in copied:

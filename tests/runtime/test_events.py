@@ -339,3 +339,19 @@ def test_a_single_step_passes_over_no_reset(target: str) -> None:
     mod = ball().compile(target=target)
     with pytest.raises(eg.UsageError, match="events of ball reset its state, and a single step watches none"):
         mod.step(0.0, mod.x0(), 0.5)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "LSODA", "Radau"])
+@pytest.mark.parametrize("law", ["reset", "impact"])
+def test_scipys_methods_find_all_events_of_one_instant(law: str, method: str) -> None:
+    """solve_ivp tells of the first alone; the other bodies fell through the floor."""
+    m = eg.Model("three", gravity=(0, -G, 0))
+    for name in "abc":
+        m.prismatic(f"J{name}", m.ground, m.body(name, mass=1.0), axis="y", coordinate=name)
+        reset = {"direction": -1, "reset": {f"{name}_dot": f"-0.5*{name}_dot"}}
+        m.event(f"floor_{name}", name, **(reset if law == "reset" else {"restitution": 0.5}))
+    run = m.compile(target="numpy").simulate(0.8, dict.fromkeys("abc", 1.0), method=method, **TIGHT)
+    fall = np.sqrt(2 / G)
+    after = 0.8 - fall
+    np.testing.assert_allclose(run.x[:3, -1], 0.5 * G * fall * after - 0.5 * G * after**2, atol=1e-7)
+    assert [len(times) for times in run.t_events] == [1, 1, 1]

@@ -41,7 +41,7 @@ class Original:
         Output -> what it is.
     states : (n_x, k) array
     values : (n_y, k) array of outputs
-    reactions, undetermined : (n_joints, 6, k) and (n_joints, 6) arrays or None
+    reactions : (n_joints, 6, k) array or None
     sizes : (n_y, k) array
         The size of what each output is made of.
     force : (k,) array
@@ -56,7 +56,6 @@ class Original:
     states: Array
     values: Array
     reactions: Array | None
-    undetermined: Any
     sizes: Array
     force: Array
     limits: Array
@@ -94,9 +93,6 @@ def observe(
     else:
         limits = np.array([relative_limit(module, x, description, length) for x in states.T])
         reactions = reactions_of(module, states)
-    open_ = None
-    if reactions is not None:
-        open_ = np.any([module.undetermined_reactions(0.0, x) for x in states.T], axis=0)
     force = np.full(states.shape[1], np.finfo(float).tiny)
     if reactions is not None:
         force += np.abs(reactions[:, :3]).max(axis=(0, 1)) + np.abs(reactions[:, 3:]).max(axis=(0, 1)) / length
@@ -104,7 +100,7 @@ def observe(
         number = module.y_names.index("probe_mass")
         linear = [i for i, name in enumerate(module.y_names) if kinds[name] in LINEAR]
         force += np.abs(values[number]) * sizes[linear].max(axis=0, initial=0.0)
-    return Original(description, module, kinds, states, values, reactions, open_, sizes, force, limits, length)
+    return Original(description, module, kinds, states, values, reactions, sizes, force, limits, length)
 
 
 def reactions_of(module: Any, states: Array) -> Array | None:
@@ -147,10 +143,12 @@ def sizes_of(module: Any, kinds: Mapping[str, str], values: Array, states: Array
         return np.abs(values[rows]).max(axis=0) if rows else np.zeros(values.shape[1])
 
     turning = largest(SPIN)
-    speed = largest(SPEED) + length * turning
-    linear = largest(LINEAR) + length * largest(ANGULAR) + length * turning**2
+    speed = largest(SPEED) + length * turning + length
+    # at rest without loads nothing accelerates: a length a second squared is the least size
+    linear = largest(LINEAR) + length * largest(ANGULAR) + length * turning**2 + length
     place = largest(PLACE) + length
-    energy = np.full(values.shape[1], max(float(np.max(largest(("kinetic_energy", "potential_energy")))), 0.0))
+    # potentials are differences of larger numbers: the work of what accelerates the mass over a place
+    energy = float(np.max(largest(("kinetic_energy", "potential_energy")))) + largest(("total_mass",)) * linear * place
     by_kind = dict.fromkeys(LINEAR, linear) | dict.fromkeys(ANGULAR, linear / length)
     by_kind |= dict.fromkeys(SPEED, speed) | dict.fromkeys(SPIN, speed / length) | dict.fromkeys(PLACE, place)
     by_kind |= dict.fromkeys(("kinetic_energy", "potential_energy"), energy)

@@ -1,5 +1,5 @@
-static int jacobian_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                          double *restrict out, double *restrict w)
+static int jacobian_here(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                         double *restrict out, double *restrict weakest, double *restrict w)
 {
     partition parts;
     const int width = N + 1 + M;
@@ -8,6 +8,7 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     int status = close_loops(t, x, u, c, w);
     if (status == 0) {
         status = accelerate(t, u, c, width, &parts, w + AT_ACC, w);
+        *weakest = parts.weakest;
     }
     if (status == 0 && MH < M) {
         status = factor_gram(MH, w + AT_J, CONSTRAINTS_GENTLE, w + AT_GH);

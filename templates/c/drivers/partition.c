@@ -3,6 +3,7 @@ typedef struct {
     int dependent[N];
     int row[N];
     int independent[N];
+    double weakest; /* smallest of the best pivots, relative to the first: of the size of the smallest singular value */
 } partition;
 
 /* Rows [J | -column/s_c | I] of the given width in w + AT_ROWS; the unit matrix only where the width has room. */
@@ -26,28 +27,34 @@ static void form_rows(const double *restrict J, const double *restrict column, i
 static int split(int width, int strict, partition *restrict parts, double *restrict w)
 {
     double *const a = w + AT_ROWS;
-    int spent[M] = {0}, taken[N] = {0}, count = 0;
+    int spent[M] = {0}, taken[N] = {0}, best[M][2], changed[M], count = 0;
     double size = 0.0;
+    for (int i = 0; i < M; i++) {
+        changed[i] = 1;
+    }
     for (int step = 0; step < R; step++) {
-        double best = 0.0, best_any = 0.0;
-        int row = 0, column = 0, row_any = 0, column_any = 0;
+        int rows[2] = {-1, -1};
+        double sizes[2] = {0.0, 0.0};
         for (int i = 0; i < M; i++) {
-            for (int k = 0; k < N && !spent[i]; k++) {
-                const double entry = fabs(a[i * width + k]);
-                if (!taken[k] && entry > best_any) {
-                    best_any = entry, row_any = i, column_any = k;
-                }
-                if (!taken[k] && PREFERRED_DEPENDENT[k] && entry > best) {
-                    best = entry, row = i, column = k;
+            if (changed[i]) {
+                find_best(a + i * width, taken, best[i]);
+            }
+            for (int kind = 0; kind < 2 && !spent[i]; kind++) {
+                const double entry = best[i][kind] < 0 ? 0.0 : fabs(a[i * width + best[i][kind]]);
+                if (entry > sizes[kind]) {
+                    sizes[kind] = entry, rows[kind] = i;
                 }
             }
         }
-        size = step == 0 ? best_any : size;
-        if (!strict && (best < 0.01 * best_any || best == 0.0)) {
-            best = best_any, row = row_any, column = column_any;
-        }
-        if (!(best > (strict ? CONSTRAINTS_CHOSEN : CONSTRAINTS_STATE) * size)) {
+        size = step == 0 ? sizes[0] : size;
+        parts->weakest = step == 0 ? 1.0 : fmin(parts->weakest, sizes[0] / size);
+        const int kind = strict || (sizes[1] >= 0.01 * sizes[0] && sizes[1] > 0.0);
+        if (!(sizes[kind] > (strict ? CONSTRAINTS_CHOSEN : CONSTRAINTS_STATE) * size)) {
             return EOMGEN_PARTITION_BAD;
+        }
+        const int row = rows[kind], column = best[row][kind];
+        for (int i = 0; i < M; i++) { /* what elimination leaves as it is needs no search again */
+            changed[i] = a[i * width + column] != 0.0;
         }
         eliminate(a, width, row, column);
         parts->dependent[step] = column, parts->row[step] = row;

@@ -1,11 +1,6 @@
 static int rhs_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
                      double *restrict out, double *restrict w)
 {
-    partition parts;
-    int status = close_loops(t, x, u, c, w);
-    if (status == 0) {
-        status = accelerate(t, u, c, N + 1, &parts, out + NQ, w);
-    }
-    form_rates(w + AT_X, w + AT_V, out);
-    return status;
+    double weakest;
+    return rhs_here(t, x, u, c, out, &weakest, w);
 }

@@ -50,7 +50,9 @@ typedef struct {
     double *pieces;
     long notes_room;       /* rows in notes, at least 2 n beyond those there. A row: event, t, state (n) */
     double *notes;
-    long node, done, stored, n_pieces, n_notes, resets; /* start at 0; the caller may take rows and set back the last four */
+    long trail_room;       /* rows in trail, 0: not wanted. A row: t and the state at every step where n_eval times are stored */
+    double *trail;
+    long node, done, stored, n_pieces, n_notes, n_trail, resets; /* start at 0; the caller may take rows and set back their counts */
     int begun, ended;
 } eomgen_journey;
 

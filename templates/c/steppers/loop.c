@@ -11,6 +11,18 @@ static void store(const eomgen_run *run, eomgen_journey *j, double t, const doub
     j->stored++;
 }
 
+/* A step, or a state after a reset, where every step is stored or followed. */
+static void store_step(const eomgen_run *run, eomgen_journey *j)
+{
+    if (j->n_eval < 0) {
+        store(run, j, run->t, run->y);
+    } else if (j->trail_room > 0) {
+        double *const row = j->trail + j->n_trail++ * (1 + run->n);
+        row[0] = run->t;
+        memcpy(row + 1, run->y, (size_t)run->n * sizeof(double));
+    }
+}
+
 /* Begin the part that ends at the next corner. */
 static void set_out(eomgen_run *run, const eomgen_journey *j)
 {
@@ -28,9 +40,8 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         j->events->last_reset = NAN;
         eomgen_arm(run, j->events);
     }
-    if (j->n_eval < 0) {
-        store(run, j, run->t, run->y);
-    } else if (j->n_eval > 0 && j->t_eval[0] == run->t) {
+    store_step(run, j);
+    if (j->n_eval > 0 && j->t_eval[0] == run->t) {
         store(run, j, run->t, run->y);
         j->done++;
     }
@@ -51,9 +62,7 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
     eomgen_events *const ev = j->events;
     run->h_abs = 0.0;
     eomgen_start(method, run);
-    if (j->n_eval < 0) {
-        store(run, j, run->t, run->y);
-    }
+    store_step(run, j);
     ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
     ev->last_reset = run->t;
     j->resets++;
@@ -114,9 +123,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         memcpy(run->y, j->events->y, (size_t)run->n * sizeof(double));
         run->t = t;
     }
-    if (j->n_eval < 0) {
-        store(run, j, run->t, run->y);
-    }
+    store_step(run, j);
     if (stop == 2) {
         return EOMGEN_TERMINAL;
     }
@@ -135,6 +142,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     }
     while (run->direction * (run->t - j->nodes[j->n_nodes - 1]) < 0.0) {
         if ((j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
+            (j->trail_room > 0 && j->n_trail + 2 > j->trail_room) ||
             (j->events != NULL && j->n_notes + 2 * j->events->n > j->notes_room)) {
             return EOMGEN_FULL;
         }

@@ -17,11 +17,20 @@ static int close_directly(double t, double *restrict q, const double *restrict u
     return EOMGEN_PROJECTION_FAILED;
 }
 
-static int rhs_driver(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                     double *restrict out, double *restrict w)
+/* The nearest q with C(q) = 0, in place. */
+static int bring(double t, double *restrict q, const double *restrict u, const double *restrict c, double *restrict w)
+{
+    return close_directly(t, q, u, c, w) == 0 ? 0 : close_position(t, q, u, c, w);
+}
+
+/* x'; leaves the state on the constraints in w + AT_X. *weakest: as in partition, 1 where it is surely not small. */
+static int rhs_here(double t, const double *restrict x, const double *restrict u, const double *restrict c,
+                    double *restrict out, double *restrict weakest, double *restrict w)
 {
     double *const y = w + AT_X;
     const double *const found = w + AT_DYNAMICS;
+    partition parts;
+    parts.weakest = 1.0;
     for (int k = 0; k < NQ + N; k++) {
         y[k] = x[k];
     }
@@ -33,14 +42,16 @@ static int rhs_driver(double t, const double *restrict x, const double *restrict
                 y[NQ + k] = found[k];
                 out[NQ + k] = found[N + k];
             }
+            *weakest = found[2 * N + 1] != 0.0 ? 1.0 : find_weakest(t, y, u, c, &parts, w);
             return 0;
         }
     }
-    partition parts; /* far away, or the preferred coordinates do not move the mechanism well here */
+    /* far away, or the preferred coordinates do not move the mechanism well here */
     int status = close_loops(t, x, u, c, w);
     if (status == 0) {
         status = accelerate(t, u, c, N + 1, &parts, out + NQ, w);
     }
     form_rates(w + AT_X, w + AT_V, out);
+    *weakest = parts.weakest;
     return status;
 }

@@ -1,0 +1,29 @@
+"""Stage cli, verify: model file -> the table of everything its module was compared with, and an exit code."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from .analysis import Prepared, analysis_options
+from .failures import BREACH
+from .screen import print_json, stage
+
+
+@click.command()
+@analysis_options
+@click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")
+def verify(work: Prepared, states: int, seed: int, as_json: bool) -> None:
+    """Compare a compiled model with its graph, 50 digits and free bodies; exits with 5 where a limit is broken."""
+    from ..verification.verify import verify_model
+
+    with stage("verify"):
+        found = verify_model(work.model, work.module, states=states, seed=seed)
+    if as_json:
+        heading = {"name": work.equations.name, "method": work.equations.method}
+        print_json(heading | found.as_dict() | {"seconds": round(found.seconds, 3)})
+    else:
+        click.echo(str(found))
+    sys.exit(0 if found.ok else BREACH)

@@ -1,0 +1,148 @@
+"""Stage verification, cases: a module -> random states on its constraints, with random parameters and inputs.
+
+The states lie at or near the branch of the declared initial position; parameters differ from the declared ones by a few
+per cent, as far as loops still close and keep their freedoms.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..errors import EomgenError
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+SPREAD = 0.03  #: relative spread of parameters
+ANGLE, LENGTH = 0.4, 0.2  #: spread of coordinates: rad, and parts of the model's length
+SPEED = 1.0  #: spread of velocities: rad/s, and lengths of the model per second
+LATEST = 0.5  #: latest time (s)
+CLOSED = 1e-9  #: scaled residual of a state that counts as closed
+HALVINGS = 8  #: of the way from the reference position, until it closes
+
+
+class Case(NamedTuple):
+    """One state with everything that kernels take."""
+
+    number: int
+    t: float
+    x: Array
+    a: Array  #: any accelerations, not those of the motion
+    p: Array
+    u: Array
+    n_q: int
+
+    @property
+    def q(self) -> Array:
+        """Coordinates."""
+        return self.x[: self.n_q]
+
+    @property
+    def v(self) -> Array:
+        """Velocities."""
+        return self.x[self.n_q :]
+
+
+def random_cases(module: Module, count: int, seed: int = 0) -> list[Case]:
+    """States that move, on the constraints.
+
+    Parameters
+    ----------
+    module : Module
+    count : int
+    seed : int
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close at the declared values either.
+    """
+    rng = np.random.default_rng(seed)
+    geometric = _geometric(module, rng)
+    found = [draw(module, rng, geometric, k) for k in range(count)]
+    return found
+
+
+def draw(module: Module, rng: np.random.Generator, geometric: Array, number: int) -> Case:
+    """One state; parameters that keep the loops closed are tried first, then those that do not touch them."""
+    t = float(rng.uniform(0.0, LATEST))
+    spread = 1.0 + SPREAD * rng.standard_normal(module.n_p).clip(-2.0, 2.0)
+    u = module.u + 0.5 * rng.standard_normal(module.n_u) * (1.0 + np.abs(module.u))
+    kept = np.where(geometric, module.p, module.p * spread)
+    for p, inputs in ((module.p * spread, u), (kept, u), (kept, module.u), (module.p, module.u)):
+        for _ in range(3):
+            x = _state(module, rng, t, p, inputs)
+            if x is not None:
+                a = rng.standard_normal(module.n_v) * _sizes(module, module.layout.velocity_kinds)
+                return Case(number, t, x, a, p, inputs, module.n_q)
+    x = module.x0(t=0.0)
+    a = rng.standard_normal(module.n_v) * _sizes(module, module.layout.velocity_kinds)
+    return Case(number, 0.0, module.project(x, t=0.0), a, module.p, module.u, module.n_q)
+
+
+def _sizes(module: Module, kinds: tuple[str, ...]) -> Array:
+    length = float(module.metadata.get("length_scale") or 1.0)
+    return np.array([length if kind == "length" else 1.0 for kind in kinds])
+
+
+def _geometric(module: Module, rng: np.random.Generator) -> Array:
+    """Which parameters the holonomic constraints depend on."""
+    here = np.zeros(module.n_p, dtype=bool)
+    if not module.n_rows:
+        return here
+    q = module.layout.q_reference + 0.1 * rng.standard_normal(module.n_q)
+    x = np.concatenate([q, rng.standard_normal(module.n_v)])
+
+    def rows(p: Array) -> Array:
+        return np.concatenate(
+            [module.constraints(q, p=p, t=0.1, rows="all"), module.velocity_constraints(x, p=p, t=0.1, rows="all")]
+        )
+
+    before = rows(module.p)
+    for k in range(module.n_p):
+        p = module.p
+        p[k] = p[k] * 1.01 + (0.01 if p[k] == 0.0 else 0.0)
+        here[k] = bool((rows(p) != before).any())
+    return here
+
+
+def _state(module: Module, rng: np.random.Generator, t: float, p: Array, u: Array) -> Array | None:
+    """A closed state that can be evaluated, or None."""
+    layout = module.layout
+    q_kinds = layout.coordinate_kinds
+    shift = rng.standard_normal(module.n_q) * np.array([LENGTH if kind == "length" else ANGLE for kind in q_kinds])
+    shift *= _sizes(module, q_kinds)
+    v = SPEED * rng.standard_normal(module.n_v) * _sizes(module, layout.velocity_kinds)
+    try:
+        reference = module.x0(t=t, p=p, u=u)[: module.n_q]
+    except EomgenError:
+        return None
+    for k in range(HALVINGS):
+        try:
+            x = module.project(np.concatenate([reference + shift * 0.5**k, v]), t=t, p=p, u=u)
+            if _closed(module, x, t, p, u) and np.isfinite(module.rhs(t, x, p=p, u=u)).all():
+                return x
+        except EomgenError:
+            continue
+    return None
+
+
+def _closed(module: Module, x: Array, t: float, p: Array, u: Array) -> bool:
+    """Whether all rows hold, redundant ones too, no axis is flipped, and the rank is that of the reference."""
+    q, layout = x[: module.n_q], module.layout
+    if not module.n_rows:
+        return True
+    scales = layout.scales
+    residual = np.abs(scales.residual(module.constraints(q, p=p, u=u, t=t, rows="all")))
+    rate = np.abs(module.velocity_constraints(x, p=p, u=u, t=t, rows="all"))
+    if residual.max(initial=0.0) > CLOSED or rate.max(initial=0.0) > CLOSED * (1.0 + np.abs(x).max()):
+        return False
+    if layout.n_a and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
+        return False
+    J = scales.jacobian(module.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
+    values = np.linalg.svd(J, compute_uv=False)
+    rank = module.n_v - module.n_dof
+    return bool(values[rank - 1] > 1e-3 * values[0]) if rank and rank <= len(values) else True

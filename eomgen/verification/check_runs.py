@@ -1,0 +1,220 @@
+"""Stage verification, check runs: the generated steppers over single steps and short runs.
+
+The judge is SciPy's DOP853 with tight tolerances on the plain right-hand side (E. Hairer, S. P. Norsett, G. Wanner,
+Solving Ordinary Differential Equations I, 2nd ed. 1993, sec. II.3 and II.10): the error of one step of a method of
+order p is of order h^(p + 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import EomgenError, SimulationError
+from ..graph.traverse import reachable
+from ..numeric.scales import Array
+from ..runtime.names import require
+from .bench import Bench
+from .cases import Case
+from .comparison import Comparison, size_of
+from .finding import Finding
+
+ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
+SHORT = (
+    0.5  #: by how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others
+)
+JUDGED = 3  #: states that single steps are taken from
+LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
+LOOSE = 1e6  #: tolerance that accepts every step
+TIGHT = {"rtol": 1e-13, "atol": 1e-16}
+KINKED = frozenset({"abs", "sign", "min", "max", "lt", "le", "select"})  #: operations with kinks
+LONG = 2.0  #: length of a run, in times in which the state changes by its own size
+FIRST = 4.0  #: the first step tried, in the same times
+MOST = 3000  #: evaluations of a run that is smooth
+EVEN = 0.1  #: shortest step of a smooth run beside its longest: shorter ones pass by a singular position
+SMALLEST = 14  #: halvings of the step
+
+Judge = Callable[[float], Array]  #: h -> the state a time h later
+
+
+def check(bench: Bench) -> list[Finding]:
+    """Orders of the steppers, methods against each other, energy and loops of a short run."""
+    why = _inapplicable(bench)
+    if why:
+        return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
+    kinked = _kinked(bench)
+    judges = [(case, cache(_judge(bench, case))) for case in bench.cases[:JUDGED]]
+    found = [_order(bench, method, judges) for method in ORDERS if method in _methods(bench)]
+    if not found:
+        found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
+    end = _far(bench, *judges[0])
+    found += [_agreement(bench, *end), _energy(bench, end[0])]
+    why = "its forces have kinks or tables, at which no method keeps its order"
+    return [
+        f if f.ok or not kinked or f.check.startswith("runs: energy") else Finding.skipped(f.check, why) for f in found
+    ]
+
+
+def _inapplicable(bench: Bench) -> str:
+    if not bench.module.n_dof:
+        return "drivers move all of it, and nothing is integrated"
+    if bench.layout.n_resets:
+        return "events reset its state"
+    if not bench.layout.projects:
+        return "derived with baumgarte="
+    return ""
+
+
+def _kinked(bench: Bench) -> bool:
+    """Whether right-hand sides may have kinks, where methods need not keep their order."""
+    terms = bench.terms
+    nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
+    return any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes)
+
+
+def _methods(bench: Bench) -> tuple[str, ...]:
+    from ..runtime.late import eager
+
+    known = tuple(getattr(eager(bench.module.core), "methods", ()))
+    return (*known, "RK4") if known else ()
+
+
+def _pace(bench: Bench, case: Case) -> float:
+    """A time in which the state changes by about its own size (s): 1 / |eigenvalue of largest size|."""
+    J = bench.slopes(case)
+    fastest = float(np.abs(np.linalg.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
+    speed = float(np.abs(case.v / bench.layout.scales.q).max(initial=0.0))
+    return 1.0 / max(fastest, speed, 1e-3)
+
+
+def _judge(bench: Bench, case: Case) -> Judge:
+    """The state a time after the case, by SciPy; on the constraints."""
+    integrate = require("scipy.integrate", "scipy", "verify")
+    bound = bench.module.bind(case.p, case.u)
+
+    def at(h: float) -> Array:
+        left = MOST
+
+        def rhs(t: float, x: Array) -> Array:
+            nonlocal left
+            left -= 1
+            if not left:
+                raise SimulationError(f"more than {MOST} evaluations for a run of {h:g} s")
+            return bound.rhs(t, x)
+
+        run = integrate.solve_ivp(rhs, (case.t, case.t + h), case.x, method="DOP853", **TIGHT)
+        steps = np.diff(run.t)[2:-1]
+        if not run.success or (steps.size and steps.min() < EVEN * steps.max()):
+            raise SimulationError(f"no run of {h:g} s: {run.message}")
+        return bound.project(run.y[:, -1], t=case.t + h)
+
+    return at
+
+
+def _far(bench: Bench, case: Case, judge: Judge) -> tuple[float, Array]:
+    """How long a smooth run from the case can be (s), and where it ends.
+
+    Raises
+    ------
+    SimulationError
+        None is possible.
+    """
+    h = LONG * _pace(bench, case)
+    for _ in range(SMALLEST):
+        try:
+            return h, judge(h)
+        except EomgenError:
+            h *= 0.5
+    raise SimulationError(f"no run from state {case.number} succeeds, however short")
+
+
+def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> Finding:
+    """Between a step h and h/2 the error falls by 2^(p + 1), until it is lost in rounding.
+
+    The mean over three halvings counts, and the best of three states: a fault of the method shows at each, an error
+    that changes its sign at one.
+    """
+    check, order = f"steppers: order of {method}", ORDERS[method]
+    found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
+    observed: list[tuple[float, int]] = []
+    for case, judge in judges:
+        bound = bench.module.bind(case.p, case.u)
+        size = size_of(case.x) + size_of(bench.rhs(case)) * _pace(bench, case)
+        lost = 30.0 * TIGHT["rtol"] * size
+        errors: list[float] = []
+        h = FIRST * _pace(bench, case)
+        for _ in range(SMALLEST):
+            try:
+                if method == "RK4":
+                    end = bound.project(bound.step(case.t, case.x, h), t=case.t + h)
+                else:
+                    stepper = bound.integrator(method=method, rtol=LOOSE, atol=LOOSE, first_step=h, max_step=h)
+                    end = stepper(case.t, case.x, h)
+                errors.append(float(np.abs(end - judge(h)).max()))
+            except EomgenError:
+                errors.append(np.inf)
+            h *= 0.5
+            if errors[-1] < lost:
+                break
+        slopes = [np.log2(a / b) for a, b in pairwise(errors) if a < LARGE * size and b > lost]
+        if slopes:
+            observed.append((max(0.0, order + 1 - float(np.mean(slopes[-3:]))), case.number))
+    if not observed:
+        return Finding.skipped(check, "one step is exact to rounding, or no two steps' errors can be told from it")
+    best, number = min(observed)
+    found.add(number, [best], SHORT)
+    return found.finding()
+
+
+def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
+    """DOP853, RK45 and Radau at tight tolerances end where SciPy's DOP853 does."""
+    check, case = "runs: methods agree", bench.cases[0]
+    methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(bench)] or ["DOP853"]
+    bound = bench.module.bind(case.p, case.u)
+    found = Comparison(check, ", ".join(methods))
+    size = size_of(expected)
+    for method in methods:
+        rtol = 1e-10
+        end = bound.integrator(method=method, rtol=rtol, atol=1e-3 * rtol * size)(case.t, case.x, h)
+        found.add(0, end - expected, 1e3 * rtol * size, size, [f"{method} {name}" for name in bench.layout.x])
+    found.cases = 1
+    return found.finding()
+
+
+def _energy(bench: Bench, h: float) -> Finding:
+    """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
+    module, case = bench.module, bench.cases[0]
+    found = Comparison("runs: energy and loops")
+    bound = module.bind(case.p, case.u)
+    rtol = 1e-10
+    run = bound.simulate((case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=1e-13)
+    residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))
+                 for t, x in zip(run.t, run.x.T, strict=True)]  # fmt: skip
+    found.add(0, [max(residuals, default=0.0)], [1e-10], 1.0, ["loops"])
+    if _conservative(bench):
+        E = np.array([bound.energy(x, t=t) for t, x in zip(run.t, run.x.T, strict=True)])
+        size = float(np.abs(E[:, 0]).max() + np.abs(E[:, 1] - E[0, 1]).max()) or 1.0
+        found.add(0, [np.abs(E.sum(axis=1) - E[0].sum()).max()], [1e3 * rtol * size], size, ["energy"])
+        found.note = "energy and loops"
+    else:
+        found.note = "loops; forces, drivers or inputs do work"
+    found.cases = 1
+    return found.finding()
+
+
+def _conservative(bench: Bench) -> bool:
+    kinematics, terms = bench.kinematics, bench.terms
+    if bench.mechanism.bare or any(f.marker_remainder or f.coordinate_remainder for f in kinematics.forces):
+        return False
+    moving = [x for x in terms.constraint_rate if not x.is_zero]
+    return not moving and terms.t not in _symbols(bench) and not set(terms.u) & _symbols(bench)
+
+
+def _symbols(bench: Bench) -> set[str]:
+    from ..graph.substitute import symbols_of
+
+    terms = bench.terms
+    return symbols_of([terms.kinetic, terms.potential, *terms.bias])

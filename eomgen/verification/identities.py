@@ -1,0 +1,216 @@
+"""Stage verification, identities: a module alone -> what must hold between its own results, whatever the model is.
+
+Nothing but the module and NumPy is needed, so that exported packages carry these checks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import EomgenError
+from ..numeric.definite import correlated
+from ..numeric.scales import Array
+from .cases import CLOSED, Case
+from .comparison import Comparison, failed, size_of
+from .differences import extrapolate
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+EPS = float(np.finfo(float).eps)
+#: Rounding of a kernel relative to its largest entry, where the size of the terms behind it is not known: sums of some
+#: hundred products.  Checks that know the graph have bounds of their own.
+KERNEL = 256.0 * EPS
+
+Check = Callable[["Module", Sequence[Case]], Finding]
+
+
+def identities(module: Module, cases: Sequence[Case]) -> list[Finding]:
+    """All of them; one that cannot be carried out fails."""
+    found = []
+    for name, check in CHECKS.items():
+        try:
+            found.append(check(module, cases))
+        except EomgenError as error:
+            found.append(failed(name, error))
+    return found
+
+
+def _mass(module: Module, c: Case) -> Array:
+    return module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+
+
+def _jacobian(module: Module, c: Case) -> Array:
+    return module.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)
+
+
+def _definite(module: Module, cases: Sequence[Case]) -> Finding:
+    """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
+    check = "embedded_mass_matrix: symmetric, positive definite"
+    if not module.n_dof or module.layout.given_rates:
+        return Finding.skipped(check, "there is no degree of freedom" if not module.n_dof else "equations are given")
+    if module.metadata.get("indefinite"):
+        return Finding.skipped(check, "the model allows masses and inertias that no body has")
+    found = Comparison(check, "asymmetry; or the smallest eigenvalue at unit diagonal, sign reversed")
+    for c in cases:
+        M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
+        found.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
+        smallest = float(np.linalg.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
+        found.add(c.number, [max(0.0, -smallest)], [0.0])
+    return found.finding()
+
+
+def _kinetic(module: Module, cases: Sequence[Case]) -> Finding:
+    check = "energy: T = v M v / 2"
+    if not module.n_bodies:
+        return Finding.skipped(check, "there are no bodies")
+    found = Comparison(check)
+    for c in cases:
+        T, expected = float(module.energy(c.x, p=c.p, u=c.u, t=c.t)[0]), float(c.v @ _mass(module, c) @ c.v) / 2.0
+        size = float(np.abs(c.v) @ np.abs(_mass(module, c)) @ np.abs(c.v)) / 2.0
+        found.add(c.number, [T - expected], [KERNEL * size], size)
+    return found.finding()
+
+
+def _inverse(module: Module, cases: Sequence[Case]) -> Finding:
+    found = Comparison("inverse_dynamics: M a + h")
+    for c in cases:
+        M, h = _mass(module, c), module.bias(c.t, c.x, p=c.p, u=c.u)
+        expected = module.inverse_dynamics(c.q, c.v, c.a, p=c.p, u=c.u, t=c.t)
+        size = size_of(np.abs(M) @ np.abs(c.a) + np.abs(h))
+        found.add(c.number, M @ c.a + h - expected, KERNEL * size, size, module.v_names)
+    return found.finding()
+
+
+def _rates(module: Module, q: Array, v: Array) -> Array:
+    space = module.layout.space
+    return v if space is None else space.rates(q, v)
+
+
+def _slopes(module: Module, cases: Sequence[Case]) -> Finding:
+    """C_q N of each velocity; C of Euler parameters off their unit length is a function like any other."""
+    check = "constraint_jacobian: extrapolated differences"
+    if not module.n_rows or module.layout.given_rates:
+        return Finding.skipped(check, "there are no constraints" if not module.n_rows else "equations are given")
+    found, n_h = Comparison(check), module.layout.n_h
+    for c in cases:
+        C = module.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t, rows="all")[:n_h]
+        for j, scale in enumerate(module.layout.scales.q):
+            way = _rates(module, c.q, np.eye(module.n_v)[j]) * scale
+            slope, error = extrapolate(_along_q(module, c, way), KERNEL * size_of(C) * size_of(c.q))
+            size = size_of(C) * scale
+            found.add(c.number, slope - C[:, j] * scale, error + KERNEL * size, size, module.constraint_labels[:n_h])
+    found.cases = len(cases)
+    return found.finding()
+
+
+def _along_q(module: Module, c: Case, way: Array) -> Callable[[float], Array]:
+    return lambda s: module.constraints(c.q + s * way, p=c.p, u=c.u, t=c.t, rows="all")
+
+
+def _projection(module: Module, cases: Sequence[Case]) -> Finding:
+    """Projected twice is projected once; loops are closed there, and at ``x0``."""
+    found, scales = Comparison("project: idempotent, loops closed, as x0 leaves them"), module.layout.scales
+    for c in cases:
+        x = module.project(c.x, t=c.t, p=c.p, u=c.u)
+        again = module.project(x, t=c.t, p=c.p, u=c.u)
+        found.add(c.number, again - x, CLOSED * size_of(x), size_of(x), module.x_names)
+        for state, t, p, u in ((x, c.t, c.p, c.u), (module.x0(), 0.0, module.p, module.u)):
+            gap = scales.residual(module.constraints(state[: module.n_q], t=t, p=p, u=u, rows="all"))
+            found.add(c.number, gap, CLOSED, 1.0, module.constraint_labels[: module.layout.n_h])
+    found.cases = len(cases)
+    return found.finding()
+
+
+def _balance(module: Module, cases: Sequence[Case]) -> Finding:
+    """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
+    found = Comparison("rhs: forces in balance along free motions")
+    for c in cases:
+        a = module.rhs(c.t, c.x, p=c.p, u=c.u)[module.n_q :]
+        M, h, C = _mass(module, c), module.bias(c.t, c.x, p=c.p, u=c.u), _jacobian(module, c)
+        scale = module.layout.scales.q
+        free = _null(C * scale) * scale[:, None]
+        size = np.abs(free).T @ (np.abs(M) @ np.abs(a) + np.abs(h))
+        condition = _condition(M, C, scale)
+        found.add(c.number, free.T @ (M @ a + h), KERNEL * condition * size + 1e-300, size_of(size))
+    return found.finding()
+
+
+def _null(J: Array) -> Array:
+    """Orthonormal columns that J (m, n) of full rank m maps to zero."""
+    n = J.shape[1]
+    return np.linalg.svd(J)[2][len(J) :].T if len(J) else np.eye(n)
+
+
+def _condition(M: Array, C: Array, scale: Array) -> float:
+    """Condition of C scaled, times that of the embedded matrix at unit diagonal."""
+    free = _null(C * scale) * scale[:, None]
+    own = np.linalg.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
+    rows = np.linalg.norm(C * scale, axis=1)
+    return float(own * (np.linalg.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
+
+
+def _holding(module: Module, cases: Sequence[Case]) -> Finding:
+    """d/dt (C_q v + C_t) = 0 along x' = rhs."""
+    check = "rhs: constraints go on holding"
+    if not module.n_rows or not module.layout.projects:
+        return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
+    found = Comparison(check)
+    for c in cases:
+        rate = module.rhs(c.t, c.x, p=c.p, u=c.u)
+        pace = 1.0 / max(size_of(rate), 1.0)
+        C = _jacobian(module, c)
+        size = size_of(np.abs(C) @ np.abs(rate[module.n_q :])) * pace
+        condition = _condition(_mass(module, c), C, module.layout.scales.q)
+        noise = KERNEL * size_of(np.abs(C) @ np.abs(c.v))
+        slope, error = extrapolate(_along_x(module, c, rate, pace), noise)
+        found.add(c.number, slope, error + KERNEL * condition * size, max(size, noise))
+    return found.finding()
+
+
+def _along_x(module: Module, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
+    def f(s: float) -> Array:
+        x, t = c.x + s * pace * rate, c.t + s * pace
+        return module.velocity_constraints(x, p=c.p, u=c.u, t=t)
+
+    return f
+
+
+def _minimal(module: Module, cases: Sequence[Case]) -> Finding:
+    check, layout = "minimal: the same accelerations", module.layout
+    try:
+        layout.require_minimal_form()
+    except EomgenError:
+        return Finding.skipped(check, "positions do not follow from independent coordinates")
+    if not module.n_dof or not layout.projects:
+        return Finding.skipped(
+            check, "there is no degree of freedom" if not module.n_dof else "derived with baumgarte="
+        )
+    found = Comparison(check)
+    for c in cases:
+        bound = module.bind(c.p, c.u)
+        minimal = bound.minimal
+        minimal.reset(c.q)
+        full = minimal.reduce(bound.rhs(c.t, c.x))
+        own = minimal.rhs(c.t, minimal.reduce(c.x))
+        condition = _condition(_mass(module, c), _jacobian(module, c), layout.scales.q)
+        size = size_of(bound.rhs(c.t, c.x))
+        found.add(c.number, own - full, CLOSED * condition * size, size, minimal.x_names)
+    return found.finding()
+
+
+#: Name -> check; the name is what a check that raises is told by.
+CHECKS: dict[str, Check] = {
+    "embedded_mass_matrix: symmetric, positive definite": _definite,
+    "energy: T = v M v / 2": _kinetic,
+    "inverse_dynamics: M a + h": _inverse,
+    "constraint_jacobian: extrapolated differences": _slopes,
+    "project: idempotent, loops closed, as x0 leaves them": _projection,
+    "rhs: forces in balance along free motions": _balance,
+    "rhs: constraints go on holding": _holding,
+    "minimal: the same accelerations": _minimal,
+}

@@ -1,0 +1,52 @@
+"""Stage verification, recorded: the figures that came with an exported package -> how far its kernels are from them.
+
+They are of the graph that the package was generated from, in double arithmetic, written when it was generated.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+from ..runtime.layout import KERNELS
+from .comparison import Comparison, size_of
+from .finding import Finding
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+FILE = "selftest.json"  #: in the folder of the package
+
+
+def recorded_findings(module: Module, file: Path | None = None) -> list[Finding]:
+    """One finding for each kernel with figures; none where there is no file of them."""
+    place = Path(__file__).parents[1] / FILE if file is None else file
+    if not place.is_file():
+        return []
+    data: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
+    if data["name"] != module.name:
+        return []
+    return [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
+
+
+def _compare(module: Module, name: str, figures: list[dict[str, Any]], states: list[dict[str, Any]]) -> Finding:
+    found = Comparison(f"{name}: recorded figures")
+    for number, (state, figure) in enumerate(zip(states, figures, strict=True)):
+        given = {key: np.array(value, dtype=float) for key, value in state.items()}
+        expected = np.array(figure["values"], dtype=float)
+        actual = _call(module, name, given).ravel()
+        found.add(number, actual - expected, figure["bound"], size_of(expected))
+    return found.finding()
+
+
+def _call(module: Module, name: str, given: dict[str, Array]) -> Array:
+    q, v, t = given["q"], given["v"], float(given["t"])
+    p, u = given["p"], given["u"]
+    takes = KERNELS[name][0]
+    if takes == "motion":
+        return np.asarray(module.kernels.motion(name)(q, v, given["a"], p=p, u=u, t=t))
+    return np.asarray(module.kernels.state(name)(q if takes == "q" else np.concatenate([q, v]), p=p, u=u, t=t))

@@ -1,0 +1,20 @@
+"""Stage verification, selftest: an exported package -> a table of its checks on the screen, and an exit code."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from .verify import verify
+
+if TYPE_CHECKING:
+    from ..runtime.module import Module
+
+BREACH = 5  #: exit code of a verification that failed
+
+
+def main(module: Module) -> None:
+    """Print the verification of a module, and leave with 0 or 5."""
+    found = verify(module)
+    print(found)
+    sys.exit(0 if found.ok else BREACH)
