@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from mutations import c_code, derivation, elements, emitters, numerics, runtime
+from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, runtime
 
 FAULTS = (
     *derivation.FAULTS,
     *elements.FAULTS,
     *numerics.FAULTS,
     *emitters.FAULTS,
-    *c_code.FAULTS,
+    *c_drivers.FAULTS,
+    *c_steppers.FAULTS,
     *runtime.FAULTS,
 )
