@@ -128,7 +128,7 @@ def test_residuals_stay_in_metres_and_radians():
 
 @pytest.mark.parametrize("target", ["numpy", "cython"])
 def test_a_relation_that_parameters_leave_idle_holds_nothing(target):
-    """3 k - l = 6e-17 for k = 0.1 and l = 0.3 is rounding of terms of size 0.3: the pendulum beside a gear swings on."""
+    """3 k - l = 6e-17 for k = 0.1 and l = 0.3 is rounding of terms of 0.3: the pendulum beside a gear swings on."""
     m = eg.Model("idle", gravity=(0, -9.81, 0))
     m.parameter("k", 0.1), m.parameter("l", 0.3)
     for name in "ABC":

@@ -224,10 +224,8 @@ def test_euler_parameters_are_projected_by_the_least_turn(make: Callable[[str], 
         off[i : i + 4] = (Rotation.from_quat(x[i : i + 4], scalar_first=True) * turn).as_quat(scalar_first=True)
     closed = library.fine("project", off)
     assert np.abs(module.constraints(closed[:n_q])).max() <= 1e-13
-    steps = [
-        (Rotation.from_quat(off[i : i + 4], scalar_first=True).inv() * Rotation.from_quat(closed[i : i + 4], scalar_first=True)).as_rotvec()
-        for i, _ in balls
-    ]  # fmt: skip
+    pairs = [[Rotation.from_quat(q[i : i + 4], scalar_first=True) for q in (off, closed)] for i, _ in balls]
+    steps = [(before.inv() * after).as_rotvec() for before, after in pairs]
     step, C_q = np.concatenate(steps), module.constraint_jacobian(closed[:n_q])[0]
     across = step - C_q * (C_q @ step) / (C_q @ C_q)
     assert np.abs(across).max() <= 1e-3 * np.abs(step).max()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,7 +65,8 @@ static int keep(const double *p, double *c)
 int main(void)
 {
     static const eomgen_series series = {23, 0, NULL};
-    static const eomgen_model model = {.n_p = 1, .n_u = 1, .n_const = 1, .n_work = 2, .precompute = keep, .series = &series};
+    static const eomgen_model model = {
+        .n_p = 1, .n_u = 1, .n_const = 1, .n_work = 2, .precompute = keep, .series = &series};
     const eomgen_method *const methods[4] = {&eomgen_dop853, &eomgen_rk45, &eomgen_rk23, &eomgen_taylor};
     const double rtol[4] = {1e-8, 1e-8, 1e-6, 1e-10}, atol[N] = {1e-9, 1e-9};
     double p[COUNT], x0[COUNT * N], u[COUNT], t_eval[EVAL], samples[COUNT * EVAL * N], x[COUNT * N], t[COUNT];
@@ -87,8 +87,9 @@ int main(void)
         eomgen_ensemble e = {.method = methods[i], .model = &model, .rhs = swing, .series = &series,
             .lane_rhs = (void (*)(void))swing_lanes, .lane_series = (void (*)(void))swing_terms, .lane_width = 2,
             .n = N, .count = COUNT, .x0 = x0, .p = p, .u = u, .p_stride = 1, .u_stride = 1,
-            .nodes = forced ? forced_nodes : free_nodes, .n_nodes = forced ? 3 : 2, .rtol = rtol[i], .max_step = INFINITY,
-            .atol = atol, .max_steps = 100000, .t_eval = t_eval, .n_eval = EVAL, .samples = samples, .x = x, .t = t,
+            .nodes = forced ? forced_nodes : free_nodes, .n_nodes = forced ? 3 : 2, .rtol = rtol[i],
+            .max_step = INFINITY, .atol = atol, .max_steps = 100000, .t_eval = t_eval, .n_eval = EVAL,
+            .samples = samples, .x = x, .t = t,
             .status = status, .steps = steps, .rejected = rejected, .evaluations = evaluations, .failure = failure,
             .failure_time = failure_time};
         eomgen_thread own = {.signals = forced ? &ramp : NULL};

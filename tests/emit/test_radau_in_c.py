@@ -76,7 +76,8 @@ def test_van_der_pol_without_python(tmp_path: Path) -> None:
     *found, steps, evaluations = (float(word) for word in done.stdout.split())
     assert found == pytest.approx([1.706167732170456, -0.8928097010248257], rel=1e-10)
     judge = solve_ivp(
-        lambda t, x: [x[1], ((1 - x[0] ** 2) * x[1] - x[0]) / EPS], (0.0, 2.0), [2.0, 0.0], "Radau", rtol=1e-9, atol=1e-11,
+        lambda t, x: [x[1], ((1 - x[0] ** 2) * x[1] - x[0]) / EPS], (0.0, 2.0), [2.0, 0.0], "Radau",
+        rtol=1e-9, atol=1e-11,
         jac=lambda t, x: [[0.0, 1.0], [(-2 * x[0] * x[1] - 1) / EPS, (1 - x[0] ** 2) / EPS]],
     )  # fmt: skip
     assert steps == pytest.approx(len(judge.t) - 1, rel=0.02)  # Newton's method converges as fast as SciPy's

@@ -84,7 +84,8 @@ def test_drive_on_a_slider_that_closes_a_loop(method: str) -> None:
     """Of a slider-crank, massless but for a crank and the drive: T = (I + J s'^2) theta'^2 / 2, s' = ds/dtheta."""
     r, l, inertia = 0.2, 0.5, 0.03
     m = eg.Model("press", gravity=(0, 0, 0))
-    crank, rod, slider = m.body("crank", mass=0, inertia={"zz": inertia}), m.body("rod", mass=0), m.body("slider", mass=0)
+    crank = m.body("crank", mass=0, inertia={"zz": inertia})
+    rod, slider = m.body("rod", mass=0), m.body("slider", mass=0)
     m.revolute("A", m.ground, crank, coordinate="theta")
     m.revolute("B", crank.at(r, 0, 0), rod, coordinate="phi")
     m.revolute("C", rod.at(l, 0, 0), slider, coordinate="psi")
@@ -93,7 +94,8 @@ def test_drive_on_a_slider_that_closes_a_loop(method: str) -> None:
     module = m.compile(target="numpy", independent=["theta"], method=method)
     assert "D" not in module.q_names
     angle, rate, d = 0.8, 3.0, 1e-5
-    slope = [-r * np.sin(a) - r**2 * np.sin(2 * a) / (2 * np.sqrt(l**2 - (r * np.sin(a)) ** 2)) for a in (angle - d, angle, angle + d)]  # fmt: skip
+    angles = np.array([angle - d, angle, angle + d])
+    slope = -r * np.sin(angles) - r**2 * np.sin(2 * angles) / (2 * np.sqrt(l**2 - (r * np.sin(angles)) ** 2))
     whole = inertia + DRIVE * slope[1] ** 2
     expected = -DRIVE * slope[1] * (slope[2] - slope[0]) / (2 * d) * rate**2 / whole
     x = module.x0({"theta": angle, "theta_dot": rate})

@@ -13,7 +13,7 @@ STATES = [(0.3, -1.1, 0.4), (-2.0, 0.7, 1.3)]
 
 @pytest.mark.parametrize("method", OF_LAGRANGIANS)
 def test_a_pendulum_whose_support_swings(method: str) -> None:
-    """The support is at a sin(w t): l theta'' = -g sin(theta) + a w^2 sin(w t) cos(theta) (Landau, Lifshitz, sec. 5)."""
+    """The support is at a sin(w t): l theta'' = -g sin(theta) + a w^2 sin(w t) cos(theta) (Landau, sec. 5)."""
     speed = "(l*th_dot*cos(th) + a*w*cos(w*t))**2 + (l*th_dot*sin(th))**2"
     values = {"m": 1.3, "l": 0.7, "a": 0.4, "w": 3.0, "g": 9.81}
     mod = eg.Model.from_lagrangian(

@@ -20,7 +20,8 @@ def advance(angle: float) -> float:
 def test_one_equation_in_the_crank_angle(method: str, angle: float) -> None:
     """(J + m s'^2) theta'' = tau - m s' s'' theta'^2, s' and s'' derivatives by theta."""
     m = eg.Model("press", gravity=(0, 0, 0))
-    crank, rod, slider = m.body("crank", mass=0, inertia={"zz": CRANK}), m.body("rod", mass=0), m.body("slider", mass=SLIDER)
+    crank, rod = m.body("crank", mass=0, inertia={"zz": CRANK}), m.body("rod", mass=0)
+    slider = m.body("slider", mass=SLIDER)
     m.revolute("A", m.ground, crank, coordinate="theta")
     m.revolute("B", crank.at(R, 0, 0), rod, coordinate="phi")
     m.revolute("C", rod.at(L, 0, 0), slider)

@@ -49,7 +49,8 @@ def largest_difference(model: Any) -> float:
     pairs += [slopes.bias, tree.bias]
     pairs += [[x for row in rows for x in row] for rows in (slopes.mass_matrix, tree.mass_matrix)]
     numbers = [np.array(evaluate(part, values), dtype=float) for part in pairs]
-    return float(np.max([np.abs(a - b).max() / np.abs(b).max() for a, b in zip(numbers[::2], numbers[1::2], strict=True)]))
+    both = zip(numbers[::2], numbers[1::2], strict=True)
+    return float(np.max([np.abs(a - b).max() / np.abs(b).max() for a, b in both]))
 
 
 @pytest.mark.parametrize("name", JOINTS)

@@ -74,8 +74,8 @@ FAULTS = (
         "x[k] += B[k * F + j] * given[j];",
         "independent rates are not scaled",
         (
-            "tests/emit/test_c_loops.py::test_kinematics_satisfies_all_three_levels_and_holds_what_is_given[slider"
-            " preferred]",
+            ("tests/emit/test_c_loops.py::test_kinematics_satisfies_all_three_levels_and_holds_what_is_given[slider"
+            " preferred]"),
         ),
     ),
     Fault(

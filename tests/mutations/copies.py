@@ -83,9 +83,8 @@ class Copy:
                 process.kill()
                 text, code = process.communicate()[0], -1
         shutil.rmtree(self.root / "tmp", ignore_errors=True)
-        failed = [
-            line.split(" ", 1)[1].split(" - ")[0] for line in text.splitlines() if line.startswith(("FAILED ", "ERROR "))
-        ]
+        told = [line for line in text.splitlines() if line.startswith(("FAILED ", "ERROR "))]
+        failed = [line.split(" ", 1)[1].split(" - ")[0] for line in told]
         return Outcome(code, time.monotonic() - start, failed[0] if failed else "", text)
 
     def run_with(self, fault: Fault, tests: Sequence[str]) -> Outcome:

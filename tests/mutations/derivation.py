@@ -109,8 +109,8 @@ FAULTS = (
         "pivot = _dot(column, felt)",
         "the inertia of a drive does not resist",
         (
-            "tests/equations/test_armature.py::test_drives_in_an_open_chain_add_to_the_diagonal_of_the_mass_matrix"
-            "[recursive]",
+            ("tests/equations/test_armature.py::test_drives_in_an_open_chain_add_to_the_diagonal_of_the_mass_matrix"
+            "[recursive]"),
         ),
     ),
     Fault(
@@ -154,8 +154,8 @@ FAULTS = (
         "[g + alpha * rate for",
         "Baumgarte's 2 alpha C' loses its 2",
         (
-            "tests/forms/test_baumgarte.py::test_accelerations_off_the_constraints_are_those_of_the_formula[slider"
-            "_crank-cython]",
+            ("tests/forms/test_baumgarte.py::test_accelerations_off_the_constraints_are_those_of_the_formula[slider"
+            "_crank-cython]"),
         ),
     ),
     Fault(
@@ -283,8 +283,8 @@ FAULTS = (
         "start = graph.zero",
         "the angle of a plane loop's cut joint lacks its constant part",
         (
-            "tests/kinematics/test_turns.py::test_torsional_spring_between_markers_of_a_tree_has_a_potential_and_w"
-            "inds_up",
+            ("tests/kinematics/test_turns.py::test_torsional_spring_between_markers_of_a_tree_has_a_potential_and_w"
+            "inds_up"),
         ),
     ),
     Fault(

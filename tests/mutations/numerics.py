@@ -25,8 +25,8 @@ FAULTS = (
         "SMALL_LOOP = 1e-9",
         "rows of a loop far smaller than the mechanism are lost beside the others",
         (
-            "tests/acceptance/test_small_loops.py::test_a_micrometre_loop_beside_a_kilometre_one_moves_as_alone[1."
-            "0-cython]",
+            ("tests/acceptance/test_small_loops.py::test_a_micrometre_loop_beside_a_kilometre_one_moves_as_alone[1."
+            "0-cython]"),
         ),
     ),
     Fault(

@@ -97,7 +97,7 @@ def main() -> int:
     alive = [fault.id for fault, outcome in outcomes if outcome.code != FAILED]
     if not given.ids:
         write_table(outcomes)
-    print(f"{len(outcomes) - len(alive)} of {len(outcomes)} caught" + (f"; survive: {', '.join(alive)}" if alive else ""))
+    print(f"{len(outcomes) - len(alive)} of {len(outcomes)} caught", *(f"survives: {name}" for name in alive), sep="\n")
     return bool(alive)
 
 

@@ -146,8 +146,8 @@ FAULTS = (
         "return np.concatenate([forces, 0.0 * (here.v / s)[like.surplus]])",
         "equilibria ignore what nonholonomic rows move",
         (
-            "tests/analysis/test_rest_and_velocity_rows.py::test_the_inner_length_of_a_maxwell_element_comes_to_re"
-            "st_too[embedding]",
+            ("tests/analysis/test_rest_and_velocity_rows.py::test_the_inner_length_of_a_maxwell_element_comes_to_re"
+            "st_too[embedding]"),
         ),
     ),
     Fault(
@@ -163,8 +163,8 @@ FAULTS = (
         "np.eye(n)])",
         "dF/dy + cj dF/dy' of the differential-algebraic form: cj is taken for 1",
         (
-            "tests/forms/test_dae.py::test_consistent_values_leave_no_residual_and_the_jacobian_is_exact[double_pe"
-            "ndulum]",
+            ("tests/forms/test_dae.py::test_consistent_values_leave_no_residual_and_the_jacobian_is_exact[double_pe"
+            "ndulum]"),
         ),
     ),
     Fault(
@@ -173,8 +173,8 @@ FAULTS = (
         "da = system.solve(right)[:n]",
         "the Jacobian of a stabilised right-hand side has the wrong sign",
         (
-            "tests/forms/test_baumgarte.py::test_the_jacobian_is_that_of_the_stabilised_right_hand_side[slider_cra"
-            "nk-numpy]",
+            ("tests/forms/test_baumgarte.py::test_the_jacobian_is_that_of_the_stabilised_right_hand_side[slider_cra"
+            "nk-numpy]"),
         ),
     ),
     Fault(
@@ -190,8 +190,8 @@ FAULTS = (
         "q_i, v_i = x[:k], 0.0 * x[k:]",
         "the minimal form forgets the velocities",
         (
-            "tests/acceptance/test_minimal.py::test_minimal_form_equals_the_tree_form[slider_crank-1.0-given0-embe"
-            "dding]",
+            ("tests/acceptance/test_minimal.py::test_minimal_form_equals_the_tree_form[slider_crank-1.0-given0-embe"
+            "dding]"),
         ),
     ),
     Fault(

@@ -6,7 +6,6 @@ import ast
 from pathlib import Path
 
 import pytest
-
 from mutations.copies import Copy
 from mutations.fault import ROOT
 from mutations.faults import FAULTS
@@ -27,8 +26,8 @@ def test_names_are_unique_and_areas_are_covered() -> None:
     assert len(ids) == len(set(ids)) >= 60
     areas = {fault.file.split("/")[1] for fault in FAULTS if fault.file.startswith("eomgen/")}
     assert areas >= {
-        "equations", "kinematics", "joints", "constraints", "forces", "graph", "rotations", "numeric", "emit", "program",
-        "runtime", "analysis", "limits",
+        "equations", "kinematics", "joints", "constraints", "forces", "graph", "rotations", "numeric", "emit",
+        "program", "runtime", "analysis", "limits",
     }  # fmt: skip
     folders = {Path(fault.file).parent.name for fault in FAULTS if fault.file.startswith("templates/")}
     assert folders >= {"drivers", "steppers", "ensembles"}
