@@ -2,6 +2,7 @@
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
+# make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
 # make clean  removes what the other targets made, .venv included
 # Each makes its own .venv (Python 3.11 or later) and installs what it needs; a second call goes straight to work.
 
@@ -11,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test bench lint clean
+.PHONY: demo test bench lint mutations clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -26,6 +27,9 @@ lint: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-plot
 	@$(BIN)/python -m benchmarks.run $(BENCHMARKS)
+
+mutations: $(VENV)/.installed-test
+	@$(BIN)/python tests/mutations/run.py --jobs 2
 
 clean:
 	@rm -rf $(VENV) build dist demo_output eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

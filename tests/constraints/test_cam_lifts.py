@@ -47,3 +47,16 @@ def test_cams_slide_or_turn_and_so_do_their_followers(cam: str, follower: str) -
     assert state["S_dot"] == pytest.approx(df * 1.3, abs=1e-13)
     assert found["A_dot"] == pytest.approx(a_ddot, rel=1e-12)
     assert found["S_dot"] == pytest.approx(df * a_ddot + ddf * 1.3**2, rel=1e-12)
+
+
+def test_the_phase_turns_the_cam_back() -> None:
+    """s = f(a - phase): where the cam stands at its phase the follower is where f(0) says."""
+    m = eg.Model("cams")
+    wheel, follower = m.body("wheel", mass=1.0, inertia=(1, 1, 1)), m.body("follower", mass=1.0)
+    m.revolute("A", m.ground, wheel)
+    m.prismatic("S", m.ground, follower)
+    m.cam("law", "A", "S", lift="0.3*sin(theta) + 0.1*cos(2*theta)", phase=0.4)
+    module = m.compile(target="numpy")
+    for angle in (0.4, 1.5):
+        state = dict(zip(module.x_names, module.x0(A=angle), strict=True))
+        assert state["S"] == pytest.approx(0.3 * np.sin(angle - 0.4) + 0.1 * np.cos(2 * angle - 0.8), abs=1e-13)

@@ -124,3 +124,19 @@ def test_residuals_stay_in_metres_and_radians():
     q[mod.q_names.index("x1")] += 0.5
     C = dict(zip(mod.layout.constraint_labels, mod.constraints(q), strict=True))
     assert C["flow.equation"] == pytest.approx(2e-3 * 0.5)
+
+
+@pytest.mark.parametrize("target", ["numpy", "cython"])
+def test_a_relation_that_parameters_leave_idle_holds_nothing(target):
+    """3 k - l = 6e-17 for k = 0.1 and l = 0.3 is rounding of terms of 0.3: the pendulum beside a gear swings on."""
+    m = eg.Model("idle", gravity=(0, -9.81, 0))
+    m.parameter("k", 0.1), m.parameter("l", 0.3)
+    for name in "ABC":
+        m.revolute(name, m.ground, m.body(f"body{name}", mass=1.0, com=(0.5, 0, 0), inertia={"zz": 0.1}))
+    m.gear("mesh", "B", "C", teeth=(20, 40))
+    m.coupling("idle", equation="(3*k - l)*sin(A)")
+    mod = m.compile(target=target)
+    assert mod.n_dof == 2
+    angle = 0.3
+    swing = mod.rhs(0.0, mod.x0(A=angle, B=0.2))[mod.x_names.index("A_dot")]
+    assert swing == pytest.approx(-9.81 * 0.5 * np.cos(angle) / (0.1 + 0.25), rel=1e-12)

@@ -137,6 +137,9 @@ def test_a_bad_preference_is_left_alone_by_rhs_and_reported_where_the_set_is_fix
     assert second("embedded_mass_matrix", dead)[0] == 4
     assert second("kinematics", [0.45, 1.0, 0.0, *dead])[0] == 4
     assert first("embedded_mass_matrix", dead)[0] == 0
+    for theta, status in ((1e-5, 0), (1e-9, 4)):  # a dead centre to the eye of the last half of the digits
+        near = closed_state(good, first, q=[theta, -0.1 * theta / 0.35, 0.45])[:3]
+        assert second("embedded_mass_matrix", near)[0] == status
 
 
 def test_a_state_that_cannot_be_closed_is_reported(systems, compiled):

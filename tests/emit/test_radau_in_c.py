@@ -6,11 +6,13 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from scipy.integrate import solve_ivp
 
 from eomgen.compilation.compiler import find_compiler
 from eomgen.emit.sources import read_template
 from eomgen.layer import read_layer
 
+EPS = 1e-6
 PROGRAM = r"""
 #include <math.h>
 #include <stdio.h>
@@ -50,7 +52,7 @@ int main(void)
             return 2;
         }
     }
-    printf("%.17g %.17g\n", run.y[0], run.y[1]);
+    printf("%.17g %.17g %ld %ld\n", run.y[0], run.y[1], run.steps, run.evaluations);
     return 0;
 }
 """
@@ -71,5 +73,12 @@ def test_van_der_pol_without_python(tmp_path: Path) -> None:
     assert built.returncode == 0, built.stderr
     done = subprocess.run([tmp_path / "program"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    found = [float(word) for word in done.stdout.split()]
+    *found, steps, evaluations = (float(word) for word in done.stdout.split())
     assert found == pytest.approx([1.706167732170456, -0.8928097010248257], rel=1e-10)
+    judge = solve_ivp(
+        lambda t, x: [x[1], ((1 - x[0] ** 2) * x[1] - x[0]) / EPS], (0.0, 2.0), [2.0, 0.0], "Radau",
+        rtol=1e-9, atol=1e-11,
+        jac=lambda t, x: [[0.0, 1.0], [(-2 * x[0] * x[1] - 1) / EPS, (1 - x[0] ** 2) / EPS]],
+    )  # fmt: skip
+    assert steps == pytest.approx(len(judge.t) - 1, rel=0.02)  # Newton's method converges as fast as SciPy's
+    assert evaluations == pytest.approx(judge.nfev, rel=0.02)

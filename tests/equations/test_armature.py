@@ -60,6 +60,48 @@ def test_drive_between_two_branches(method: str, target: str) -> None:
     assert module.rhs(0.0, np.zeros(4))[2:] == pytest.approx(expected, rel=1e-14)
 
 
+@pytest.mark.parametrize("method", [*METHODS, "auto"])
+def test_drives_in_an_open_chain_add_to_the_diagonal_of_the_mass_matrix(method: str) -> None:
+    drives = np.array([0.7, 0.0, 1.3])
+
+    def arm(scale: float) -> eg.Model:
+        m = eg.Model("arm", gravity=(0, -GRAVITY, 0))
+        last = m.ground
+        for k, drive in enumerate(drives):
+            body = m.body(f"b{k}", mass=2 - 0.3 * k, com=(0.5, 0.1, 0.03), inertia=(0.1, 0.2, 0.3))
+            m.revolute(f"A{k}", last, body, axis="zxy"[k], coordinate=f"q{k}", armature=scale * drive)
+            last = body.at(0.9, 0, 0)
+        return m
+
+    bare = arm(0.0).compile(method="embedding", target="numpy")
+    x = np.array([0.4, -0.8, 1.1, 0.9, -1.3, 0.6])
+    expected = np.linalg.solve(bare.mass_matrix(x[:3]) + np.diag(drives), -bare.bias(0.0, x))
+    assert arm(1.0).compile(method=method, target="numpy").rhs(0.0, x)[3:] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_drive_on_a_slider_that_closes_a_loop(method: str) -> None:
+    """Of a slider-crank, massless but for a crank and the drive: T = (I + J s'^2) theta'^2 / 2, s' = ds/dtheta."""
+    r, l, inertia = 0.2, 0.5, 0.03
+    m = eg.Model("press", gravity=(0, 0, 0))
+    crank = m.body("crank", mass=0, inertia={"zz": inertia})
+    rod, slider = m.body("rod", mass=0), m.body("slider", mass=0)
+    m.revolute("A", m.ground, crank, coordinate="theta")
+    m.revolute("B", crank.at(r, 0, 0), rod, coordinate="phi")
+    m.revolute("C", rod.at(l, 0, 0), slider, coordinate="psi")
+    m.prismatic("D", m.ground, slider, axis="x", armature=DRIVE)
+    m.guess = {"theta": 0.8, "phi": -1.1, "psi": 0.3}
+    module = m.compile(target="numpy", independent=["theta"], method=method)
+    assert "D" not in module.q_names
+    angle, rate, d = 0.8, 3.0, 1e-5
+    angles = np.array([angle - d, angle, angle + d])
+    slope = -r * np.sin(angles) - r**2 * np.sin(2 * angles) / (2 * np.sqrt(l**2 - (r * np.sin(angles)) ** 2))
+    whole = inertia + DRIVE * slope[1] ** 2
+    expected = -DRIVE * slope[1] * (slope[2] - slope[0]) / (2 * d) * rate**2 / whole
+    x = module.x0({"theta": angle, "theta_dot": rate})
+    assert module.rhs(0.0, x)[module.n_q + module.v_names.index("theta_dot")] == pytest.approx(expected, rel=1e-8)
+
+
 def effective(crank: float, driven: str) -> tuple[float, float]:
     """Inertia and potential energy of the four-bar linkage felt by its crank, by vectors in the complex plane."""
     pin = CRANK * np.exp(1j * crank)

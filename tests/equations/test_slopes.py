@@ -45,11 +45,12 @@ def largest_difference(model: Any) -> float:
     formula = jacobian(list(tree.inverse_dynamics), symbols)
     found = slopes.by_position(kinematics.a)
     found |= {(i, n_q + k): value for (i, k), value in slopes.by_velocity.items()}
-    pairs = [(entries.get((i, k), zero) for i in range(n) for k in range(n_q + n)) for entries in (found, formula)]
+    pairs = [[entries.get((i, k), zero) for i in range(n) for k in range(n_q + n)] for entries in (found, formula)]
     pairs += [slopes.bias, tree.bias]
-    pairs += [(x for row in rows for x in row) for rows in (slopes.mass_matrix, tree.mass_matrix)]
-    numbers = [np.array(evaluate(list(part), values), dtype=float) for part in pairs]
-    return max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(numbers[::2], numbers[1::2], strict=True))
+    pairs += [[x for row in rows for x in row] for rows in (slopes.mass_matrix, tree.mass_matrix)]
+    numbers = [np.array(evaluate(part, values), dtype=float) for part in pairs]
+    both = zip(numbers[::2], numbers[1::2], strict=True)
+    return float(np.max([np.abs(a - b).max() / np.abs(b).max() for a, b in both]))
 
 
 @pytest.mark.parametrize("name", JOINTS)

@@ -9,16 +9,9 @@ import numpy as np
 import pytest
 
 from eomgen.graph.core import Expr, Graph, atan2, cos, sin, sqrt
-from eomgen.graph.rounding import (
-    EPS,
-    ROUNDED,
-    settled_rotation,
-    settled_vector,
-    terms_of,
-    vanishing,
-    with_bounds,
-)
+from eomgen.graph.rounding import settled_rotation, settled_vector, terms_of, vanishing, with_bounds
 from eomgen.graph.vectors import product, transpose
+from eomgen.limits.rounding import EPS, ROUNDED
 
 ANGLES = [0.3, -0.8, 1.1]
 
@@ -142,3 +135,16 @@ def test_terms_of_a_sum_of_products() -> None:
     values = {"a": 0.3, "b": -0.2, "c": -4.0}
     (found,) = with_bounds([terms_of((a + b) * c - a / c)], values)[0]
     assert found == pytest.approx((0.3 + 0.2) * 4.0 + 0.3 / 4.0)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("quarters", [1, 2, 3, 4, -2])
+def test_quarter_and_half_turns_are_exact_and_keep_their_signs(axis: int, quarters: int) -> None:
+    """cos(pi/2) is 6e-17 in double precision: such entries of a constant turn are exactly 0, 1 and -1."""
+    graph = Graph()
+    c, s = math.cos(quarters * math.pi / 2), math.sin(quarters * math.pi / 2)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    numbers = np.eye(3)
+    numbers[i, i], numbers[j, j], numbers[i, j], numbers[j, i] = c, c, -s, s
+    turned = settled_rotation(tuple(tuple(map(graph.constant, row)) for row in numbers.tolist()))
+    assert [[x.value for x in row] for row in turned] == np.round(numbers).tolist()

@@ -8,6 +8,7 @@ import pytest
 
 from eomgen.errors import AssemblyError, PartitionError, ProjectionError
 from eomgen.numeric import (
+    Scales,
     VelocityEquations,
     assemble,
     assemble_velocity,
@@ -192,3 +193,32 @@ def test_the_crank_is_chosen_as_independent(crank):
     assert choose_independent(jacobians[1:2], 2, prefer=[2]).tolist() == [2]
     assert conditioning(jacobians[0], [2]) < 1e-12
     assert conditioning(jacobians[0], [0]) > 0.1
+
+
+def test_drivers_move_what_depends_on_them():
+    """a + b = sin t: with a given, b' = cos t - a' and b'' = -sin t - a''."""
+    t, scales = 0.7, Scales(np.ones(2), np.ones(1))
+    q, v, a = kinematics(
+        lambda q: (np.array([q.sum() - np.sin(t)]), np.ones((1, 2))),
+        lambda q: np.array([-np.cos(t)]),
+        lambda q, v: np.array([np.sin(t)]),
+        np.array([0.2]), np.array([0.5]), np.array([-0.3]), np.zeros(2), scales, 1, [0],
+    )  # fmt: skip
+    np.testing.assert_allclose(q, [0.2, np.sin(t) - 0.2], atol=1e-14)
+    np.testing.assert_allclose(v, [0.5, np.cos(t) - 0.5], atol=1e-14)
+    np.testing.assert_allclose(a, [-0.3, -np.sin(t) + 0.3], atol=1e-14)
+
+
+def test_rates_of_functions_that_change_by_themselves():
+    """y = 2 q + 3 t with y' = 5 wanted: q' = 1, whatever else moves."""
+    wanted = VelocityEquations(np.array([[2.0, 0.0]]), np.array([3.0]), np.array([5.0]), np.ones(1), ["y"])
+    found = assemble_velocity(
+        np.zeros((0, 2)), np.zeros(0), Scales(np.ones(2), np.zeros(0)), guess=np.array([0.0, 0.7]), equations=wanted
+    )
+    np.testing.assert_allclose(found.v, [1.0, 0.7], atol=1e-14)
+
+
+def test_angles_to_be_reached_count_modulo_full_turns():
+    wanted = Equations(lambda q: (q, np.eye(2)), np.array([0.1, 0.1]), np.ones(2), [True, False], ["turn", "way"])
+    assert wanted.difference(np.array([0.3 + 4 * np.pi, 6.4])) == pytest.approx([0.2, 6.3])
+    assert wanted.difference(np.array([-3.2, -3.2])) == pytest.approx([2 * np.pi - 3.3, -3.3])

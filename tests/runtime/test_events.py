@@ -141,13 +141,14 @@ def gap(mod: Any, q: np.ndarray) -> float:
     return float(mod.outputs(0.0, np.concatenate([q, np.zeros(2)]))[0])
 
 
-def test_a_reset_in_a_loop_is_brought_back_onto_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_reset_in_a_loop_is_brought_back_onto_it(target: str, tmp_path: Path) -> None:
     source = (Path(__file__).parents[2] / "examples" / "slider_crank.yaml").read_text(encoding="utf-8")
     file = tmp_path / "kicked.yaml"
     file.write_text(
         source + "\nevents: {kick: {expression: sin(theta), direction: 1, reset: {theta_dot: 1.1*theta_dot}}}\n"
     )
-    mod = eg.load(file).compile()
+    mod = eg.load(file).compile(target=target)
     run = mod.simulate((0, 2), {"theta": 0.3, "theta_dot": 10.0}, rtol=1e-9, atol=1e-11)
     assert len(run.t_events["kick"]) >= 2
     assert run.residuals.raw_velocity < 1e-6

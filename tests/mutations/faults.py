@@ -1,0 +1,15 @@
+"""All deliberate faults, each with the test that notices it."""
+
+from __future__ import annotations
+
+from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, runtime
+
+FAULTS = (
+    *derivation.FAULTS,
+    *elements.FAULTS,
+    *numerics.FAULTS,
+    *emitters.FAULTS,
+    *c_drivers.FAULTS,
+    *c_steppers.FAULTS,
+    *runtime.FAULTS,
+)
