@@ -28,7 +28,8 @@ static int jacobian(double t, const double *x, const double *u, const double *c,
 {
     (void)t, (void)u, (void)w;
     out[0] = 0.0, out[1] = 1.0;
-    out[2] = c[0] > 0.0 ? (-2.0 * x[0] * x[1] - 1.0) / c[0] : -400.0, out[3] = c[0] > 0.0 ? (1.0 - x[0] * x[0]) / c[0] : -0.3;
+    out[2] = c[0] > 0.0 ? (-2.0 * x[0] * x[1] - 1.0) / c[0] : -400.0;
+    out[3] = c[0] > 0.0 ? (1.0 - x[0] * x[0]) / c[0] : -0.3;
     return 0;
 }
 
