@@ -124,7 +124,8 @@ def make(libraries: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[[
             metadata = collect_metadata(kinematics, mobility, tree) | {"target": "c"}
             straight = name == "straight"
             nodes = 0 if name == "columns" else Limits().jacobian_nodes
-            limits = Limits(unrolled=0, unrolled_loops=0, jacobian_nodes=nodes)  # the drivers are what is tried
+            few = {"unrolled": 0, "unrolled_loops": 0}  # the drivers are what is tried
+            limits = Limits(**few, jacobian_nodes=nodes, jacobian_recursive=nodes)
             limits = Limits() if straight else limits
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr("eomgen.program.collect.Limits", lambda: Limits(unrolled=4))  # as if long
