@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints import RollingDisc
 from ..constraints.rolling import LYING
 from ..describe.mechanism import Mechanism
-from ..errors import AssemblyError, Problem
+from ..errors import AssemblyError, ModelError, Problem
 from ..forces import Line, Route
 from ..forces.routes import Cylinder
 from ..frames import Marker
@@ -20,6 +20,7 @@ from ..graph.substitute import symbols_of
 from .motion import Motion
 
 if TYPE_CHECKING:
+    from .kinematics import Kinematics
     from .mobility import Array, ConstraintFunctions
 
 
@@ -93,3 +94,25 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     if all(label.partition(".")[0] in discs for label in bad):
         raise AssemblyError(f"{what}: {LYING}; tilt it in initial or guess", bad)
     raise AssemblyError(f"{what}; give another one in initial or guess", bad)
+
+
+def refuse_idle_rows(kinematics: Kinematics) -> None:
+    """Refuse constraints that hold nothing at the declared parameter values, but would at others.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints and the parameters whose values cancel.
+    """
+    c, parameters = kinematics.constraints, set(kinematics.parameter_names)
+    problems = []
+    for label, row in zip(c.labels, c.jacobian, strict=True):
+        used = sorted(symbols_of([x for x in row if not x.is_zero]) & parameters)
+        if used:
+            name = label.partition(".")[0]
+            what = f"{label} holds nothing with the declared {', '.join(used)}: its factors are 0 or cancel"
+            remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
+            path = f"constraints.{name}" if label in kinematics.coupled else f"joints.{name}"
+            problems.append(kinematics.mechanism.problem(path, what, remedy))
+    if problems:
+        raise ModelError(problems)

@@ -30,7 +30,7 @@ from ..numeric.space import settle
 from ..records import dataclass
 from .candidates import rate_candidates
 from .driving import close_driven, follow_drivers
-from .flaws import require_finite
+from .flaws import refuse_idle_rows, require_finite
 from .kinematics import Kinematics
 from .row_scales import row_scales
 
@@ -346,6 +346,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     jacobians = [J for J in jacobians if np.isfinite(J).all()]
     ranks = tuple(rank(J).rank for J in jacobians)
     r = max(ranks)
+    if functions.m and not r:
+        refuse_idle_rows(kinematics)
     n_dof = n - r
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.constraints import STRUCTURE as TOLERANCE
+from ..limits.constraints import UNMOVED
 from .partitions import PREFERENCE
 from .scales import Array, Indices
 
@@ -35,7 +36,10 @@ def rank(J: Array, tolerance: float = TOLERANCE) -> Rank:
     if not values.size or values[0] == 0.0:
         return Rank(0, 1.0, 0.0)
     relative = values / values[0]
-    count = int(np.count_nonzero(relative > tolerance))
+    # rows may all be rounding of their terms: there is a least length, too
+    count = int(np.count_nonzero((relative > tolerance) & (values > UNMOVED)))
+    if not count:
+        return Rank(0, 1.0, 0.0)
     return Rank(count, float(relative[count - 1]), float(relative[count]) if count < len(relative) else 0.0)
 
 

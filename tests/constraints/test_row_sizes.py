@@ -140,3 +140,17 @@ def test_a_relation_that_parameters_leave_idle_holds_nothing(target):
     angle = 0.3
     swing = mod.rhs(0.0, mod.x0(A=angle, B=0.2))[mod.x_names.index("A_dot")]
     assert swing == pytest.approx(-9.81 * 0.5 * np.cos(angle) / (0.1 + 0.25), rel=1e-12)
+
+
+@pytest.mark.parametrize(("k1", "k2"), [(0.1, 0.3), (0.0, 0.0)])
+def test_a_relation_that_cancels_at_the_declared_values_is_refused_where_it_stands_alone(k1, k2):
+    """3 * 0.1 - 0.3 is 5.6e-17: taken for a row it held A still; left out it would be missing with other values."""
+    m = eg.Model("two", gravity=(0, -9.81, 0))
+    a, b = (m.body(n, mass=1, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1)) for n in "ab")
+    m.revolute("A", m.ground, a)
+    m.revolute("B", a.at(0.5, 0, 0), b)
+    m.parameter("k1", k1)
+    m.parameter("k2", k2)
+    m.coupling("none", equation="(3*k1 - k2)*sin(A)")
+    with pytest.raises(eg.ModelError, match=r"constraints.none: none.equation holds nothing with the declared k1, k2"):
+        m.check()
