@@ -14,7 +14,9 @@ import numpy as np
 
 from ..limits.rounding import ROUNDED
 from .core import Expr, Graph
+from .differentiate import gradient
 from .evaluate import Evaluator
+from .substitute import symbols_of
 from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
 
@@ -22,6 +24,8 @@ TRIES = 3  #: random points at which an identity is tried
 
 #: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.
 ANALYTIC = LEAVES | {"add", "sub", "mul", "div", "neg", "exp", "sin", "cos", "tan", "sinh", "cosh", "tanh"}
+
+EXACT = frozenset({"neg", "abs", "min", "max", "select"})  #: operations that do not round
 
 Numbers = Sequence[float]
 
@@ -31,7 +35,7 @@ SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
     "sub": lambda y, x, e: e[0] + e[1],
     "mul": lambda y, x, e: abs(x[1]) * e[0] + abs(x[0]) * e[1],
     "div": lambda y, x, e: (e[0] + abs(y) * e[1]) / abs(x[1]),
-    "neg": lambda y, x, e: e[0] - abs(y),  # exact
+    "neg": lambda y, x, e: e[0],
     "pow": lambda y, x, e: abs(x[1] * y / x[0]) * e[0] + (abs(y * math.log(x[0])) * e[1] if e[1] else 0.0),
     "sqrt": lambda y, x, e: 0.5 * e[0] / y if e[0] else 0.0,
     "exp": lambda y, x, e: y * e[0],
@@ -46,10 +50,10 @@ SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
     "cosh": lambda y, x, e: abs(math.sinh(x[0])) * e[0],
     "tanh": lambda y, x, e: (1.0 - y * y) * e[0],
     "atan2": lambda y, x, e: (abs(x[1]) * e[0] + abs(x[0]) * e[1]) / (x[0] * x[0] + x[1] * x[1]),
-    "abs": lambda y, x, e: e[0] - y,
-    "min": lambda y, x, e: (e[0] if y == x[0] else e[1]) - abs(y),
-    "max": lambda y, x, e: (e[0] if y == x[0] else e[1]) - abs(y),
-    "select": lambda y, x, e: (e[1] if x[0] else e[2]) - abs(y),
+    "abs": lambda y, x, e: e[0],
+    "min": lambda y, x, e: e[0] if y == x[0] else e[1],
+    "max": lambda y, x, e: e[0] if y == x[0] else e[1],
+    "select": lambda y, x, e: e[1] if x[0] else e[2],
 }
 
 
@@ -70,6 +74,13 @@ def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[n
     bounds : (n,) array
         In units of eps; infinite where nothing is known, as of a square root at 0.
     """
+    return _spread(outputs, values, {})
+
+
+def _spread(
+    outputs: Sequence[Expr], values: Mapping[str, float], given: Mapping[str, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of expressions, and what the bounds of some symbols make of theirs; of rounding, if none is given."""
     graph = common_graph(outputs)
     if graph is None:
         return np.empty(0), np.empty(0)
@@ -81,10 +92,11 @@ def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[n
         operation, *operands = graph.nodes[i]
         y = found[i]
         if operation == "sym":
-            bounds[i] = 0.0
+            bounds[i] = given.get(operands[0], 0.0)
             continue
+        own = 0.0 if given or operation in EXACT else abs(y)  # a table or a function in C knows its value
         spread = SPREAD.get(operation)
-        bounds[i] = abs(y)  # a constant is rounded once, a table or a function in C knows its value
+        bounds[i] = own
         if spread is not None:
             try:
                 bounds[i] += spread(y, [found[k] for k in operands], [bounds[k] for k in operands])
@@ -97,7 +109,8 @@ def vanishing(outputs: Sequence[Expr]) -> list[bool]:
     """Which expressions are zero, to rounding, at all values of their symbols.
 
     Tried at random values: an analytic expression that is zero at some of them is zero everywhere, with probability 1.
-    Others, such as ``max(x, 0)``, may vanish in a part of their domain and do not count.
+    Others, such as ``max(x, 0)``, may vanish in a part of their domain and do not count.  Its derivatives must be
+    rounding too: beside large numbers that cancel, a term of size 1 may be lost in the value.
     """
     graph = common_graph(outputs)
     left = [k for k, analytic in enumerate(_analytic(graph, outputs)) if analytic] if graph is not None else []
@@ -112,8 +125,17 @@ def vanishing(outputs: Sequence[Expr]) -> list[bool]:
         values, bounds = with_bounds([outputs[k] for k in left], names)
         zero = is_rounding(values, bounds)
         left = [k for k, z in zip(left, zero, strict=True) if z]
+    left = [k for k in left if _is_flat(outputs[k], names)]
     found = set(left)
     return [k in found for k in range(len(outputs))]
+
+
+def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
+    """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
+    names = sorted(symbols_of([x]))
+    slopes, bounds = with_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
+    terms = [_spread([x], values, {name: 1.0})[1][0] for name in names]
+    return bool(is_rounding(slopes, np.maximum(bounds, terms)).all())
 
 
 def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:

@@ -97,7 +97,7 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
 
 
 def refuse_idle_rows(kinematics: Kinematics) -> None:
-    """Refuse constraints that hold nothing at the declared parameter values, but would at others.
+    """Refuse constraints of which no slope is there: identities that nothing proves, and factors that cancel.
 
     Raises
     ------
@@ -107,11 +107,14 @@ def refuse_idle_rows(kinematics: Kinematics) -> None:
     c, parameters = kinematics.constraints, set(kinematics.parameter_names)
     problems = []
     for label, row in zip(c.labels, c.jacobian, strict=True):
-        used = sorted(symbols_of([x for x in row if not x.is_zero]) & parameters)
-        if used:
-            name = label.partition(".")[0]
-            what = f"{label} holds nothing with the declared {', '.join(used)}: its factors are 0 or cancel"
-            remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
+        slopes = [x for x in row if not x.is_zero]
+        if slopes:
+            name, used = label.partition(".")[0], sorted(symbols_of(slopes) & parameters)
+            what = f"{label} holds nothing at all positions that were tried: its slopes are 0"
+            remedy = "take it away"
+            if used:
+                what = f"{label} holds nothing with the declared {', '.join(used)}: its factors are 0 or cancel"
+                remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
             path = f"constraints.{name}" if label in kinematics.coupled else f"joints.{name}"
             problems.append(kinematics.mechanism.problem(path, what, remedy))
     if problems:

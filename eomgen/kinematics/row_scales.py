@@ -58,8 +58,11 @@ def row_scales(kinematics: Kinematics) -> tuple[Expr, ...]:
             usual = _length_at([kinematics.length_scale], numbers[0]).value
         first, second = (_length_at(gradient, known) for known in numbers)
         largest = max(first.value, second.value)
-        if written and largest <= TINY_ROOT:
-            found[i] = graph.constant(max(first.terms, second.terms) or 1.0)
+        terms = max(first.terms, second.terms)
+        if written and largest <= TINY_ROOT and terms > 0.0:
+            found[i] = graph.constant(terms)
+        elif written and largest <= TINY_ROOT:  # nothing at the declared values of its factors
+            found[i] = _length(substitute(gradient, places[1]))
         elif written or TINY_ROOT < largest < SMALL_LOOP * usual:
             place = places[first.value < BY_CHANCE * second.value]
             found[i] = _length(substitute(gradient, place))

@@ -90,7 +90,7 @@ class _Run:
         self.t_events: list[list[float]] = [[] for _ in self.listed]
         self.x_events: list[list[Array]] = [[] for _ in self.listed]
         self.counts = {"nfev": 0, "njev": 0}
-        self.status, self.message = 0, ""
+        self.status, self.message, self.reached = 0, "", span[1]
 
     def travel(self, x: Array) -> None:
         """Go on until the run ends."""
@@ -202,6 +202,7 @@ class _Run:
                 self.left[e] -= 1
                 if not self.left[e]:
                     self.status, self.message = 1, f"event {self.names[e]} ended the run"
+                    self.reached = t
         if self.status:
             return None
         changing = [self.index[e] for e in fired if self.listed[e].action != GO_ON]
@@ -228,6 +229,5 @@ class _Run:
         t_events, x_events = [np.empty(0)] * len(self.events), [np.empty((n, 0))] * len(self.events)
         for i, times, states in zip(self.index, self.t_events, self.x_events, strict=True):
             t_events[i], x_events[i] = np.array(times), np.array(states).reshape(-1, n).T
-        reached = max((times[-1] for times in t_events if times.size), default=self.span[1], key=abs)
-        ends = (self.span[0], float(reached) if self.status else self.span[1])
+        ends = (self.span[0], self.reached)
         return Solution(t, x, t_events, x_events, None, self.status, self.message, self.counts, ends)

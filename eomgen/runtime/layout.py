@@ -93,6 +93,7 @@ class Layout:
         self.length: float = float(data.get("length_scale") or 1.0)
         rows: Sequence[str | float] = data.get("constraint_scales") or data.get("constraint_kinds", ())
         self.scales = Scales.of_kinds(kinds, rows, self.length, self.space)
+        self.row_lengths = np.array([kind == "length" for kind in data.get("constraint_kinds", ())], dtype=bool)
         #: coordinates of the independent velocities, where each is the rate of one
         self.independent_q = self.scales.coordinates(self.independent)
         #: the scales of coordinates and holonomic rows, where they are not those of the velocities
@@ -115,12 +116,16 @@ class Layout:
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
 
     def sized(self, sizes: Array) -> Layout:
-        """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values."""
+        """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values.
+
+        The length scale stays as declared where no velocity is one of length and no row is a gap.
+        """
         s_q, s_c = sizes[: self.n_v], sizes[self.n_v :]
         if np.array_equal(s_q, self.scales.q) and np.array_equal(s_c, self.scales.c):
             return self
         found = copy(self)
-        lengths = [*s_q[self.velocity_lengths], *s_c[self.scales.c == self.length]]
+        usual = self.row_lengths & (self.scales.c == self.length)  # other rows have sizes of their own
+        lengths = [*s_q[self.velocity_lengths], *s_c[usual]]
         found.length = float(lengths[0]) if lengths else self.length
         found.scales = self.scales._replace(q=s_q, c=s_c)
         found.place_scales = found.scales

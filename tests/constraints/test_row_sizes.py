@@ -154,3 +154,26 @@ def test_a_relation_that_cancels_at_the_declared_values_is_refused_where_it_stan
     m.coupling("none", equation="(3*k1 - k2)*sin(A)")
     with pytest.raises(eg.ModelError, match=r"constraints.none: none.equation holds nothing with the declared k1, k2"):
         m.check()
+
+
+def test_a_relation_that_acts_only_with_parameters_given_later_is_refused_then():
+    """k (A - B) = 0 with k declared 0 beside a gear: one row holds; with k = 1 two would."""
+    m = eg.Model("three", gravity=(0, -9.81, 0))
+    for name in "ABC":
+        m.revolute(name, m.ground, m.body(name.lower(), mass=1, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    m.parameter("k", 0.0)
+    m.gear("mesh", "B", "C", teeth=(20, 40))
+    m.coupling("tie", equation="k*(sin(A) - sin(B))")
+    mod = m.compile(target="numpy")
+    assert mod.n_dof == 2
+    with pytest.raises(eg.UsageError, match="with k as given 2 constraint rows are independent, 1 with the declared"):
+        mod.simulate(0.1, {"A": 0.3}, parameters={"k": 1.0})
+
+
+@pytest.mark.parametrize("equation", ["abs(2 + cos(A)) - 2 - cos(A)", "atan2(sin(A), cos(A)) - A"])
+def test_an_identity_that_nothing_proves_is_refused_where_it_stands_alone(equation):
+    m = eg.Model("one", gravity=(0, -9.81, 0))
+    m.revolute("A", m.ground, m.body("a", mass=1, com=(0.3, 0, 0), inertia=(0.1, 0.1, 0.1)))
+    m.coupling("none", equation=equation)
+    with pytest.raises(eg.ModelError, match="constraints.none: none.equation holds nothing at all positions"):
+        m.check()

@@ -49,6 +49,14 @@ def test_identities_vanish_and_what_is_small_does_not() -> None:
     assert not any(vanishing(other))
 
 
+def test_a_term_lost_in_large_numbers_that_cancel_is_seen_in_its_slope() -> None:
+    """(x + 1e8)^2 - 1e16 - 2e8 x - y is x^2 - y, whatever rounding leaves of its value."""
+    g = Graph()
+    x, y = g.symbol("x"), g.symbol("y")
+    row = (x + 1e8) * (x + 1e8) - 1e16 - x * 2e8 - y
+    assert vanishing([row, row + y - x * x]) == [False, True]
+
+
 def test_what_vanishes_in_a_part_of_its_domain_is_kept() -> None:
     g = Graph()
     x = g.symbol("x")

@@ -32,6 +32,7 @@ static int split(int width, int strict, partition *restrict parts, double *restr
     for (int i = 0; i < M; i++) {
         changed[i] = 1;
     }
+    parts->weakest = 1.0;
     for (int step = 0; step < R; step++) {
         int rows[2] = {-1, -1};
         double sizes[2] = {0.0, 0.0};
