@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..limits.rounding import TINY
+from ..limits.rounding import EPS, TINY
 from ..limits.statics import ARRIVED, CLOSE, SHORTEST
 from ..numeric.scales import Array
-from .rounding import BALANCED, EPS
+from .rounding import BALANCED
 
 if TYPE_CHECKING:
     from .search import Point, Search
