@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..limits.rounding import EPS
 from ..limits.statics import CLOSE
 from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST, largest
-from .rounding import EPS
 
 if TYPE_CHECKING:
     from .search import Point, Search

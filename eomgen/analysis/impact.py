@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
-from ..limits.impacts import HELD, TOUCHING
+from ..limits.impacts import HELD, ROUNDED, TOUCHING
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
@@ -27,8 +27,6 @@ from .tables import as_text
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
-
-ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -240,8 +238,8 @@ def _rounding(rows: Array, v: Array, B: Array, condition: float, layout: Layout)
     s = layout.scales.q
     lengths = np.linalg.norm(rows * s, axis=1)
     fast = float(np.linalg.norm(v / s))
-    rest = ROUNDING * (np.abs(rows) @ np.abs(v) + condition * lengths * fast)
+    rest = ROUNDED * (np.abs(rows) @ np.abs(v) + condition * lengths * fast)
     part = np.linalg.norm((rows @ B), axis=1)
-    fixed = part <= max(HELD, ROUNDING * condition) * lengths
+    fixed = part <= max(HELD, ROUNDED * condition) * lengths
     rest[fixed] += HELD * lengths[fixed] * fast
     return rest, fixed

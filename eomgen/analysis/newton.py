@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..limits.rounding import TINY
+from ..limits.rounding import EPS, TINY
 from ..limits.statics import ARRIVED, CLOSE, SHORTEST
 from ..numeric.scales import Array
-from .rounding import BALANCED, EPS
+from .rounding import BALANCED
 
 if TYPE_CHECKING:
     from .search import Point, Search
@@ -23,6 +23,7 @@ STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 STIFFEST = 1e16  #: largest damping of a step
+POLISHED = 8  #: most steps after the correction has reached rounding
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
 
@@ -125,12 +126,28 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
 
 
 def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Point:
-    """The iterate one last step away, if it is nearer to balance."""
-    there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
-    if there is None:
-        return point
-    here, after = (search.residual(one.here, point.here) / solver.sizes for one in (point, there))
-    return there if np.linalg.norm(after) < np.linalg.norm(here) else point
+    """The iterate of whole steps from here, as long as each halves the residual.
+
+    Where stiff forces stand beside soft ones, a correction within rounding of the stiff ones may leave more than that
+    of the soft ones; the next steps have only these left.
+    """
+    sizes = solver.sizes
+    left = float(np.linalg.norm(search.residual(point.here, point.here) / sizes))
+    for _ in range(POLISHED):
+        there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
+        if there is None:
+            break
+        after = float(np.linalg.norm(search.residual(there.here, point.here) / sizes))
+        if not after < left:
+            break
+        point, left, enough = there, after, after > 0.5 * left or largest(solver.shown(change)) <= ARRIVED
+        if enough:
+            break
+        solver = Solver(search.linearise(point))
+        if len(solver.sizes) != len(sizes):
+            break
+        change = solver.solve(search.residual(point.here, point.here))
+    return point
 
 
 def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
@@ -146,7 +163,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
         residual = search.residual(here, here)
         change = solver.solve(residual)
         if not residual.any() or solver.arrived(residual, change, search.rounded(point)):
-            return point, step, True
+            return point, step, False  # near enough for Newton's iteration, which tells rounding from what is left
         same = len(start) == len(solver.sizes)
         sizes = start if same else solver.sizes
         J, r = solver.linear.J / sizes[:, None], residual / sizes

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.rounding import TINY
+from ..limits.rounding import EPS, TINY
 from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-EPS = float(np.finfo(float).eps)
 ROUNDING = 10.0 * EPS  #: relative error of the entries of a matrix that is exact but for rounding
 BALANCED = 100.0 * EPS  #: what rounding leaves of a balance, relative to what a unit displacement does to it
 ROUNDS = 30  #: of balancing, at most

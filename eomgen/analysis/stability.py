@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.rounding import EPS
 from ..numeric.scales import Array
-from .rounding import EPS, ROUNDING, graded_modes, judge
+from .rounding import ROUNDING, graded_modes, judge
 
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
 

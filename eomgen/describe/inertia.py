@@ -82,6 +82,7 @@ def _own(
     else:
         com = reader.vector(f"{path}.com", values["com"]) if "com" in values else o
     at_origin: Mat3 | None = tensor if isinstance(about, str) and about == "origin" else None
+    about_point = None if point is None else point[0]
     if point is not None:
         negative = shift_tensor(-mass, vec.sub(com, point[0]))
         tensor = add_tensors(tensor, negative)
@@ -89,7 +90,9 @@ def _own(
         moment = None if moment is None else vec.add(moment, vec.scale(p.mass, p.com))
         at_origin = None if at_origin is None else add_tensors(at_origin, shift_tensor(p.mass, p.com))
     whole = combine(graph, [MassProperties(mass, com, tensor), *points])
-    return Body(name, whole.mass, whole.com, whole.inertia, moment, at_origin, check=check, plane=axis)
+    return Body(
+        name, whole.mass, whole.com, whole.inertia, moment, at_origin, check=check, plane=axis, about=about_point
+    )
 
 
 def _tensor(reader: Reader, path: str, values: Mapping[str, Any]) -> tuple[Mat3, Mat3]:

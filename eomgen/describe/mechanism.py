@@ -63,6 +63,7 @@ class Body:
     inertia_origin: Mat3 | None = None
     check: str = "error"  #: what becomes of a mass and inertia that no body can have: error, note or off
     plane: Vec3 | None = None  #: the axis of the only moment given, for a body that moves in a plane
+    about: Vec3 | None = None  #: the point that the inertia was given about, if not the centre of mass
 
     @property
     def checked(self) -> bool:

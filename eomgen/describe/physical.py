@@ -10,10 +10,10 @@ from ..frames import GROUND
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from ..graph.vectors import Mat3
+from ..graph.vectors import Mat3, Vec3
 from ..limits.descriptions import TENSOR, TENSOR_TERMS
 from ..limits.inertia import COMPUTED
-from ..numeric.inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales
+from ..numeric.inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales, longest_within
 from .description import Faults
 from .mechanism import Body, JointSpec
 
@@ -64,11 +64,19 @@ def check_bodies(
 
 
 def _longest(bodies: Sequence[Body], joints: Sequence[JointSpec], values: Mapping[str, float]) -> float:
-    """The longest distance of a centre of mass or of a joint from a body's origin (m), of those that are known."""
-    points = [body.com for body in bodies]
-    points += [m.frame.position for spec in joints for m in (spec.predecessor, spec.successor) if m.body != GROUND]
-    known = [_numbers(point, values) for point in points]
-    return max((float(np.linalg.norm(point)) for point in known if point is not None), default=0.0)
+    """The longest distance (m) within a body of its centre of mass, its joints and the point its inertia is about.
+
+    Points that are not known at the declared values, and the centre of no mass, do not count.
+    """
+    points: list[list[Vec3]] = [[] if body.mass.is_zero else [body.com] for body in bodies]
+    for own, body in zip(points, bodies, strict=True):
+        own += [] if body.about is None else [body.about]
+    for spec in joints:
+        for marker in (spec.predecessor, spec.successor):
+            if marker.body != GROUND:
+                points[marker.body].append(marker.frame.position)
+    known = [[_numbers(point, values) for point in own] for own in points]
+    return longest_within([point for point in own if point is not None] for own in known)
 
 
 def _numbers(expressions: Sequence[Expr], values: Mapping[str, float]) -> list[float] | None:

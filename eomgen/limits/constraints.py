@@ -38,10 +38,12 @@ LEFT = SETTLED
 #: Rank at one projected state: J is known to 1e-13 in large mechanisms; directions a thousand times stronger are held.
 STATE = 1e-10
 #: Rank of the mechanism, from configurations at random, few of which are near a singular one: closed to ACCEPTED, rows
-#: That depend on each other when closed keep false ranks of that size, a hundred times below.
+#: that depend on each other when closed keep false ranks of that size, a hundred times below.
 STRUCTURE = 100.0 * ACCEPTED
+#: Least part of a best pivot at which one in a preferred column is taken, which costs two digits at most.
+PREFERENCE = 0.01
 #: Pivots of a coordinate that was chosen and may not be exchanged: dependent ones move at most 1e8 times as fast, which
-#: Leaves half of the digits.
+#: leaves half of the digits.
 CHOSEN = 1e-8
 #: Rank of the balance of all bodies, whose rows are products of two such matrices and of levers.
 BALANCE = 10.0 * STATE
@@ -60,5 +62,6 @@ PASSED = 1e-4
 #: Least square of the sine between a column of pivots and those before it, in straight-line code that may fall back to
 #: pivoting: an angle of 3e-3, beyond which accelerations keep eight digits; and where it must not, of rounding alone.
 LOST, VANISHED = 1e-5, 1e-20
+
 # -- the same --------------------------------------------------------------------------------------------------------
 ALIKE = 1e-13  #: relative difference of two inputs that count as one: 500 eps

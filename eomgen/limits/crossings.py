@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 #: A crossing is looked for where the weakest pivot is smaller; accelerations, known to V^2 EXACT / pivot^3, keep 1e-11
-#: there; and its square, of angles between columns.
-NEAR, NEAR_SQUARE = 0.05, 0.0025
+#: there. NEAR_SQUARE: the same of squares of sines between columns.
+NEAR = 0.05
+NEAR_SQUARE = NEAR * NEAR
 REACH = 0.1  #: scaled motion to the first points on either side; halved while that promises a smaller error
 SHORTEST = 0.01  #: least reach
 MIDDLE = 5.0  #: the pivots at the first points are together so many times that here: the crossing is within 0.4 reaches
@@ -14,8 +15,6 @@ GOOD = 1e-11  #: error of an interpolation, over V^2, that no shorter reach can 
 WEAKEST = 1e-4  #: below this pivot the solution at the state gets no worse: its weak part is left out
 STILL = 1e-9  #: scaled velocity that tells no direction
 SLANT = 1e-3  #: least part of the motion that the tangent coordinates must keep
-ARRIVED, ENOUGH = (
-    1e-14,
-    1e-12,
-)  #: distance along the curve at which the search for a point ends, and which is good enough
+ARRIVED = 1e-14  #: distance along the curve at which the search for a point ends
+ENOUGH = 1e-12  #: distance along the curve that is good enough where the search gets no nearer
 ROUNDS = 30  #: of that search; each leaves the square of the sine of the angle between tangent and curve

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-#: Part of a law's range that counts as zero where it begins and ends
+#: Part of a law's range that counts as zero where it begins and ends.
 ZERO = 1e-9
-#: How near to the ends of a turn a law is looked at, inside it (rad)
+#: How near to the ends of a turn a law is looked at, inside it (rad).
 EDGE = 1e-10
-#: Rounding of a law, relative to its largest value
+#: Rounding of a law, relative to its largest value.
 LAW = 1e-12
-#: Part of its range by which a law, or its slope, may miss its own beginning after a turn: six digits written
+#: Part of its range by which a law, or its slope, may miss its own beginning after a turn: six digits written.
 CLOSING = 1e-6
-#: Relative difference of the first and last value of a periodic table that counts as rounding
+#: Relative difference of the first and last value of a periodic table that counts as rounding.
 PERIODIC = 1e-12
-#: Part of the largest force or moment below which a component is shown as 0
+#: Part of the largest force or moment below which a component is shown as 0.
 SHOWN_FORCE = 1e-13
-#: Part of the largest value of a unit below which one is shown as 0: the rounding of a zero
+#: Part of the largest value of a unit below which one is shown as 0: the rounding of a zero.
 SHOWN = 1e-14
-#: By which slopes of an angle may miss whole numbers in a loop that counts as plane: axes are written to nine digits
+#: By which slopes of an angle may miss whole numbers in a loop that counts as plane: axes are written to nine digits.
 PLANE = 1e-9
-#: A gap whose gradient is below this part of its kind's size is of a loop that small: more digits would be lost
+#: A gap whose gradient is below this part of its kind's size is of a loop that small: more digits would be lost.
 SMALL_LOOP = 1e-3
-#: Gradients at the initial values that are this part of those beside them vanish there by chance
+#: Gradients at the initial values that are this part of those beside them vanish there by chance.
 BY_CHANCE = 1e-3
-#: How far given Euler parameters may be from length 1: six digits written
+#: How far given Euler parameters may be from length 1: six digits written.
 UNIT = 1e-6
 #: Relative difference of entries that should be alike, such as those across the diagonal of a tensor.
 TENSOR, TENSOR_TERMS = 1e-9, 1e-12

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-#: Scaled distance from the constraints up to which coordinates of a reset count as on them
+from .rounding import EPS
+
+#: Scaled distance from the constraints up to which coordinates of a reset count as on them.
 OFF = 1e-9
 #: Gaps of a run at most this open, in lengths of the model or rad, take part in an impact: event times keep
-#: eight digits
+#: eight digits.
 TOUCHING = 1e-8
-#: Part of a normal, along which nothing is free to move, that is rounding
+#: Relative rounding of a rate and of a normal: sums of a few products.
+ROUNDED = 16.0 * EPS
+#: Part of a normal, along which nothing is free to move, that is rounding.
 HELD = 1e-9
-#: Relative: rates that count as 0
+#: Part of the rates below which one counts as 0.
 STILL = 1e-12
-#: Part of the first approach that is left if the impacts of an instant do not die away
+#: Part of the first approach that is left if the impacts of an instant do not die away.
 ENDLESS = 1e-3
-#: Rate after an impact, relative to the largest so far, at which a gap counts as closed
+#: Rate after an impact, relative to the largest so far, at which a gap counts as closed.
 RESTING = 1e-6
-#: Negative gaps of this size, in lengths of the model or rad, are an error
+#: Negative gaps of this size, in lengths of the model or rad, are an error.
 BEYOND = 1e-6
-#: (s) over which the acceleration of a gap is differenced
+#: Time (s) over which the acceleration of a gap is differenced.
 MOMENT = 1e-6
-#: Of the size of a gap that counts as closed: what is added to one that begins at 0 and opens
+#: What is added to a gap that begins at 0 and opens, as part of the size at which one counts as closed.
 STARTED = 1e-5
-#: Part of the span by which the rates on one side of an event are looked at
+#: Part of the span by which the rates on one side of an event are looked at.
 ASIDE = 1e-7
-#: Part of the rates by which they may differ on both sides of an event and count as continuous
+#: Part of the rates by which they may differ on both sides of an event and count as continuous.
 SMOOTH = 1e-9
-#: Part of the span within which events are simultaneous
+#: Part of the span within which events are simultaneous.
 SIMULTANEOUS = 1e-12
 #: Part of the rates that may be left against the constraints after an impact.
 LEFT = 1e-8

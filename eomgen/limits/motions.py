@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-#: Scaled step along the constraints at which the nearest position is found, a thousand roundings
+#: Scaled step along the constraints at which the nearest position is found, a thousand roundings.
 NEAREST = 1e-12
-#: Relative difference of two directions that count as one
+#: Relative difference of two directions that count as one.
 ALIGNED = 1e-12
 #: Quality, the smallest singular value over the largest, below which a position counts as singular: rates there
-#: keep ten digits at most, and a minimum is found to the root of what positions are closed to, 1e-5 at worst
+#: keep ten digits at most, and a minimum is found to the root of what positions are closed to, 1e-5 at worst.
 SINGULAR = 1e-6
 #: Quality below which an interpolant across a singular position gives more digits than the equations, which keep
-#: EXACT / s^2 of velocities
+#: EXACT / s^2 of velocities.
 POOR = 1e-3
-#: Parameters relative to the path that count as one
+#: Parameters relative to the path that count as one.
 SAME = 1e-10
-#: Scaled motion too small to tell a direction by: positions are closed to 1e-10
+#: Scaled motion too small to tell a direction by: positions are closed to 1e-10.
 UNJUDGED = 1e-6
-#: Scaled motion on either side of a singular position, tried in order
+#: Scaled motion on either side of a singular position, tried in order.
 LEAPS = (1e-3, 4e-3, 1.6e-2, 6e-2)
-#: Step of the path's parameter, relative to the path, before the way counts as blocked: 500 roundings
+#: Step of the path's parameter, relative to the path, before the way counts as blocked: 500 roundings.
 BLOCKED = 1e-13
-#: Smallest over largest singular value of J from which a grid point counts as singular
+#: Smallest over largest singular value of J from which a grid point counts as singular.
 DEGENERATE = 1e-9
-#: Part of det J at the neighbours that counts as 0 between them
+#: Part of det J at the neighbours that counts as 0 between them.
 NEGLIGIBLE = 1e-10
-#: By which a limit may be passed, for rounding and what positions are closed to
+#: By which a limit may be passed, for rounding and what positions are closed to.
 SLACK = 1e-9
-#: Distance from a singularity of Euler angles (rad) at which a failure is put down to it
+#: Distance from a singularity of Euler angles (rad) at which a failure is put down to it.
 LOCKED = 1e-4
-#: Sine of the angle between a disc's axle and its plane's normal below which it counts as flat
+#: Sine of the angle between a disc's axle and its plane's normal below which it counts as flat.
 FLAT = 1e-3
 #: Part of the largest singular value below which one is none: C_q is known to so much in large mechanisms.
 NULL = 1e-13

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 EPS = 2.0**-52  #: distance from 1 to the next number
 #: A sum counts as zero within so many times eps of its terms: the numbers of a description are rounded before they come
-#: Here, entries of a turned frame from three angles by up to nine products, a turned tensor from some 30.
+#: here, entries of a turned frame from three angles by up to nine products, a turned tensor from some 30.
 ROUNDED = 64.0 * EPS
 #: The same of a sum of products formed here, of which each is rounded once and the sum once.
 SUMMED = 4.0 * EPS
@@ -15,7 +15,7 @@ TINY = 1e-300
 #: The same of sizes that are squared.
 TINY_ROOT = 1e-150
 LARGE_ROOT = 1e150  #: a number whose square is beyond double precision
-#: Width of a bracket relative to its place at which nothing lies between: two numbers
+#: Width of a bracket relative to its place at which nothing lies between: two numbers.
 NEXT = 4e-16
 #: By which an angle may miss a multiple of a quarter turn, relative to it, and an entry of a rotation a whole number: 4
 #: to 5 eps, what pi / 2 written in sixteen digits leaves.

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-#: Largest share of the needed forces that may be left over
+#: Largest share of the needed forces that may be left over.
 REACHED = 1e-8
-#: Deviation from a straight line, relative, at which forces count as linear in an input
+#: Deviation from a straight line, relative, at which forces count as linear in an input.
 AFFINE = 1e-9
-#: Scaled rates below which a state counts as an equilibrium
+#: Scaled rates below which a state counts as an equilibrium.
 STILL = 1e-7
-#: Entries of a matrix below this part of the largest count as zero: slopes keep eight digits
+#: Entries of a matrix below this part of the largest count as zero: slopes keep eight digits.
 COUPLED = 1e-8
-#: Part of Newton's step below which it leads nowhere
+#: Part of Newton's step below which it leads nowhere.
 SHORTEST = 1e-5
-#: Scaled step at which Newton's iteration has arrived: positions are closed no better
+#: Scaled step at which Newton's iteration has arrived: positions are closed no better.
 ARRIVED = 1e-12
-#: The same where rounding of the forces leaves no more
+#: The same where rounding of the forces leaves no more.
 CLOSE = 1e-6
-#: Relative error of slopes taken from central differences
+#: Relative error of slopes taken from central differences.
 DIFFERENCES = 1e-8
-#: Scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it
+#: Scaled rate (1/s) that the constraints give to a displacement, above which an error speaks of it.
 MOVING = 1e-9
-#: Relative difference up to which K counts as symmetric where its modes are asked for
+#: Relative difference up to which K counts as symmetric where its modes are asked for.
 SYMMETRIC = 1e-9
-#: Smallest component of a unit self-stress that counts
+#: Smallest component of a unit self-stress that counts.
 SEEN = 1e-7
 #: Part of a force, or of 1 N, that a model affine in its inputs may leave when they are solved for.
 REMAINDER = 1e-6

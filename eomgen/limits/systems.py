@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 #: Subtracted from K at the places of constraints: far above the rounding of a pivot (1e-14), so that redundant rows do
-#: Not spoil it, and so small that two or three passes leave nothing of it.
+#: not spoil it, and so small that two or three passes leave nothing of it.
 RELAXATION = 1e-10
 #: K counts as singular where it answers more than 1 / PIVOT times what is asked: nothing is left of sixteen digits.
 PIVOT = 1e-14
@@ -15,5 +15,5 @@ LEFT = 1e-11
 ROUNDED = 1e-14
 #: The same of constraints along a weak direction, over its s^2: velocities are known to EXACT / s^2 there.
 FAINT = 1e-15
-#: S^2 at least: below, FAINT would allow more than a hundredth.
+#: Least s^2 in that: below it, FAINT would allow more than a hundredth.
 WEAKEST = 1e-13

@@ -7,12 +7,13 @@ negative and none above the sum of the other two (Wensing, Kim, Slotine, IEEE Ro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
+from ..limits.rounding import ROUNDED
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
@@ -37,6 +38,29 @@ def word_of_check(value: object) -> str | None:
     return value if isinstance(value, str) and value in CHECKS else None
 
 
+def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
+    """The longest distance between two points of one body, wherever the frames of bodies lie.
+
+    Parameters
+    ----------
+    bodies : iterable of sequences of (3,) arrays
+        Points of each body in its own frame (m): its centre of mass and its joints.
+
+    Returns
+    -------
+    float
+        m; 0 where no body has two points that differ by more than their rounding.
+    """
+    longest = 0.0
+    for points in bodies:
+        places = np.asarray(points, dtype=float).reshape(-1, 3)
+        rounding = ROUNDED * float(np.abs(places).max(initial=0.0))
+        for k, place in enumerate(places):
+            apart = float(np.linalg.norm(places[k + 1 :] - place, axis=1).max(initial=0.0))
+            longest = max(longest, apart if apart > rounding else 0.0)
+    return longest
+
+
 def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length: float) -> list[float]:
     """m l^2 of each body, which what rounding leaves of its inertia is judged by.
 
@@ -47,8 +71,8 @@ def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length
     tensors : sequence of (3, 3) arrays
         kg m^2.
     length : float
-        The mechanism's longest distance (m) of a centre of mass or of a joint from a body's origin: the programs that
-        compute inertias shift them over such distances.  If it is 0, the largest radius of gyration takes its place.
+        Of :func:`longest_within` (m): the programs that compute inertias shift them over such distances.  If it is 0,
+        the largest radius of gyration takes its place.
 
     Returns
     -------

@@ -13,10 +13,9 @@ import numpy as np
 
 from ..errors import PartitionError
 from ..limits.constraints import CHOSEN as STRICT
+from ..limits.constraints import PREFERENCE
 from ..limits.constraints import STATE as RANK
 from .scales import Array, Indices
-
-PREFERENCE = 0.01  #: a pivot in a preferred column is taken when it is at least this part of the best
 
 
 class Partition(NamedTuple):

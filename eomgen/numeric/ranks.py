@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.constraints import PREFERENCE, UNMOVED
 from ..limits.constraints import STRUCTURE as TOLERANCE
-from ..limits.constraints import UNMOVED
-from .partitions import PREFERENCE
 from .scales import Array, Indices
 
 ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..describe.names import nearest
 from ..errors import ModelError
-from ..numeric.inertia import fault_of_inertia, inertia_scales
+from ..numeric.inertia import fault_of_inertia, inertia_scales, longest_within
 from .placement import IDENTITY, Inertia, Placement, about, moved, sum_inertias
 from .robot import Joint, Link, Options, Robot
 
@@ -192,10 +192,12 @@ def _check_inertias(robot: Robot) -> None:
     sound = [joint for joint in robot.joints.values() if joint.place[1] not in faulty]
     welded = {end for joint in sound if joint.type == "weld" for end in (joint.parent, joint.child)}
     moved_links = {joint.child for joint in robot.joints.values()}
-    places = [link.inertia.com for link in robot.links.values()]
-    places += [joint.outer.position for joint in robot.joints.values()]
+    points = {x.name: [x.inertia.com] if x.inertia.mass else [] for x in robot.links.values()}
+    for joint in robot.joints.values():
+        points.setdefault(joint.parent, []).append(joint.outer.position)
+        points.setdefault(joint.child, []).append(joint.inner.position)
     inertias = [link.inertia for link in robot.links.values()]
-    longest = max((float(np.linalg.norm(place)) for place in places), default=0.0)
+    longest = longest_within(own for name, own in points.items() if name in robot.links)
     scales = inertia_scales([i.mass for i in inertias], [i.tensor for i in inertias], longest)
     for link, scale in zip(robot.links.values(), scales, strict=True):
         fault = fault_of_inertia(link.inertia.tensor, scale=scale)

@@ -20,10 +20,9 @@ from ..numeric.scales import Array
 if TYPE_CHECKING:
     from .module import Module
 
-SPACING = (
-    0.15  #: scaled motion between two looks, of coordinates that the constraints hold; a pass takes pi, or half of it
-)
-MOST = 200_000  #: looks at a run
+#: Scaled motion between two samples, of coordinates that the constraints hold; a pass takes pi, or half of it.
+SPACING = 0.15
+MOST = 200_000  #: samples of a run
 DIP = 0.5  #: a smallest singular value that falls below this part of its largest over the run is looked at
 ENTRIES = 2_000_000  #: of constraint Jacobians held at a time
 PARTS = 24  #: of the neighbourhood of a dip, again and again

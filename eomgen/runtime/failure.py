@@ -8,11 +8,10 @@ import numpy as np
 
 from ..errors import STATUS, EvaluationError
 from ..limits.motions import FLAT, LOCKED
-from ..limits.rounding import TINY_ROOT
+from ..limits.rounding import LARGE_ROOT, TINY_ROOT
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 
-LARGE = 1e150  #: a number whose square is beyond double precision
 SHOWN = 8  #: coordinates listed in a message
 
 WORDS = {
@@ -92,7 +91,7 @@ class Fail:
             what, remedy = f"the model is one for kinematics only: {idle}", "give those bodies mass or inertia"
         elif status in (1, 2, 4) and names and (trouble := self.trouble(x, t, p)):
             blame, remedy = f": {trouble[0]}", trouble[1]
-        elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE]):
+        elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
         elif self.culprit is not None and names:
             if status == 5 and (found := self.culprit(1, t, x, p, u)):

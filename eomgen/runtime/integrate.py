@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from .events import GO_ON, Event
 from .names import require, unknown
@@ -248,7 +249,7 @@ def _complete(part: Any, events: Sequence[Event], trail: Sequence[tuple[float, A
     latest, first = max(found)
     t, x = sign * latest, np.array(part.y_events[first][-1])
     began, state = next((point for point in reversed(trail) if sign * point[0] < latest), (t, x))
-    step, instant = abs(t - began), 1e-14 * max(abs(t), 1e-3)
+    step, instant = abs(t - began), INSTANT * max(abs(t), 1e-3)
     for e, event in enumerate(events):
         if len(part.t_events[e]) and sign * part.t_events[e][-1] > sign * began:
             continue

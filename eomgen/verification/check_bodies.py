@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..limits.rounding import EPS
 from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import EPS, FOLDED, UNIT
+from .rounding import FOLDED, UNIT
 from .truth import Truth
 
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import EomgenError
+from ..limits.rounding import EPS
 from ..numeric.scales import Array
 from .bench import Bench, numbers
 from .cases import Case
@@ -18,7 +19,7 @@ from .comparison import Comparison, pairs, size_of
 from .differences import extrapolate
 from .digits import Numbers, solve
 from .finding import Finding
-from .rounding import EPS, UNIT
+from .rounding import UNIT
 from .truth import Truth, Values
 
 DIRECTIONS = 2  #: random ones for each state

@@ -23,9 +23,8 @@ from .comparison import Comparison, size_of
 from .finding import Finding
 
 ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
-SHORT = (
-    0.5  #: by how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others
-)
+#: By how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others.
+SHORT = 0.5
 JUDGED = 3  #: states that single steps are taken from
 LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
 LOOSE = 1e6  #: tolerance that accepts every step

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import EomgenError
+from ..limits.rounding import EPS
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .cases import CLOSED, Case
@@ -21,7 +22,6 @@ from .finding import Finding
 if TYPE_CHECKING:
     from ..runtime.module import Module
 
-EPS = float(np.finfo(float).eps)
 #: Rounding of a kernel relative to its largest entry, where the size of the terms behind it is not known: sums of some
 #: hundred products.  Checks that know the graph have bounds of their own.
 KERNEL = 256.0 * EPS

@@ -16,9 +16,9 @@ import numpy as np
 from ..graph.core import Expr
 from ..graph.evaluate import FUNCTIONS
 from ..graph.traverse import common_graph, reachable
+from ..limits.rounding import EPS
 from ..numeric.scales import Array
 
-EPS = float(np.finfo(float).eps)
 #: Relative rounding of one node: at most three roundings to nearest (a reciprocal, a product, a sum), and one unit in
 #: the last place, 2 roundings, of a function; 4 half units each way.
 UNIT = 2.0 * EPS

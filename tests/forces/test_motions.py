@@ -339,7 +339,7 @@ def test_the_energy_balance_of_a_run_counts_what_a_bushing_and_a_stop_lose() -> 
     m.friction("rub", "z", coulomb=0.5, smoothing=0.2)
     equations = m.derive()
     run = equations.compile(target="numpy").simulate((0, 1), initial={"z_dot": 3.0}, dense_output=True, **TIGHT)
-    found = balance_energy(equations, run, {})
+    found = balance_energy(equations, run)
     assert found.work is not None
     assert found.work < -1
     assert found.power_balance is not None

@@ -18,7 +18,7 @@ from robots.pinocchio_judge import Judge
 from robots.shipped import EXAMPLES, urdf_robots
 
 import eomgen as eg
-from eomgen.numeric.inertia import COMPUTED, fault_of_inertia, inertia_scales
+from eomgen.numeric.inertia import COMPUTED, fault_of_inertia, inertia_scales, longest_within
 
 LINK = """<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
 <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
@@ -107,6 +107,50 @@ def test_the_measure_is_m_l_squared() -> None:
     assert inertia_scales([0.0, 3.0], [thin, thin], 2.0) == [12.0, 12.0]
     assert inertia_scales([0.0, 0.0], [thin, np.eye(3)], 2.0) == [1.0, 1.0]
     assert inertia_scales([2.0, 1.0], [np.eye(3), thin], 0.0) == [pytest.approx(3.0), pytest.approx(1.5)]
+
+
+def test_where_a_body_frame_lies_does_not_matter() -> None:
+    """A moment of -1e-3 kg m^2 is no rounding of 1 kg over 0.5 m, and -1e-15 is; about a far point it may be."""
+    for far in (0.0, 1e4, 1e6):
+        for moment, wrong in ((-1e-3, True), (-1e-15, False)):
+            m = eg.Model("far")
+            b = m.body("b", mass=1.0, com=(far + 0.5, 0, 0), inertia=(moment, 1e-8, 1e-8))
+            m.revolute("a", m.ground, b.at(far, 0, 0), coordinate="th")
+            if wrong:
+                with pytest.raises(eg.ModelError, match="negative principal moment"):
+                    m.mechanism()
+            else:
+                m.mechanism()
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_point_mass_with_its_inertia_about_the_origin_passes(free: bool) -> None:
+    """What is left about the centre of mass is rounding of m d^2, positive or negative."""
+    rng = np.random.default_rng(0)
+    for d in rng.normal(size=(20, 3)):
+        m, mass = eg.Model("point"), float(rng.uniform(0.1, 5.0))
+        b = m.body("b", mass=mass, com=tuple(d), inertia=(mass * ((d @ d) * np.eye(3) - np.outer(d, d))).tolist(),
+                   about="origin")  # fmt: skip
+        m.free("F", m.ground, b) if free else m.revolute("F", m.ground, b.at(*d))
+        m.mechanism()
+
+
+def test_distances_within_bodies() -> None:
+    far = np.array([1e6, 0.0, 0.0])
+    bodies = [[(0.0, 0.0, 0.0), (0.3, 0.4, 0.0)], [(1.0, 0.0, 0.0)], []]
+    assert longest_within(bodies) == pytest.approx(0.5)
+    assert longest_within([np.array(own).reshape(-1, 3) + far for own in bodies]) == pytest.approx(0.5, rel=1e-9)
+    assert longest_within([[far, far + 1e-9]]) == 0.0  # rounding of the places
+
+
+def test_a_link_far_from_its_joints_frame_is_judged_by_its_own_lengths(tmp_path: Path) -> None:
+    """Beside another fault the links are judged one by one: a long tower before the arm changes nothing."""
+    path = write(tmp_path, {"xx": "-1e-3"})
+    text = path.read_text().replace('<child link="upper"/>', '<child link="upper"/><origin xyz="1e6 0 0"/>')
+    for joint in ("", '<joint name="c" type="hinge"><parent link="lower"/><child link="none"/></joint>'):
+        path.write_text(text.replace("</robot>", f"{joint}</robot>"))
+        with pytest.raises(eg.ModelError, match="negative principal moment"):
+            eg.load(path).mechanism()
 
 
 def test_units_do_not_matter(tmp_path: Path) -> None:

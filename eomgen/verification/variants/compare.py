@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import EomgenError
+from ...limits.rounding import EPS
 from ..finding import Finding
-from .states import EPS, ROUNDINGS, Original, compiled, reactions_of
+from .states import ROUNDINGS, Original, compiled, reactions_of
 from .texts import names_of
 from .variant import NotApplicable, Variant
 

@@ -17,6 +17,7 @@ import numpy as np
 from ...describe.description import Description
 from ...describe.model import Model
 from ...errors import EomgenError
+from ...limits.rounding import EPS
 from ...numeric.scales import Array
 from ...records import dataclass
 from .frames import length_of
@@ -25,7 +26,6 @@ from .variant import kinds_of, velocities_of
 
 #: Roundings of the size of the result that a calculation may collect; the largest ratio seen stands in docs.
 ROUNDINGS = 200.0
-EPS = float(np.finfo(float).eps)
 STATES = 3
 
 

@@ -27,7 +27,7 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
             break;
         }
         cholesky_solve(rows, G, z);
-        if (longest > 0.01 * before) {
+        if (longest > CONSTRAINTS_FAST * before) {
             const double weak = weakness(rows, J, z, &size);
             if (!(sqrt(square) * (order == 2 ? weak : sqrt(weak)) > noise * sqrt(size))) {
                 break;

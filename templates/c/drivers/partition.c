@@ -49,7 +49,7 @@ static int split(int width, int strict, partition *restrict parts, double *restr
         }
         size = step == 0 ? sizes[0] : size;
         parts->weakest = step == 0 ? 1.0 : fmin(parts->weakest, sizes[0] / size);
-        const int kind = strict || (sizes[1] >= 0.01 * sizes[0] && sizes[1] > 0.0);
+        const int kind = strict || (sizes[1] >= CONSTRAINTS_PREFERENCE * sizes[0] && sizes[1] > 0.0);
         if (!(sizes[kind] > (strict ? CONSTRAINTS_CHOSEN : CONSTRAINTS_STATE) * size)) {
             return EOMGEN_PARTITION_BAD;
         }

@@ -43,7 +43,7 @@ static int close_position(double t, double *restrict q, const double *restrict u
         if (left > CONSTRAINTS_HINDERED * size && !is_within(CONSTRAINTS_EXACT, ROUNDING_SUMMED, C, J, q, s)) { /* along weak rows, and the term keeps it */
             double row;
             const double weak = weakness(MH, J, w + AT_E, &row);
-            if (size < 0.01 * weak) { /* the step is far shorter than the way to lost rank */
+            if (size < CONSTRAINTS_NEAR * weak) { /* the step is far shorter than the way to lost rank */
                 (void)factor_gram(MH, J, fmax(CONSTRAINTS_TIKHONOV, CONSTRAINTS_BELOW * weak), w + AT_G);
                 left = step_back(C, w);
             }
