@@ -170,11 +170,24 @@ def drift(values: Callable[[float], Array], t: float) -> Array:
 def moving_inputs(layout: Layout, u: Array) -> Array:
     """Rates (n_u,) of inputs whose rates are among the inputs u (n_u,); 0 of the others."""
     rates = np.zeros(layout.n_u)
-    for name, of in layout.input_rates.items():
-        for (base, order), (rate, times) in pairwise([(name, 0), *of]):
-            if times == order + 1 and base in layout.u:
-                rates[layout.u.index(base)] = u[layout.u.index(rate)]
+    for base, rate in rate_places(layout).items():
+        rates[base] = u[rate]
     return rates
+
+
+def rate_pairs(layout: Layout) -> list[tuple[str, str]]:
+    """Inputs, or their rates, each with the rate that is its derivative: (l, l_dot), (l_dot, l_ddot)."""
+    return [
+        (base, rate)
+        for name, of in layout.input_rates.items()
+        for (base, order), (rate, times) in pairwise([(name, 0), *of])
+        if times == order + 1
+    ]
+
+
+def rate_places(layout: Layout) -> dict[int, int]:
+    """Places in u of the inputs whose rates are inputs too, with those of the rates."""
+    return {layout.u.index(base): layout.u.index(rate) for base, rate in rate_pairs(layout) if base in layout.u}
 
 
 def fill_rates(
