@@ -12,13 +12,14 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE
 from ..numeric.scales import Array
-from .signal_rates import TableRate
+from .signal_rates import TableRate, find_jump
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
     from .signals import Forcing
 
 OfTime = Callable[[float], float]
+NONE = np.empty(0)  #: no state
 BLOCKS, CELLS = 16, 16  #: a run is compared on so many parts, each of so many intervals
 BESIDE = DIFFERENCE  #: part of a run over which an input and its rate are compared beside one time
 
@@ -55,7 +56,13 @@ def require_agreement(forcing: Forcing, start: float, end: float) -> None:
                     raise UsageError(
                         f"input {rate} is not the rate of {name}: at t = {t:.6g} s {name} changes by {changes:.6g} per "
                         f"second, and {rate} says {says:.6g}; leave {rate} out where {name} is a number, a table or "
-                        f"a text, or mend it"
+                        "a text, or mend it"
+                    )
+                jump = None if table else find_jump(lambda t, x, f=f: f(t), lambda t, x, g=g: g(t), NONE, start, end)  # type: ignore[misc]
+                if jump is not None:
+                    raise UsageError(
+                        f"input {name}: the equations need its rate {rate}, and it jumps at t = {jump:.6g} s, which is "
+                        "an impact; write it smoother"
                     )
 
 

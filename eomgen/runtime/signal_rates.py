@@ -126,7 +126,10 @@ def require_smooth(forcing: Forcing, start: float, end: float) -> None:
             what = f"input {name}: the equations need its rate {rate}"
             if f.depends_on_state:
                 raise UsageError(f"{what}, and conditions on the state may make it jump; write it without, or in t")
-            jump = find_jump(f.function(forcing.parameters), g.function(forcing.parameters), zero, start, end)
+            value, slope = f.function(forcing.parameters), g.function(forcing.parameters)
+            jump = find_jump(value, slope, zero, start, end)
+            if jump is None:
+                jump = find_switch(value, slope, f.switches(forcing.parameters), zero, start, end)
             if jump is not None:
                 raise UsageError(f"{what}, and it jumps at t = {jump:.6g} s, which is an impact; write it smoother")
 
@@ -157,6 +160,39 @@ def find_jump(
             if right - left <= LOCATED * (high - low) or not left < middle < right:
                 return middle
             left, right = (left, middle) if gap(left, middle) > gap(middle, right) else (middle, right)
+    return None
+
+
+def find_switch(
+    value: Callable[[float, Array], float],
+    rate: Callable[[float, Array], float],
+    switches: Callable[[float, Array], list[float]],
+    x: Array,
+    start: float,
+    end: float,
+) -> float | None:
+    """A time at which a function jumps because a condition of it changes, however soon it changes back; None if none.
+
+    The conditions are followed by what they compare, whose signs are looked at on the ends of CELLS intervals of the
+    run and on four times inside each.
+    """
+    low, high = min(start, end), max(start, end)
+    inner = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
+    edges = np.linspace(low, high, CELLS + 1)
+    times: list[float] = np.sort(np.concatenate([edges, *(edges[:-1] + s * np.diff(edges) for s in inner)])).tolist()
+    signs = np.array([switches(t, x) for t in times]) > 0.0
+    beside = LOCATED * (high - low)
+    allowed = CONTINUOUS * max(TINY, *(abs(value(t, x)) for t in edges.tolist()))
+    for i, k in np.argwhere(signs[1:] != signs[:-1]).tolist():
+        left, right = times[i], times[i + 1]
+        while right - left > beside and left < (middle := 0.5 * (left + right)) < right:
+            left, right = (left, middle) if (switches(middle, x)[k] > 0.0) != signs[i, k] else (middle, right)
+        before, after = left - beside, right + beside
+        if before < low or after > high:
+            continue
+        own = 2.0 * (after - before) * max(abs(rate(before, x)), abs(rate(after, x)))  # what it changes without a jump
+        if abs(value(after, x) - value(before, x)) > allowed + own:
+            return 0.5 * (left + right)
     return None
 
 
