@@ -327,7 +327,7 @@ def find_state(
     """
     if forcing is not None and forcing.constrained:
         layout = module.layout
-        places, names = layout.constraint_inputs, [layout.u[i] for i in layout.constraint_inputs]
+        places = layout.constraint_inputs
 
         def assemble(u: Array) -> tuple[Array, Array]:
             """The state at inputs u, and the inputs at this state."""
@@ -354,7 +354,7 @@ def find_state(
             u[places] = found[places] - gap + move
         given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
         raise AssemblyError(
-            f"the inputs {', '.join(names)} change with the state that the constraints give at t = {t:.6g} s, and no "
+            f"the inputs {', '.join(layout.u[i] for i in places)} change with the state that the constraints give at t = {t:.6g} s, and no "
             f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
             "give initial values nearer to such a state, or write the inputs in t",
             [],
