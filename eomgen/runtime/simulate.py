@@ -352,9 +352,10 @@ def find_state(
                 break
             before, u = (move, gap), found.copy()
             u[places] = found[places] - gap + move
+        names = ", ".join(layout.u[i] for i in places)
         given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
         raise AssemblyError(
-            f"the inputs {', '.join(layout.u[i] for i in places)} change with the state that the constraints give at t = {t:.6g} s, and no "
+            f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
             f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
             "give initial values nearer to such a state, or write the inputs in t",
             [],
