@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
-from ..runtime.signal_rates import derive, drift, moving_inputs
+from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import Formula
 
 if TYPE_CHECKING:
@@ -139,8 +139,8 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
         raise UsageError(words)
-    if isinstance(value, Formula) or hasattr(value, "derivative"):
-        rate = derive(name, f"{name}_dot", value)
+    if isinstance(value, Formula) or (hasattr(value, "derivative") and value.derivative() is not None):
+        rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
         return float((rate.function(forcing.parameters) if isinstance(rate, Formula) else rate)(t, x))
     f = forcing.varying[index]
     if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):

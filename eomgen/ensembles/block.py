@@ -164,13 +164,16 @@ def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Pl
 
 def find_forcing(module: Module, plan: Plan) -> Forcing:
     """The inputs of all runs; those that are constant count as 0 here."""
-    return Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
+    forcing = Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
+    forcing.unsettled = frozenset(plan.constants)
+    return forcing
 
 
 def forcing_of(module: Module, cases: Cases, plan: Plan, k: int) -> Forcing:
     """The inputs of run k."""
     forcing = find_forcing(module, plan)
     forcing.attach(module.bind(**cases.column(k)))
+    forcing.unsettled = frozenset()
     forcing.begin(*plan.span)
     return forcing
 

@@ -17,7 +17,7 @@ from ..runtime.compiled import can_run
 from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
-from ..runtime.signal_rates import fill_rates
+from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
 from ..runtime.simulate import DEFAULTS, check_count, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
@@ -219,6 +219,9 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
     only = {name for name in layout.input_rates if name not in layout.u}
     rest = {name: x for name, x in inputs.items() if name not in tables}
     still = fill_rates(layout, inputs, lambda name, rate, value: 0.0)
+    for name, rate in rate_pairs(layout):
+        if name in rest and rate in rest and np.any(np.asarray(rest[rate], dtype=float) != 0.0):
+            raise UsageError(f"input {rate} is not the rate of {name}, which is a number in each run; give {rate} as 0")
     held = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
     return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
 

@@ -23,5 +23,7 @@ AHEAD = 1e-8  #: part of the run over which the rate of an event's value is take
 # -- inputs ----------------------------------------------------------------------------------------------------------
 MOMENT = 1e-5  #: (s) over which the explicit part of a rate in time is differenced: the cube root of eps
 CONTINUOUS = 1e-9  #: part of the largest value or slope of a table by which it may jump and count as continuous
+CONTRADICTS = 1e-2  #: part of what an input changes in a run, by which a rate given beside it may be wrong
+CONTRADICTS_TABLE = 1e-1  #: the same where one of them is a table, which is coarse between its points
 DIFFERENCE = 1e-6  #: part of a variable over which a function of it is differenced
 LOCATED = 1e-12  #: part of an interval to which the jump of a text is located: beside it lie 4,000 numbers

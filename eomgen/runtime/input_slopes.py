@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .layout import Layout
-from .signal_rates import TableRate
+from .signal_rates import TableRate, rate_places
 from .signals import Forcing, Signal
 
 
@@ -40,8 +40,7 @@ class InputSlopes:
         self.layout = layout
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
         self.forcing = forcing
-        chains = ((layout.u.index(name), of[0]) for name, of in layout.input_rates.items() if name in layout.u)
-        self.rates = {i: layout.u.index(rate) for i, (rate, times) in chains if times == 1}
+        self.rates = rate_places(layout)
         self.tables: dict[int, TableRate] = {}
         self.functions: set[int] = set()
         for i, signal in forcing.varying.items():

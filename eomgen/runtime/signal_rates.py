@@ -126,7 +126,10 @@ def require_smooth(forcing: Forcing, start: float, end: float) -> None:
             what = f"input {name}: the equations need its rate {rate}"
             if f.depends_on_state:
                 raise UsageError(f"{what}, and conditions on the state may make it jump; write it without, or in t")
-            jump = find_jump(f.function(forcing.parameters), g.function(forcing.parameters), zero, start, end)
+            value, slope = f.function(forcing.parameters), g.function(forcing.parameters)
+            jump = find_jump(value, slope, zero, start, end)
+            if jump is None:
+                jump = find_switch(value, slope, f.switches(forcing.parameters), zero, start, end)
             if jump is not None:
                 raise UsageError(f"{what}, and it jumps at t = {jump:.6g} s, which is an impact; write it smoother")
 
@@ -160,6 +163,39 @@ def find_jump(
     return None
 
 
+def find_switch(
+    value: Callable[[float, Array], float],
+    rate: Callable[[float, Array], float],
+    switches: Callable[[float, Array], list[float]],
+    x: Array,
+    start: float,
+    end: float,
+) -> float | None:
+    """A time at which a function jumps because a condition of it changes, however soon it changes back; None if none.
+
+    The conditions are followed by what they compare, whose signs are looked at on the ends of CELLS intervals of the
+    run and on four times inside each.
+    """
+    low, high = min(start, end), max(start, end)
+    inner = 0.5 + 0.5 * np.polynomial.legendre.leggauss(4)[0]
+    edges = np.linspace(low, high, CELLS + 1)
+    times: list[float] = np.sort(np.concatenate([edges, *(edges[:-1] + s * np.diff(edges) for s in inner)])).tolist()
+    signs = np.array([switches(t, x) for t in times]) > 0.0
+    beside = LOCATED * (high - low)
+    allowed = CONTINUOUS * max(TINY, *(abs(value(t, x)) for t in edges.tolist()))
+    for i, k in np.argwhere(signs[1:] != signs[:-1]).tolist():
+        left, right = times[i], times[i + 1]
+        while right - left > beside and left < (middle := 0.5 * (left + right)) < right:
+            left, right = (left, middle) if (switches(middle, x)[k] > 0.0) != signs[i, k] else (middle, right)
+        before, after = left - beside, right + beside
+        if before < low or after > high:
+            continue
+        own = 2.0 * (after - before) * max(abs(rate(before, x)), abs(rate(after, x)))  # what it changes without a jump
+        if abs(value(after, x) - value(before, x)) > allowed + own:
+            return 0.5 * (left + right)
+    return None
+
+
 def drift(values: Callable[[float], Array], t: float) -> Array:
     """Derivatives by time, (n,), of values that may depend on it, to fourth order."""
     h = (t + MOMENT * max(1.0, abs(t))) - t
@@ -170,11 +206,24 @@ def drift(values: Callable[[float], Array], t: float) -> Array:
 def moving_inputs(layout: Layout, u: Array) -> Array:
     """Rates (n_u,) of inputs whose rates are among the inputs u (n_u,); 0 of the others."""
     rates = np.zeros(layout.n_u)
-    for name, of in layout.input_rates.items():
-        for (base, order), (rate, times) in pairwise([(name, 0), *of]):
-            if times == order + 1 and base in layout.u:
-                rates[layout.u.index(base)] = u[layout.u.index(rate)]
+    for base, rate in rate_places(layout).items():
+        rates[base] = u[rate]
     return rates
+
+
+def rate_pairs(layout: Layout) -> list[tuple[str, str]]:
+    """Inputs, or their rates, each with the rate that is its derivative: (l, l_dot), (l_dot, l_ddot)."""
+    return [
+        (base, rate)
+        for name, of in layout.input_rates.items()
+        for (base, order), (rate, times) in pairwise([(name, 0), *of])
+        if times == order + 1
+    ]
+
+
+def rate_places(layout: Layout) -> dict[int, int]:
+    """Places in u of the inputs whose rates are inputs too, with those of the rates."""
+    return {layout.u.index(base): layout.u.index(rate) for base, rate in rate_pairs(layout) if base in layout.u}
 
 
 def fill_rates(

@@ -15,6 +15,7 @@ from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, require_time_and_state, unknown
+from .rate_checks import require_agreement
 from .signal_rates import TableRate, derive, fill_rates, jumps, pieces_of, require_smooth
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
@@ -193,6 +194,7 @@ class Forcing:
         self.base, self.parameters = np.zeros(layout.n_u), np.zeros(layout.n_p)
         self.names = layout.u
         self.lapse: Lapse | None = None
+        self.unsettled: frozenset[str] = frozenset()  #: numbers that are given later, for each run of an ensemble
 
     def _read(self, name: str, value: Any) -> Any:
         """What a user gives as a number, a Signal, a Formula or a function."""
@@ -221,11 +223,13 @@ class Forcing:
         Raises
         ------
         UsageError
-            A table jumps where its rate is needed, or its rate where the rate of that is.
+            A table jumps where its rate is needed, or its rate where the rate of that is; a rate is not that of its
+            input.
         """
         self.span = (start, end)
         self.enter(start, end)
         require_smooth(self, start, end)
+        require_agreement(self, start, end)
 
     def enter(self, start: float, end: float) -> None:
         """Go on with the part of a run between two corners: at its ends tables have the piece inside it."""

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: Steps of one size in one run; storing them takes gigabytes.
 MOST_STEPS = 10**8
-#: Assemblies in turn with inputs that depend on the state.
+#: Assemblies in turn, by secant steps, with inputs that depend on the state.
 ROUNDS = 50
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
@@ -327,15 +327,39 @@ def find_state(
     """
     if forcing is not None and forcing.constrained:
         layout = module.layout
-        x, places = np.concatenate([layout.q_reference, np.zeros(layout.n_v)]), layout.constraint_inputs
-        for _ in range(ROUNDS):
-            u = forcing(t, x)
-            forcing.require_finite()
+        places = layout.constraint_inputs
+
+        def assemble(u: Array) -> tuple[Array, Array]:
+            """The state at inputs u, and the inputs at this state."""
             x = find_state(module.bind(None, u), initial, t)
-            if np.allclose(forcing(t, x)[places], u[places], rtol=ALIKE, atol=ALIKE):
+            found = forcing(t, x)
+            forcing.require_finite()
+            return x, found
+
+        u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
+        forcing.require_finite()
+        secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
+        for _ in range(ROUNDS):
+            x, found = assemble(u)
+            gap = (found - u)[places]
+            if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
                 return x
+            if before is not None:  # Broyden's update: the slope that explains the last step
+                move, change = before
+                secant += np.outer(gap - change - secant @ move, move) / (move @ move)
+            move = np.linalg.lstsq(secant, -gap, rcond=None)[0]
+            if not np.isfinite(move).all() or not move.any():
+                break
+            before, u = (move, gap), found.copy()
+            u[places] = found[places] - gap + move
         names = ", ".join(layout.u[i] for i in places)
-        raise AssemblyError(f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s", [])
+        given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
+        raise AssemblyError(
+            f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
+            f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
+            "give initial values nearer to such a state, or write the inputs in t",
+            [],
+        )
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):

@@ -71,6 +71,20 @@ class Formula:
         graph = self.expression.graph
         return any(graph.nodes[i][0] in BRANCHING for i in reachable(graph, [self.expression.id]))
 
+    def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
+        """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
+        from ..graph.core import Expr
+        from ..graph.evaluate import compile_evaluator
+        from ..graph.traverse import reachable
+
+        graph, found = self.expression.graph, []
+        for i in reachable(graph, [self.expression.id]):
+            node = graph.nodes[i]
+            if node[0] in SWITCHING:
+                found.append(Expr(graph, graph.sub(*node[1:3]) if node[0] != "sign" else node[1]))
+        evaluate, values = compile_evaluator(found, ("t", *self.layout.x, *self.layout.p)), p.tolist()
+        return lambda t, x: [float(value) for value in evaluate([t, *np.asarray(x).tolist(), *values])]
+
     def derivative(self, name: str, rate: str) -> Formula:
         """The derivative by time along the motion, of an input that is called ``name``.
 
@@ -152,6 +166,14 @@ class DeclaredSignal:
         """f(t, x) at given parameters (n_p,)."""
         play = _player(self.tape, p)
         return lambda t, x: play(t, x)[0]
+
+    def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
+        """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
+        code, numbers, _ = self.tape
+        own = [(op, a, b) for op, a, b, _ in code if op in SWITCHING]
+        added = [("sub", a, b, 0) for op, a, b in own if op != "sign"]
+        out = [*range(len(code), len(code) + len(added)), *(a for op, a, _ in own if op == "sign")]
+        return _player(([*code, *added], numbers, out), p)
 
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:
         """Its derivatives (1 + n_x + n_p,) by t, x and p, as f(t, x) at given parameters (n_p,)."""
@@ -242,6 +264,8 @@ BEYOND: dict[str, Callable[[float, float, float], float]] = {
 
 #: Operations at which an expression may jump or bend.
 BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
+#: Those that jump where what they compare is equal.
+SWITCHING = ("sign", "lt", "le", "eq")
 
 
 def is_formula(value: Any) -> bool:

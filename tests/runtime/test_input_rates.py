@@ -160,6 +160,73 @@ def test_a_rate_without_its_input_is_refused(ring: Any) -> None:
     assert np.abs(np.hypot(run["x"], run["y"]) - 1.0).max() < 1e-12
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"l": 1.0, "l_dot": 1.0},
+        {"l": "1 + t", "l_dot": 0.0},
+        {"l": "1 + t", "l_dot": "2 + 0*t"},
+        {"l": ([0.0, 1.0], [1.0, 2.0]), "l_dot": ([0.0, 1.0], [5.0, 5.0])},
+        {"l": lambda t, x: 1.0 + t, "l_dot": lambda t, x: 2.0 * t},
+        {"l": lambda t, x: 1.0 + t, "l_dot": 1.03},
+    ],
+)
+def test_a_rate_that_contradicts_its_input_is_refused(given: Any) -> None:
+    winch = build("winch", "numpy")
+    with pytest.raises(eg.UsageError, match="input l_dot is not the rate of l: at t = .* l changes by"):
+        winch.simulate(1.0, {"th_dot": 1.0}, inputs=given)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"l": "1 + 0.1*sin(3000*t)", "l_dot": "300*cos(3000*t)"},  # 500 periods
+        {"l": (GRID, 1.0 + np.sin(6.0 * GRID) / 9.0), "l_dot": (GRID, 6.0 * np.cos(6.0 * GRID) / 9.0)},  # coarse
+        {"l": lambda t, x: 1.0 + max(0.0, t - 0.3), "l_dot": lambda t, x: float(t > 0.3)},
+        {"l": lambda t, x: 1.0 + x[0], "l_dot": lambda t, x: x[1]},
+    ],
+)
+def test_a_rate_that_is_right_is_taken(given: Any) -> None:
+    winch = build("winch", "numpy")
+    run = winch.simulate(1.0, {"th_dot": 1.0}, inputs=given, max_step=0.01)
+    assert np.abs(run["l"] ** 2 * run["th_dot"] - 1.0).max() < 0.03  # the coarse table is off by 0.02
+
+
+def test_a_jump_of_a_function_is_refused_though_its_rate_is_given() -> None:
+    step = {"l": lambda t, x: 1.0 + (t > 0.3), "l_dot": 0.0}
+    with pytest.raises(eg.UsageError, match=r"jumps at t = 0\.3 s"):
+        build("winch", "numpy").simulate(1.0, {"th_dot": 1.0}, inputs=step)
+
+
+def test_a_rate_that_is_bound_of_a_held_input_is_refused() -> None:
+    bound = build("winch", "numpy").bind(u={"l": 1.0, "l_dot": 1.0})
+    refused: Any = {"match": "input l_dot is bound to 1, the rate of l, which is held"}
+    with pytest.raises(eg.UsageError, **refused):
+        bound.simulate(1.0, {"th_dot": 1.0})
+    with pytest.raises(eg.UsageError, **refused):
+        bound.sensitivities(["th"], 1.0, {"th_dot": 1.0})
+    with pytest.raises(eg.UsageError, **refused):
+        bound.simulate_many(1.0, {"th_dot": 1.0}, count=2)
+    let_out = bound.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + t"}, **TIGHT)
+    assert abs(let_out["th_dot"][-1] - 0.25) < 1e-9
+    with pytest.raises(eg.UsageError, match="l_dot is not the rate of l, which is a number in each run"):
+        bound.simulate_many(1.0, {"th_dot": 1.0}, inputs={"l": [1.0, 2.0], "l_dot": [1.0, 2.0]})
+
+
+@pytest.mark.parametrize(
+    "pulse", ["where(t > 0.5, 1, 0)*where(t < 0.501, 1, 0)", "max(sign(t - 0.5), 0)*(t < 0.50001)"]
+)
+def test_a_short_pulse_is_a_jump(pulse: str) -> None:
+    with pytest.raises(eg.UsageError, match=r"l_dot, and it jumps at t = 0\.5"):
+        build("winch", "numpy").simulate(1.0, {"th_dot": 1.0}, inputs={"l": f"1 + 0.1*{pulse}"})
+
+
+def test_a_steep_text_with_a_condition_is_no_jump() -> None:
+    steep = "1 + where(t < 0.5, 0, (t - 0.5)*1000*exp(-1000*(t - 0.5)))"
+    run = build("winch", "numpy").simulate(1.0, {"th_dot": 1.0}, inputs={"l": steep}, max_step=1e-3, **TIGHT)
+    assert abs(run["th_dot"][-1] - 1.0) < 1e-6
+
+
 def test_a_text_may_bend_where_one_rate_is_enough(winch: Any) -> None:
     run = winch.simulate(1.0, {"th_dot": 1.0}, inputs={"l": "1 + max(0, t - 0.25)"}, **TIGHT)
     assert abs(run["th_dot"][-1] - 1.0 / 1.75**2) < 1e-8
@@ -203,6 +270,44 @@ def test_rows_of_velocities_take_one_rate() -> None:
         assert run.residuals.velocity < 1e-14
     with pytest.raises(eg.AssemblyError, match="the inputs u change with the state"):
         mod.simulate(1.0, {"x_dot": 1.0}, inputs={"u": lambda t, s: 0.5 if s[3] > s[2] else 1.5, "u_dot": 0.0})
+
+
+@pytest.mark.parametrize("k", [0.6, 0.95, -1.5, 3.0])
+def test_an_input_that_depends_on_the_state_is_assembled_with_it(k: float) -> None:
+    """y' = u x' with u = 0.2 + k y' has u = 0.2 / (1 - k x'), also where taking u in turn diverges."""
+    u = sp.Symbol("u")
+    m = eg.Model.from_lagrangian(
+        "blade", (x_dot**2 + y_dot**2) / 2, [x, y], constraints=[y_dot - u * x_dot], inputs={u: 0.0}
+    )
+    inputs = {"u": lambda t, s: 0.2 + k * s[3], "u_dot": 0.0}
+    run = m.compile(target="numpy").simulate(1e-6, {"x_dot": 0.5}, inputs=inputs)
+    assert abs(run["y_dot"][0] / run["x_dot"][0] - 0.2 / (1.0 - 0.5 * k)) < 1e-12
+
+
+def test_a_short_pulse_that_the_model_declares_is_a_jump() -> None:
+    m = eg.Model("arm")
+    m.input("u", signal="0.1*where(t > 0.5, 1, 0)*where(t < 0.501, 1, 0)")
+    m.revolute("A", m.ground, m.body("arm", mass=0.0), coordinate="phi")
+    m.prismatic("S", m.ground, m.body("bead", mass=1.0), axis="x", coordinate="r")
+    m.driver("lead", coordinate="phi", value="u")
+    with pytest.raises(eg.UsageError, match=r"input u: the equations need its rate u_dot, and it jumps at t = 0\.5"):
+        m.compile(target="numpy").simulate(1.0)
+
+
+def test_rates_of_all_orders_as_functions_serve_sensitivities() -> None:
+    m = eg.Model("lift")
+    m.input("lift", 0.3)
+    m.prismatic("X", m.ground, m.body("b", mass=1.0), axis="x", coordinate="x")
+    m.prismatic("S", m.ground, m.body("c", mass=1.0), axis="x", coordinate="s")
+    m.actuator("F", "X", "-4*x")
+    m.coupling("flow", equation="s - x*lift - x")
+    m.event("hit", "x - 0.5", reset={"x_dot": "-x_dot"}, direction=1)
+    mod, functions = m.compile(target="numpy"), [lambda t, x: 0.3 + 0.1 * np.sin(t), lambda t, x: 0.1 * np.cos(t)]
+    given = {"lift": functions[0], "lift_dot": functions[1], "lift_ddot": lambda t, x: -0.1 * np.sin(t)}
+    start = {"x": 0.2, "x_dot": 1.0}
+    found = mod.sensitivities(["x"], 1.5, start, inputs=given, **TIGHT).dx[:, 0, -1]
+    ends = [mod.simulate(1.5, {**start, "x": 0.2 + h}, inputs=given, **TIGHT).x[:, -1] for h in (1e-5, -1e-5)]
+    assert np.abs(found - (ends[0] - ends[1]) / 2e-5).max() < 1e-6
 
 
 def test_sympy_functions_of_time_are_inputs_with_both_rates() -> None:
