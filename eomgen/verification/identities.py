@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import EomgenError
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
+from ..runtime.signal_rates import moving_inputs
 from .cases import CLOSED, Case
 from .comparison import Comparison, failed, size_of
 from .differences import extrapolate
@@ -155,7 +156,7 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
 
 
 def _holding(module: Module, cases: Sequence[Case]) -> Finding:
-    """d/dt (C_q v + C_t) = 0 along x' = rhs."""
+    """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
     check = "rhs: constraints go on holding"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
@@ -173,9 +174,11 @@ def _holding(module: Module, cases: Sequence[Case]) -> Finding:
 
 
 def _along_x(module: Module, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
+    u_rate = moving_inputs(module.layout, c.u)
+
     def f(s: float) -> Array:
-        x, t = c.x + s * pace * rate, c.t + s * pace
-        return module.velocity_constraints(x, p=c.p, u=c.u, t=t)
+        x, t, u = c.x + s * pace * rate, c.t + s * pace, c.u + s * pace * u_rate
+        return module.velocity_constraints(x, p=c.p, u=u, t=t)
 
     return f
 
