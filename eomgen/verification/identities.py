@@ -34,6 +34,9 @@ def identities(module: Module, cases: Sequence[Case]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
     found = []
     for name, check in CHECKS.items():
+        if module.metadata.get("no_inertia") and check not in KINEMATIC:
+            found.append(Finding.skipped(name, "the model is there for kinematics only"))
+            continue
         try:
             found.append(check(module, cases))
         except EomgenError as error:
@@ -217,3 +220,5 @@ CHECKS: dict[str, Check] = {
     "rhs: constraints go on holding": _holding,
     "minimal: the same accelerations": _minimal,
 }
+#: Those that need no inertia.
+KINEMATIC = (_slopes, _projection)

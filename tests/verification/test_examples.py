@@ -106,7 +106,7 @@ def test_the_command(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.Monk
     assert "verify" in printed.err
     assert run(*words, "--json") == 0
     result = json.loads(capfd.readouterr().out)
-    assert list(result) == ["name", "method", "ok", "findings", "seconds"]
+    assert list(result) == ["name", "method", "ok", "not_reached", "findings", "seconds"]
     keys = {"check", "ok", "left_out", "worst", "limit", "where", "cases", "note"}
     assert all(set(f) == keys for f in result["findings"])
     monkeypatch.setattr("eomgen.verification.bodies.Rigid.centre", lambda self, pose: pose.position)
