@@ -99,6 +99,8 @@ def _variants(module: Module, model: Any, seed: int, seconds: float) -> list[Fin
         return [Finding.skipped(check, "the model is not known: compile with Model.compile, or use eomgen verify")]
     if module.metadata.get("no_inertia"):
         return [Finding.skipped(check, "the model is there for kinematics only")]
+    if why := _only_in_c(getattr(module, "equations", None)):
+        return [Finding.skipped(check, why)]
     from .variants import variant_findings
 
     try:
@@ -107,12 +109,17 @@ def _variants(module: Module, model: Any, seed: int, seconds: float) -> list[Fin
         return [failed(check, error)]
 
 
+def _only_in_c(equations: Equations | None) -> str:
+    """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
+    functions = equations.kinematics.graph.functions.values() if equations is not None else ()
+    blind = [function.name for function in functions if function.evaluator is None]
+    return f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it" if blind else ""
+
+
 def _with_equations(module: Module, equations: Equations, cases: list[Case]) -> list[Finding]:
     """All groups; one that cannot be carried out fails."""
-    functions = equations.kinematics.graph.functions.values()
-    blind = [function.name for function in functions if function.evaluator is None]
-    if blind:
-        why = f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it"
+    why = _only_in_c(equations)
+    if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs", why)]
     from .bench import Bench
 
