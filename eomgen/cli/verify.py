@@ -15,12 +15,19 @@ from .screen import print_json, stage
 @analysis_options
 @click.option("--states", type=click.IntRange(min=1), default=6, show_default=True, help="Number of random states.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")
-def verify(work: Prepared, states: int, seed: int, as_json: bool) -> None:
-    """Compare a compiled model with its graph, 50 digits and free bodies; exits with 5 where a limit is broken."""
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=0.0),
+    default=12.0,
+    show_default=True,
+    help="For all of it; variants have what is left.",
+)
+def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool) -> None:
+    """Compare a model with its graph, 50 digits, free bodies and variants; exits with 5 where a limit is broken."""
     from ..verification.verify import verify_model
 
     with stage("verify"):
-        found = verify_model(work.model, work.module, states=states, seed=seed)
+        found = verify_model(work.model, work.module, states=states, seed=seed, seconds=seconds)
     if as_json:
         heading = {"name": work.equations.name, "method": work.equations.method}
         print_json(heading | found.as_dict() | {"seconds": round(found.seconds, 3)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 from ..joints import JOINTS
@@ -346,7 +347,9 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         """Derive, generate and compile a module; see ``eomgen.pipeline.compile_equations``."""
         from .. import pipeline
 
-        return pipeline.compile_equations(self.derive(method, independent, baumgarte), target=target, **options)
+        module = pipeline.compile_equations(self.derive(method, independent, baumgarte), target=target, **options)
+        module.description = deepcopy(self._description)  # the model may change later
+        return module
 
     def to_yaml(self) -> str:
         """The model as the text of a model file."""

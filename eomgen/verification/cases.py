@@ -123,7 +123,8 @@ def _state(module: Module, rng: np.random.Generator, t: float, p: Array, u: Arra
     for k in range(HALVINGS):
         try:
             x = module.project(np.concatenate([reference + shift * 0.5**k, v]), t=t, p=p, u=u)
-            if _closed(module, x, t, p, u) and np.isfinite(module.rhs(t, x, p=p, u=u)).all():
+            idle = bool(module.metadata.get("no_inertia"))
+            if _closed(module, x, t, p, u) and (idle or np.isfinite(module.rhs(t, x, p=p, u=u)).all()):
                 return x
         except EomgenError:
             continue

@@ -11,6 +11,7 @@ from ..numeric.scales import Array
 from .finding import Finding
 
 UNDERFLOW = float(np.finfo(float).tiny)  #: below it roundings are not relative (Higham 2002, sec. 2.2)
+NO_LIMIT = "rounding gives no finite limit at any of the states: the system is singular there"
 FAILED = np.inf  #: the figure of a check that could not be carried out
 
 
@@ -29,6 +30,7 @@ class Comparison:
         self.check, self.note = check, note
         self.cases = 0
         self._share = -1.0
+        self._unlimited = False  #: whether an entry had no finite limit
         self._worst: tuple[float, float, str] = (0.0, 0.0, "")
 
     def add(
@@ -61,7 +63,9 @@ class Comparison:
             return
         with np.errstate(all="ignore"):
             share = np.where(apart == 0.0, 0.0, apart / allowed)
-        share = np.where(np.isfinite(apart) & ~np.isnan(share), share, np.inf)
+        limited = np.isfinite(allowed)
+        share = np.where(np.isfinite(apart), np.where(limited, share, -1.0), np.inf)
+        self._unlimited |= not limited.all()
         k = int(share.argmax())
         if share[k] > self._share:
             unit = size if size and np.isfinite(size) else 1.0
@@ -71,7 +75,9 @@ class Comparison:
             self._worst = figure, float(allowed[k]) / unit, f"{place}state {number}"
 
     def finding(self) -> Finding:
-        """What was found."""
+        """What was found; left out where rounding gives no entry a finite limit."""
+        if self._share < 0.0 and self._unlimited:
+            return Finding.skipped(self.check, NO_LIMIT)
         worst, limit, where = self._worst
         return Finding(self.check, worst, limit if np.isfinite(limit) else 0.0, where, self.cases, self.note)
 

@@ -7,6 +7,7 @@ from textwrap import wrap
 from typing import Any, NamedTuple
 
 WIDTH = 118  #: of the table
+NOT_REACHED = "not reached"  #: how the note of a check begins for which no time was left
 HEADER = ("", "check", "worst", "limit", "where")
 
 
@@ -58,8 +59,13 @@ class Verification(NamedTuple):
 
     @property
     def ok(self) -> bool:
-        """Whether every check that applies keeps its limit."""
-        return all(finding.ok for finding in self.findings)
+        """Whether every check that applies keeps its limit, and at least one does."""
+        return all(finding.ok for finding in self.findings) and not all(f.left_out for f in self.findings)
+
+    @property
+    def not_reached(self) -> int:
+        """Number of checks for which no time was left."""
+        return sum(finding.note.startswith(NOT_REACHED) for finding in self.findings)
 
     @property
     def breaches(self) -> tuple[Finding, ...]:
@@ -84,6 +90,7 @@ class Verification(NamedTuple):
         left_out = len(self.findings) - len(checked)
         ending = f"{len(checked)} checks, {len(self.breaches)} breaches"
         ending += f", {left_out} left out" if left_out else ""
+        ending += f", {self.not_reached} of them not reached: give more seconds" if self.not_reached else ""
         return f"verification of {self.name}\n\n{self.table}\n\n{'ok' if self.ok else 'BREACH'}: {ending}"
 
     def __repr__(self) -> str:
@@ -91,7 +98,8 @@ class Verification(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as JSON has them."""
-        return {"name": self.name, "ok": self.ok, "findings": [f.as_dict() for f in self.findings]}
+        own = {"name": self.name, "ok": self.ok, "not_reached": self.not_reached}
+        return own | {"findings": [f.as_dict() for f in self.findings]}
 
 
 def _cells(finding: Finding) -> tuple[str, ...]:

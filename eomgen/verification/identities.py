@@ -14,6 +14,7 @@ from ..errors import EomgenError
 from ..limits.rounding import EPS
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
+from ..runtime.signal_rates import moving_inputs
 from .cases import CLOSED, Case
 from .comparison import Comparison, failed, size_of
 from .differences import extrapolate
@@ -33,6 +34,9 @@ def identities(module: Module, cases: Sequence[Case]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
     found = []
     for name, check in CHECKS.items():
+        if module.metadata.get("no_inertia") and check not in KINEMATIC:
+            found.append(Finding.skipped(name, "the model is there for kinematics only"))
+            continue
         try:
             found.append(check(module, cases))
         except EomgenError as error:
@@ -155,7 +159,7 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
 
 
 def _holding(module: Module, cases: Sequence[Case]) -> Finding:
-    """d/dt (C_q v + C_t) = 0 along x' = rhs."""
+    """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
     check = "rhs: constraints go on holding"
     if not module.n_rows or not module.layout.projects:
         return Finding.skipped(check, "there are no constraints" if not module.n_rows else "derived with baumgarte=")
@@ -173,9 +177,11 @@ def _holding(module: Module, cases: Sequence[Case]) -> Finding:
 
 
 def _along_x(module: Module, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
+    u_rate = moving_inputs(module.layout, c.u)
+
     def f(s: float) -> Array:
-        x, t = c.x + s * pace * rate, c.t + s * pace
-        return module.velocity_constraints(x, p=c.p, u=c.u, t=t)
+        x, t, u = c.x + s * pace * rate, c.t + s * pace, c.u + s * pace * u_rate
+        return module.velocity_constraints(x, p=c.p, u=u, t=t)
 
     return f
 
@@ -214,3 +220,5 @@ CHECKS: dict[str, Check] = {
     "rhs: constraints go on holding": _holding,
     "minimal: the same accelerations": _minimal,
 }
+#: Those that need no inertia.
+KINEMATIC = (_slopes, _projection)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from itertools import count
 from typing import TYPE_CHECKING
 
 from ..graph.core import Expr
@@ -106,14 +107,17 @@ class State:
         return self.values | moved
 
     def _moved_inputs(self, step: Number) -> Values:
-        """Inputs whose rates are inputs too move with them."""
-        moved: Values = {}
-        for name in self.system.terms.u:
-            rate, bend = (self.values.get(f"{name}{suffix}") for suffix in ("_dot", "_ddot"))
-            if rate is not None:
-                moved[name] = self.values[name] + step * rate + (step * step * bend / 2 if bend is not None else 0)
-            if rate is not None and bend is not None:
-                moved[f"{name}_dot"] = rate + step * bend
+        """Inputs whose rates are inputs too move with them, by Taylor's series up to the last rate."""
+        next_of, moved = dict(self.system.terms.input_rates), dict[str, Number]()
+        for name in next_of:
+            total, factor, rate = self.values[name], self.mp.mpf(1), next_of.get(name)
+            for order in count(1):
+                if rate is None:
+                    break
+                factor *= step / order
+                total += factor * self.values[rate]
+                rate = next_of.get(rate)
+            moved[name] = total
         return moved
 
     def _second_rates(self, a: Sequence[Number]) -> Numbers:

@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from .cases import Case
 
 STATES = 6  #: random states
-LEAST = 2.0  #: seconds for variants of a model
+SECONDS, LEAST = 12.0, 2.0  #: for all of it, and for variants of a model at least
 #: Files of checks that need the equations, in the order of the table; each has ``check(bench)``.
 GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivatives", "runs")
+KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 
-def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verification:
-    """Compare a module with everything that is independent of how it was made.
+def verify(module: Module, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
+    """Compare a module with several independent calculations, and with variants of its model where that is known.
 
     Parameters
     ----------
@@ -37,6 +38,9 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
     states : int
         Number of random states.
     seed : int
+    seconds : float
+        Time for all of it; variants, the same mechanism described differently, have what is left, and at least
+        :data:`LEAST`.
 
     Returns
     -------
@@ -50,9 +54,14 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
         mpmath or SciPy is missing where the equations are there.
     """
     start = perf_counter()
-    if module.metadata.get("no_inertia"):
-        why = f"it is there for kinematics only: {module.metadata['no_inertia']}"
-        return Verification(module.name, (Finding.skipped("all that moves by forces", why),))
+    found = _of_module(module, states, seed)
+    left = max(LEAST, seconds - (perf_counter() - start))
+    found += _variants(module, getattr(module, "description", None), seed, left)
+    return Verification(module.name, tuple(found), perf_counter() - start)
+
+
+def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
+    """What the module says of itself, and what follows from its equations."""
     cases = random_cases(module, states, seed)
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
@@ -61,11 +70,11 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
         found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
     else:
         found += _with_equations(module, equations, cases)
-    return Verification(module.name, tuple(found), perf_counter() - start)
+    return found
 
 
 def verify_model(
-    model: Any, module: Module, *, states: int = STATES, seed: int = 0, seconds: float = 12.0
+    model: Any, module: Module, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS
 ) -> Verification:
     """:func:`verify` of a module, and what concerns the model that it was made from.
 
@@ -75,27 +84,51 @@ def verify_model(
     module : Module
     states, seed : int
     seconds : float
-        Time for all of it; the same physics in other clothes has what is left, and at least :data:`LEAST`.
+        Time for all of it; variants have what is left, and at least :data:`LEAST`.
     """
     start = perf_counter()
+    found = _of_module(module, states, seed)
+    found += _variants(module, model, seed, max(LEAST, seconds - (perf_counter() - start)))
+    return Verification(module.name, tuple(found), perf_counter() - start)
+
+
+def _variants(module: Module, model: Any, seed: int, seconds: float) -> list[Finding]:
+    """Variants of a model or description; left out where it is not known or has no motion to compare."""
+    check = "variants: the same mechanism described differently"
+    if model is None:
+        return [Finding.skipped(check, "the model is not known: compile with Model.compile, or use eomgen verify")]
+    if module.metadata.get("no_inertia"):
+        return [Finding.skipped(check, "the model is there for kinematics only")]
+    if why := _only_in_c(getattr(module, "equations", None)):
+        return [Finding.skipped(check, why)]
     from .variants import variant_findings
 
-    own = verify(module, states=states, seed=seed)
-    found = (*own.findings, *variant_findings(model, seed=seed, seconds=max(LEAST, seconds - own.seconds)))
-    return Verification(own.name, found, perf_counter() - start)
+    try:
+        return variant_findings(model, seed=seed, seconds=seconds)
+    except EomgenError as error:
+        return [failed(check, error)]
+
+
+def _only_in_c(equations: Equations | None) -> str:
+    """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
+    functions = equations.kinematics.graph.functions.values() if equations is not None else ()
+    blind = [function.name for function in functions if function.evaluator is None]
+    return f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it" if blind else ""
 
 
 def _with_equations(module: Module, equations: Equations, cases: list[Case]) -> list[Finding]:
     """All groups; one that cannot be carried out fails."""
-    functions = equations.kinematics.graph.functions.values()
-    blind = [function.name for function in functions if function.evaluator is None]
-    if blind:
-        why = f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it"
+    why = _only_in_c(equations)
+    if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs", why)]
     from .bench import Bench
 
     bench, found = Bench(module, equations, cases), []
-    for group in GROUPS:
+    idle = module.metadata.get("no_inertia")
+    if idle:
+        why = f"the model is there for kinematics only: {idle}"
+        found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs", why))
+    for group in KINEMATIC if idle else GROUPS:
         check = import_module(f"{__package__}.check_{group}").check
         try:
             found += check(bench)

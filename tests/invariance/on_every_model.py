@@ -1,7 +1,7 @@
-"""A plugin of pytest: every model that the chosen tests compile is compared with itself in other clothes.
+"""A plugin of pytest: every model that the chosen tests compile is compared with variants of itself.
 
-``python -m pytest -p invariance.on_every_model tests/joints/test_adams.py tests/forces`` ends with a table
-of breaches; the tests themselves run as always.  The published cases are models of such tests.
+``PYTHONPATH=tests python -m pytest -p invariance.on_every_model tests/joints`` ends with a table of breaches; the tests
+themselves run as always.  The published cases are models of such tests.
 """
 
 from __future__ import annotations

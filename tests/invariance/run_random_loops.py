@@ -1,4 +1,4 @@
-"""Random closed mechanisms, dressed at random, against a judge with multipliers: freedoms, refusals, accelerations.
+"""Random closed mechanisms and variants against a reference with multipliers: freedoms, refusals, accelerations.
 
 ``python -m invariance.run_random_loops 1000`` from the folder ``tests`` prints a table and exits 1 on a breach.
 """
@@ -36,11 +36,11 @@ class Result:
     change: str
     faults: list[str] = field(default_factory=list)
     plain: float = 0.0  #: largest error of the model as written, in parts of the limit's size
-    dressed: float = 0.0
+    variant: float = 0.0
 
 
 def try_one(number: int) -> Result:
-    """Make, dress and judge one mechanism."""
+    """Make one mechanism and a variant, and compare both with the reference."""
     loops = random_loops(number)
     first = FIRST[(number // len(FAMILIES)) % len(FIRST)]
     result = Result(list(FAMILIES)[number % len(FAMILIES)], first.__name__ if first else "as it is")
@@ -51,7 +51,7 @@ def try_one(number: int) -> Result:
         return result
     verdicts = [verdict_of(loops, original, k) for k in range(original.states.shape[1])]
     if original.module.n_dof != verdicts[-1].dof:
-        result.faults.append(f"{original.module.n_dof} freedoms as written, {verdicts[-1].dof} by the judge")
+        result.faults.append(f"{original.module.n_dof} freedoms as written, {verdicts[-1].dof} by the reference")
         return result
     result.plain = max(error_of(loops, original, original.values[:, k], v, k) for k, v in enumerate(verdicts))
     random = np.random.default_rng([number, 7])
@@ -65,16 +65,16 @@ def try_one(number: int) -> Result:
         module = compiled(variant.description)
         values = module.outputs(0.0, states_of(original, variant, module))
     except eg.EomgenError as error:
-        result.faults.append(f"refused when dressed: {type(error).__name__}: {str(error)[:160]}")
+        result.faults.append(f"refused as a variant: {type(error).__name__}: {str(error)[:160]}")
         return result
     if module.n_dof != verdicts[-1].dof:
-        result.faults.append(f"{module.n_dof} freedoms when dressed, {verdicts[-1].dof} by the judge")
+        result.faults.append(f"{module.n_dof} freedoms as a variant, {verdicts[-1].dof} by the reference")
         return result
     order = {name: i for i, name in enumerate(module.y_names)}
     rows = [order.get(variant.outputs.get(name, name)) for name in original.module.y_names]
     values = np.array([np.full(values.shape[1], np.nan) if row is None else values[row] for row in rows])
-    result.dressed = max(error_of(loops, original, values[:, k], v, k) for k, v in enumerate(verdicts))
-    for what, error in (("as written", result.plain), ("when dressed", result.dressed)):
+    result.variant = max(error_of(loops, original, values[:, k], v, k) for k, v in enumerate(verdicts))
+    for what, error in (("as written", result.plain), ("as a variant", result.variant)):
         if not error <= LIMIT:
             result.faults.append(f"accelerations {what} off by {error:.2g}")
     return result
@@ -87,7 +87,7 @@ def probes(original: Original, values: np.ndarray, quantities: tuple[str, ...], 
 
 
 def verdict_of(loops: Loops, original: Original, k: int) -> Verdict:
-    """The judge's word on a state of the model as written; its poses and velocities count."""
+    """The reference's result at a state of the model as written; its poses and velocities count."""
     module, x = original.module, original.states[:, k]
     order = [module.body_names.index(name) for name in loops.names]
     poses = module.poses(x[: module.n_q])[order]
@@ -123,9 +123,9 @@ def main() -> int:
     families: dict[str, list[Result]] = defaultdict(list)
     for result in results:
         families[result.family].append(result)
-    print(f"\n{'family':28}{'tried':>7}{'faults':>8}{'as written':>12}{'dressed':>12}")
+    print(f"\n{'family':28}{'tried':>7}{'faults':>8}{'as written':>12}{'variant':>12}")
     for family, own in families.items():
-        worst = [max((getattr(r, key) for r in own), default=0.0) for key in ("plain", "dressed")]
+        worst = [max((getattr(r, key) for r in own), default=0.0) for key in ("plain", "variant")]
         print(f"{family:28}{len(own):7}{sum(bool(r.faults) for r in own):8}{worst[0]:12.1e}{worst[1]:12.1e}")
     print("changes besides:", dict(Counter(r.change for r in results)))
     bad = sum(bool(result.faults) for result in results)

@@ -41,7 +41,7 @@ def changed(model: eg.Model, seed: int = 0) -> list[Finding]:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_in_other_clothes(name: str) -> None:
+def test_examples_as_variants(name: str) -> None:
     found = changed(eg.load(models.EXAMPLES / f"{name}.yaml"))
     assert failures(found) == []
     assert sum(not f.left_out for f in found) >= 6
@@ -56,7 +56,7 @@ def test_every_way_of_an_example(path: Any) -> None:
 
 @settings(max_examples=6)
 @given(st.integers(0, 500))
-def test_random_trees_in_other_clothes(seed: int) -> None:
+def test_random_trees_as_variants(seed: int) -> None:
     assert failures(changed(random_tree(seed), seed)) == []
 
 

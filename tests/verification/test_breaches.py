@@ -54,10 +54,8 @@ def test_a_wrong_sign_in_the_bias() -> None:
 
 def test_a_wrong_sign_in_bias_and_inverse_dynamics_alike() -> None:
     equations = derived()
-    tree, still = equations.tree, dict.fromkeys(equations.kinematics.a, equations.kinematics.graph.zero)
-    k = 1
+    tree, k = equations.tree, 1
     wrong = tree.inverse_dynamics[k] - 2.0 * tree.bias[k]
-    assert still
     tree.inverse_dynamics = (*tree.inverse_dynamics[:k], wrong, *tree.inverse_dynamics[k + 1 :])
     tree.bias = negated(tree.bias, k)
     breaches = verified(equations)

@@ -1,4 +1,4 @@
-"""Stage verification, variants: a model -> findings on the same physics in other clothes.
+"""Stage verification, variants: a model -> findings on variants, the same mechanism described differently.
 
 Body frames and ground turned and shifted, other units, names, order, cuts, joints, rotations, methods, targets, ways to
 give parameters, inputs and states: none of them may change a result by more than rounding.

@@ -16,7 +16,7 @@ from ...describe.model import Model
 from ...equations import METHODS
 from ...errors import EomgenError, ToolchainError, UsageError
 from ..finding import Finding
-from .compare import compare_module, refused, states_of
+from .compare import Worst, compare_module, refused, states_of
 from .frames import values_of
 from .geometry import parameters_of_geometry
 from .inputs import input_findings
@@ -108,16 +108,15 @@ def _minimal(check: str, model: Model, original: Original, random: Any) -> Findi
         minimal = own.minimal
     except UsageError as why:
         return Finding.skipped(check, str(why))
-    worst, limit, where = -1.0, 1.0, ""
+    worst, errors = Worst(check), np.zeros(original.states.shape[1])
     for k in range(original.states.shape[1]):
         x = original.states[:, k]
         minimal.reset(x[: own.n_q])
         full, found = own.rhs(0.0, x), minimal.rhs(0.0, minimal.reduce(x))
         size = max(float(np.abs(full).max()), 1.0)
-        error = float(np.abs(found - minimal.reduce(full)).max()) / size
-        if not np.isfinite(error) or error / original.limits[k] > worst / limit:
-            worst, limit, where = (error if np.isfinite(error) else np.inf), float(original.limits[k]), f"state {k}"
-    return Finding(check, worst, limit, where, original.states.shape[1])
+        errors[k] = float(np.abs(found - minimal.reduce(full)).max()) / size
+    worst.take("accelerations", errors, original.limits)
+    return worst.finding(len(errors))
 
 
 def _yaml(check: str, model: Model, original: Original, random: Any) -> Finding:
@@ -129,8 +128,9 @@ def _yaml(check: str, model: Model, original: Original, random: Any) -> Finding:
     order = [module.x_names.index(name) for name in original.module.x_names]
     a, b = module.rhs(0.0, states), original.module.rhs(0.0, original.states)
     errors = np.abs(a[order] - b).max(axis=0) / np.maximum(np.abs(b).max(axis=0), 1.0)
-    k = int(np.argmax(errors / original.limits))
-    return Finding(check, float(errors[k]), float(original.limits[k]), f"state {k}", len(errors))
+    worst = Worst(check)
+    worst.take("accelerations", errors, original.limits)
+    return worst.finding(len(errors))
 
 
 def _exported(check: str, model: Model, original: Original, random: Any) -> Finding:

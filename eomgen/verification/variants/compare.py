@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import EomgenError
 from ...limits.rounding import EPS
+from ..comparison import NO_LIMIT
 from ..finding import Finding
 from .states import ROUNDINGS, Original, compiled, reactions_of
 from .texts import names_of
@@ -44,7 +45,7 @@ def compare_module(
         return Finding(check, np.inf, 0.0, note=note)
     states = states_of(original, variant, module)
     values = module.outputs(0.0, states, **given) if len(module.y_names) else np.zeros((0, states.shape[1]))
-    worst = _Worst(check)
+    worst = Worst(check)
     place = {name: i for i, name in enumerate(module.y_names)}
     texts = {e.name: e.values["expression"] for e in original.description.sections["outputs"]}
     for i, name in enumerate(original.module.y_names):
@@ -69,28 +70,39 @@ def states_of(original: Original, variant: Variant, module: Any) -> Any:
     return np.array(columns, dtype=float).T.reshape(len(module.x_names), -1)
 
 
-class _Worst:
+class Worst:
     """The largest ratio of difference and limit so far."""
 
     def __init__(self, check: str) -> None:
         self.check, self.ratio, self.where = check, -1.0, ""
+        self.unlimited = False  #: whether a state had no finite limit
         self.worst, self.limit = 0.0, ROUNDINGS * EPS
 
     def take(self, where: str, errors: Any, limits: Any) -> None:
-        """Differences and limits at all states; a difference that is no number counts as infinite."""
+        """Differences and limits at all states; a difference that is no number counts as infinite.
+
+        States without a finite limit are left out.
+        """
         errors = np.where(np.isfinite(errors), errors, np.inf)
-        k = int(np.argmax(errors / limits))
+        limited = np.isfinite(limits)
+        self.unlimited |= not limited.all()
+        if not limited.any():
+            return
+        k = int(np.argmax(np.where(limited, errors / limits, -1.0)))
         if errors[k] / limits[k] > self.ratio:
             self.ratio = float(errors[k] / limits[k])
             self.worst, self.limit = float(errors[k]), float(limits[k])
             self.where = f"{where}, state {k}"
 
     def finding(self, cases: int) -> Finding:
+        """What was found; left out where no state has a finite limit."""
+        if self.ratio < 0.0 and self.unlimited:
+            return Finding.skipped(self.check, NO_LIMIT)
         return Finding(self.check, self.worst, self.limit, self.where, cases)
 
 
-def _compare_reactions(worst: _Worst, original: Original, variant: Variant, module: Any, states: Any) -> None:
-    """Reactions; of those that rigid bodies leave undetermined the smallest, which no change of clothes alters."""
+def _compare_reactions(worst: Worst, original: Original, variant: Variant, module: Any, states: Any) -> None:
+    """Reactions; of those that rigid bodies leave undetermined the smallest, which is the same in every description."""
     found = reactions_of(module, states)
     if original.reactions is None or found is None:
         return

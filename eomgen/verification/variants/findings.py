@@ -11,7 +11,7 @@ import numpy as np
 from ...describe.description import Description
 from ...describe.model import Model
 from ...errors import EomgenError
-from ..finding import Finding
+from ..finding import NOT_REACHED, Finding
 from .calls import CALLS
 from .chains import chain, split
 from .closures import as_constraints, as_equations
@@ -106,7 +106,7 @@ def variant_findings(
         check = f"variants: {name}"
         random = np.random.default_rng([seed, number])
         if perf_counter() > end:
-            findings.append(Finding.skipped(check, f"not reached in {seconds:g} s"))
+            findings.append(Finding.skipped(check, f"{NOT_REACHED} in {seconds:g} s"))
         else:
             try:
                 findings.append(_found(name, check, made, original, random))

@@ -5,7 +5,7 @@ The course of each input is a straight line, of which a table is exact; a parame
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,21 @@ RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
 SLOPE = 0.3
 
 
+class Line(NamedTuple):
+    """A straight line over time: a Python function of time and state that knows its rates."""
+
+    start: float
+    slope: float
+
+    def __call__(self, t: float, x: Any) -> float:
+        """The value at time t (s)."""
+        return self.start + self.slope * t
+
+    def derivative(self) -> Line:
+        """Its rate, as a function too."""
+        return Line(self.slope, 0.0)
+
+
 def input_findings(check: str, model: Model, original: Original, random: Any) -> Finding:
     """All ways to give the inputs of a model."""
     entries = original.description.sections["inputs"]
@@ -32,15 +47,14 @@ def input_findings(check: str, model: Model, original: Original, random: Any) ->
     if any("signal" in entry.values for entry in entries):
         return Finding.skipped(check, "the inputs have courses of their own")
     still = _as_parameters(check, original)
+    if not still.ok:
+        return still
     end = duration(original)
     start = {e.name: number_of(e.values.get("value", 0.0), {}) for e in entries}
     slope = {name: SLOPE * (abs(value) + 1.0) for name, value in start.items()}
     x, times = original.states[:, 0], np.linspace(0.0, end, 5)
 
-    def line(name: str) -> Any:
-        return lambda t, x: start[name] + slope[name] * t
-
-    course = {name: line(name) for name in start}
+    course = {name: Line(start[name], slope[name]) for name in start}
     table = {name: (times, start[name] + slope[name] * times) for name in start}
     runs = {
         "function": original.module.simulate((0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),
@@ -50,7 +64,7 @@ def input_findings(check: str, model: Model, original: Original, random: Any) ->
     for entry in made.sections["inputs"]:
         entry.values["signal"] = f"{start[entry.name]!r} + {slope[entry.name]!r}*t"
     runs["text"] = compiled(made).simulate((0.0, end), x, t_eval=times, rtol=RTOL, atol=ATOL)
-    worst, where = still.worst * RUNS / still.limit, still.where
+    worst, where = (0.0, "") if still.left_out else (still.worst * RUNS / still.limit, still.where)
     for way in ("table", "text"):
         size = np.abs(runs["function"].x).max(axis=1, initial=1.0)
         same = runs[way].x.shape == runs["function"].x.shape

@@ -47,7 +47,7 @@ class Original:
     force : (k,) array
         The size of forces: the largest reaction, and what accelerates the total mass.
     limits : (k,) array
-        Relative error that rounding allows at each state.
+        Relative error that rounding allows at each state; infinite where it gives none.
     """
 
     description: Description
@@ -81,7 +81,7 @@ def observe(
 ) -> Original:
     """Compile a description with probes, find states, and evaluate.
 
-    ``motion_only`` leaves out reactions and limits, which take longest; another judge has to know the limits then.
+    ``motion_only`` leaves out reactions and limits, which take longest; the caller has limits of its own then.
     """
     module = compiled(description)
     length = length_of(description)
@@ -160,7 +160,14 @@ def sizes_of(module: Any, kinds: Mapping[str, str], values: Array, states: Array
 
 
 def relative_limit(module: Any, x: Array, description: Description, length: float) -> float:
-    """The relative error of accelerations that rounding allows at a state."""
+    """The relative error (1) of accelerations v' that rounding allows at a state x (n_x,).
+
+    Infinite where the Jacobian of x' is not finite, such as that of a force sqrt(abs(x)) at x = 0.
+    """
+    try:
+        J = module.jacobian(0.0, x)
+    except EomgenError:
+        return np.inf
     q = x[: module.n_q]
     condition = 1.0
     kinds, rates = kinds_of(description), velocities_of(description)
@@ -174,7 +181,7 @@ def relative_limit(module: Any, x: Array, description: Description, length: floa
         singular = np.linalg.svd(rows / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
         kept = singular[singular > 1e-9 * singular.max(initial=0.0)]
         condition *= float(kept.max() / kept.min()) if kept.size else 1.0
-    slopes = np.abs(module.jacobian(0.0, x)[module.n_q : module.n_q + module.n_v])
+    slopes = np.abs(J[module.n_q : module.n_q + module.n_v])
     v = np.abs(x[module.n_q : module.n_q + module.n_v]) / s_v
     fast = max(1.0, float(v.max(initial=0.0)))
     state = np.concatenate([s_q, s_v * fast, np.zeros(len(x) - module.n_q - module.n_v)])

@@ -1,4 +1,4 @@
-"""Stage verification, variants: a description in other clothes, and how its states are read as the original's.
+"""Stage verification, variants: the same mechanism described differently, and how its states are read.
 
 Every change keeps the meaning of all outputs, so results are compared by outputs alone: the probes on every body.
 """
@@ -48,7 +48,7 @@ class Scales:
 
 @dataclass(frozen=True)
 class Variant:
-    """The same physics in other clothes.
+    """The same mechanism described differently.
 
     Attributes
     ----------
