@@ -189,7 +189,8 @@ class Analyses(ForceAnalyses):
         Parameters
         ----------
         x : mapping of str to float, or (n_x,) or (n_q,) array, optional
-            The equilibrium, at rest where only coordinates are given; by default the one that :meth:`equilibrium` finds from the declared initial position.
+            The equilibrium, at rest where only coordinates are given; by default the one that :meth:`equilibrium` finds
+            from the declared initial position.
         t : float
         p, u : optional
             As for ``bind``.
