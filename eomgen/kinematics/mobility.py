@@ -322,7 +322,6 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
         return [functions.place.move(q, random.uniform(0.2, 0.9, len(functions.place.q))) for _ in range(PROBES)]
     for k in range(PROBES):
         J = functions.place_jacobian(q)
-        require_finite(functions, q)
         basis = np.linalg.svd(J)[2][rank(J).rank :]
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
