@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +24,7 @@ FORMS = ("minimal", "full")
 
 def linearise(
     module: Module,
-    x: ArrayLike | None = None,
+    x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,
     p: Any = None,
@@ -39,7 +39,7 @@ def linearise(
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
     layout, time = module.layout, number("t", t)
-    state = module.x0(t=time) if x is None else np.array(x, dtype=float)
+    state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(x, dtype=float)
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     state = module.project(state, t=time)

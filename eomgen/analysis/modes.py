@@ -6,6 +6,7 @@ damped ones are the eigenvalues of A.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +17,7 @@ from ..errors import UsageError
 from ..limits.statics import SYMMETRIC
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
+from ..runtime.initial import Initial
 from .linearisation import Linearisation
 from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
@@ -141,7 +143,13 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
 
 
 def find_modes(
-    module: Module, x: ArrayLike | None = None, t: float = 0.0, *, p: Any = None, u: Any = None, independent: Any = None
+    module: Module,
+    x: Mapping[str, float] | ArrayLike | None = None,
+    t: float = 0.0,
+    *,
+    p: Any = None,
+    u: Any = None,
+    independent: Any = None,
 ) -> Modes:
     """See :meth:`~..runtime.analyses.Analyses.modes`."""
     module = module if p is None and u is None else module.bind(p, u)
@@ -149,6 +157,9 @@ def find_modes(
         from .equilibrium import find_equilibrium
 
         x = find_equilibrium(module, t=t).x
+    if isinstance(x, Mapping):
+        at_rest = not Initial(module.kernels, t).sort(x).rates
+        x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(x, dtype=float)
     if state.shape == (module.n_q,):
         state = np.concatenate([state, np.zeros(module.n_v)])

@@ -164,6 +164,8 @@ class Saltation:
         with np.errstate(all="ignore"):
             bend = (rate - self._rate(t - h, earlier, index, self._f(t - h, earlier), name)) / h
         error = self._error(x, gradient)
+        if needed and t == self.span[0]:
+            raise self._at_an_end(t, name, "start")
         if not rate * rate > GRAZING * abs(bend) * error or rate == 0.0 or t == self.span[0]:
             if needed:
                 raise NoDerivativeError(
@@ -210,10 +212,7 @@ class Saltation:
         near = SIMULTANEOUS * abs(self.span[1] - self.span[0])
         for end, what in ((self.span[0], "start"), (self.span[1], "end")):
             if abs(t - end) <= near:
-                raise NoDerivativeError(
-                    f"event {self.names[own]} happens at the {what} of the run, t = {t:.6g} s: a small change takes it "
-                    "out of the run, which has no derivative there; take another span"
-                )
+                raise self._at_an_end(t, self.names[own], what)
         if any(abs(t - corner) <= near for corner in self.corners):
             raise NoDerivativeError(
                 f"event {self.names[own]} happens at t = {t:.6g} s, at which an input jumps or bends: the run has no "
@@ -233,6 +232,13 @@ class Saltation:
             near = max(self._error(x, gradient), abs(rate) * SIMULTANEOUS * abs(self.span[1] - self.span[0]))
             if abs(value) <= near:
                 raise self._at_once(t, [self.names[own], self.names[other]])
+
+    @staticmethod
+    def _at_an_end(t: float, name: str, what: str) -> NoDerivativeError:
+        return NoDerivativeError(
+            f"event {name} happens at the {what} of the run, t = {t:.6g} s: a small change takes it "
+            "out of the run, which has no derivative there; take another span"
+        )
 
     def _at_once(self, t: float, names: Sequence[str]) -> NoDerivativeError:
         return NoDerivativeError(

@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import SimulationError
+from ..errors import NoDerivativeError, SimulationError
+from ..limits.motions import SINGULAR
 from ..numeric.scales import Array, Indices
 from ..runtime.analyses import require_projection, require_velocities
+from ..runtime.change_points import singular_values
 from ..runtime.events import Events, warn_of_unknown
+from ..runtime.failure import place
 from ..runtime.input_slopes import Slopes
 from ..runtime.integrate import Solution, choose_solver, integrate
 from ..runtime.names import unknown
@@ -87,6 +90,7 @@ def differentiate_run(
                 run, nodes, z0, solver, times, salts.watched, False, options, pace, salts.reset, forcing.enter
             )
     except Crawling as crawl:
+        _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])
         trouble = "; ".join(fail.trouble(crawl.x[: layout.n_x], crawl.t) or ())
         raise SimulationError(describe_crawl(crawl, layout.x, stop, title, trouble)) from None
     if solution.status < 0 or not np.isfinite(solution.x).all():
@@ -114,6 +118,23 @@ def differentiate_run(
         if layout.n_y:
             dy[..., j] = run.outputs(t, x, dx[..., j])
     return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
+
+
+def _refuse_change_point(module: Module, forcing: Forcing, t: float, x: Array) -> None:
+    """Tell of a loss of rank at the state where the derivatives grow without bound.
+
+    Raises
+    ------
+    NoDerivativeError
+    """
+    if not module.layout.rank:
+        return
+    u = forcing(t, x)[:, None] if module.layout.constraint_inputs else None
+    if singular_values(module, np.array([t]), x[:, None], u)[0, module.layout.rank - 1] < SINGULAR:
+        raise NoDerivativeError(
+            f"the run passes a change point at t = {t:.6g} s{place(module.layout.x, x)}: the mobility changes there, "
+            "and a small change of what the run is differentiated by closes or opens its way; end the run before"
+        )
 
 
 def _require_same(found: Trajectory, alone: Trajectory) -> None:

@@ -19,7 +19,7 @@ def equilibrium(work: Prepared, t: float, hold: tuple[str, ...], unknown: tuple[
     module = work.module
     guess = {name: value for name, value in work.initial.items() if not name.endswith("_dot")}
     held: dict[str, float | None] = dict.fromkeys(word for word in hold if "=" not in word)
-    held |= parse_settings(tuple(word for word in hold if "=" in word))
+    held |= parse_settings(tuple(word for word in hold if "=" in word), "--hold", "theta=0.3")
     found = module.equilibrium(guess or None, t, hold=held, unknowns=unknown)
     if as_json:
         print_json(

@@ -201,7 +201,7 @@ def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
     given: Any = entry.values.get("markers", ())
     if isinstance(given, Mapping):
         given = list(given.items())
-    if not isinstance(given, list | tuple):
+    if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
         reader.wrong(path, given, "markers")
         return []
     return [Entry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]

@@ -73,7 +73,7 @@ def _number(mechanism: Mechanism, value: Expr) -> float | None:
 
 
 def require_finite(functions: ConstraintFunctions, q: Array) -> None:
-    """Refuse a position at which a constraint or its slope is not a number.
+    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none.
 
     Raises
     ------
@@ -83,7 +83,8 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     if not functions.m:
         return
     C, J = functions.position(q)
-    finite = np.isfinite(np.column_stack([J, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):  # rows whose squares overflow have no length, and no rank
+        finite = np.isfinite(np.column_stack([J**2, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
     if finite.all():
         return
     k = functions.kinematics

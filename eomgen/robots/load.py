@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
+
+import numpy as np
 
 from ..describe.description import Description
 from ..describe.names import nearest
@@ -83,4 +86,8 @@ def make_options(given: dict[str, Any]) -> Options:
     friction = given.get("friction", False)
     if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
         raise UsageError(f"friction={friction!r}: True, or the velocity (rad/s or m/s) below which it is smoothed")
+    if isinstance(given.get("lock"), Mapping):
+        for name, value in given["lock"].items():
+            if not isinstance(value, int | float | np.integer | np.floating) or not np.isfinite(value):
+                raise UsageError(f"lock={{{name!r}: {value!r}}}: a joint is held at a finite number (rad or m)")
     return Options(**given)

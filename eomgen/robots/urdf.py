@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..numeric.inertia import SWITCH
 from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
 from .robot import Joint, Link, Mimic, Options, Robot
 from .urdf_constructs import note_urdf
@@ -144,8 +145,8 @@ class _Reader:
             self.fault(element, f"{path}.mass", "is missing", 'give <mass value="..."/>')
         else:
             mass = self.number(weight, "value", f"{path}.mass")
-            if mass < 0.0:
-                self.fault(weight, f"{path}.mass", f"is {mass:g}", "a mass is 0 or positive")
+            if mass < 0.0 and self.options.check_inertia == "error":
+                self.fault(weight, f"{path}.mass", f"is {mass:g}", f"a mass is 0 or positive; {SWITCH}")
         if tensor is None:
             return Inertia(mass, np.zeros(3), np.zeros((3, 3))).seen(frame)
         xx, xy, xz, yy, yz, zz = (

@@ -133,7 +133,7 @@ class Analyses(ForceAnalyses):
 
     def linearise(
         self,
-        x: ArrayLike | None = None,
+        x: Mapping[str, float] | ArrayLike | None = None,
         t: float = 0.0,
         *,
         p: Any = None,
@@ -145,8 +145,9 @@ class Analyses(ForceAnalyses):
 
         Parameters
         ----------
-        x : (n_x,) array, optional
-            A state, projected onto the constraints; by default the declared initial values, assembled.
+        x : mapping of str to float, or (n_x,) array, optional
+            A state: initial values by name, as :meth:`x0` takes them, or all of it, projected onto the constraints; by
+            default the declared initial values, assembled.
         t : float
             Time (s), held fixed.
         p, u : optional
@@ -180,7 +181,7 @@ class Analyses(ForceAnalyses):
 
     def modes(
         self,
-        x: ArrayLike | None = None,
+        x: Mapping[str, float] | ArrayLike | None = None,
         t: float = 0.0,
         *,
         p: Any = None,
@@ -191,8 +192,9 @@ class Analyses(ForceAnalyses):
 
         Parameters
         ----------
-        x : (n_x,) or (n_q,) array, optional
-            The equilibrium; by default the one that :meth:`equilibrium` finds from the declared initial position.
+        x : mapping of str to float, or (n_x,) or (n_q,) array, optional
+            The equilibrium, at rest where only coordinates are given; by default the one that :meth:`equilibrium` finds
+            from the declared initial position.
         t : float
         p, u : optional
             As for ``bind``.

@@ -115,14 +115,15 @@ class _Run:
                 raise SimulationError(f"IDA makes no headway at t = {t:.6g} s")
 
     def _begin(self, t: float, x: Array) -> Array:
-        """The state after events whose value is zero at the start and leaves it in their direction."""
+        """The state after events whose value is zero at the start and does not leave it against their direction."""
         fired = []
         for e, event in enumerate(self.listed):
-            if event(t, x) == 0.0:
-                rate = self.resets.rate(event, t, x)
-                if rate != 0.0 and event.direction * rate >= 0.0:
-                    fired.append(e)
+            if event(t, x) == 0.0 and event.direction * self.resets.side(event, t, x) >= 0.0:
+                fired.append(e)
         after = self._happen(t, x, fired) if fired else None
+        if self.status:  # the start and the event, as simulate stores them
+            times = np.array([t, t]) if self.times is None else self.times[self.times == t]
+            self._store(times, np.repeat(x[:, None], len(times), axis=1), True)
         if after is None:
             return x
         self._store(np.array([t]), x[:, None], True)

@@ -93,6 +93,9 @@ class Fail:
             blame, remedy = f": {trouble[0]}", trouble[1]
         elif status == 1 and (large := [n for n, value in zip(names, x, strict=False) if abs(value) > LARGE_ROOT]):
             blame, remedy = f": squares of {', '.join(large[:SHOWN])} overflow", "check the state given"
+        elif status == 4 and not len(self.layout.independent):
+            what = "the constraints are singular here, and the mechanism has no freedom"
+            remedy = "start a little away from this position, or change the dimensions"
         elif self.culprit is not None and names:
             if status == 5 and (found := self.culprit(1, t, x, p, u)):
                 status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import ZenoError
 from ..limits.runs import AHEAD, CROWD, CROWDED, TOUCHING
 from ..numeric.scales import Array
-from .events import RESET, WAIT, Event, Events
+from .events import GO_ON, RESET, WAIT, Event, Events
 
 
 class Resets:
@@ -47,16 +47,28 @@ class Resets:
             again = event.direction * came < 0.0  # the zero it just left
             if event.action in (RESET, WAIT) and (stuck or again):
                 self.crowded = self.most
-            event.left = (t, float(np.sign(goes)))
+            event.left = (t, self.side(event, t, after))
         if self.crowded >= self.most:
             raise self.endless()
 
     def endless(self) -> ZenoError:
         """The error for resets that never end."""
-        return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action in (RESET, WAIT)])
+        return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action != GO_ON])
 
     def rate(self, event: Event, t: float, x: Array) -> float:
         """How fast an event's value changes along the motion, in the direction of the run."""
         h = AHEAD * self.span
         event.left = None
         return float((event(t + h, x + h * np.asarray(self.rhs(t, x))) - event(t, x)) / abs(h))
+
+    def side(self, event: Event, t: float, x: Array) -> float:
+        """The side of zero, 1 or -1, to which the value of an event goes that is zero now; 0 where it stays.
+
+        Its rate tells; where it has none, as that of a body at rest, the value after a midpoint step of the run.
+        """
+        rate = self.rate(event, t, x)
+        if rate != 0.0:
+            return float(np.sign(rate))
+        h = AHEAD**0.5 * self.span
+        middle = x + 0.5 * h * np.asarray(self.rhs(t, x))
+        return float(np.sign(event(t + h, x + h * np.asarray(self.rhs(t + 0.5 * h, middle)))))

@@ -25,6 +25,40 @@ if TYPE_CHECKING:
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
 
 
+class OfTime:
+    """A function of time alone, as f(t, x); its rate is that of the object's own ``derivative()``."""
+
+    def __init__(self, function: Any) -> None:
+        self.function = function
+
+    def __call__(self, t: float, x: Any = None) -> Any:
+        """The value at time t."""
+        return self.function(t)
+
+    def derivative(self) -> Any:
+        """The rate, as the object says it."""
+        found = self.function.derivative()
+        return of_time(found) if callable(found) else found
+
+
+def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function itself, or as f(t, x) one with ``derivative()`` that takes the time alone.
+
+    So does one of one argument, or whose second has a number by default, as the splines of SciPy have the order of a
+    derivative there.
+    """
+    from inspect import signature
+
+    if not callable(getattr(function, "derivative", None)):
+        return function
+    try:
+        taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
+    except (TypeError, ValueError):
+        return function
+    alone = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
+    return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function
+
+
 class TableRate:
     """A derivative of a table by time: cubic pieces that may jump where they meet, 0 before and after.
 
@@ -279,7 +313,7 @@ def derive(name: str, rate: str, value: Any) -> Any:
     derivative = getattr(value, "derivative", None)
     found = derivative() if callable(derivative) else None
     if found is not None:
-        return found if callable(found) else number(f"derivative of input {name}", found)
+        return of_time(found) if callable(found) else number(f"derivative of input {name}", found)
     raise UsageError(
         f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"

@@ -16,7 +16,7 @@ from ..numeric.splines import slopes
 from .layout import Layout, number
 from .names import check_names, require_time_and_state, unknown
 from .rate_checks import require_agreement
-from .signal_rates import TableRate, derive, fill_rates, jumps, pieces_of, require_smooth
+from .signal_rates import TableRate, derive, fill_rates, jumps, of_time, pieces_of, require_smooth
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -201,6 +201,7 @@ class Forcing:
         if isinstance(value, Signal):
             return value
         if callable(value):
+            value = of_time(value)
             require_time_and_state(f"input {name}: its function", value)
             return value
         if is_formula(value):

@@ -307,3 +307,14 @@ def test_inputs_that_move_gaps_lengths_and_constraints(make: Any) -> None:
     )  # fmt: skip
     np.testing.assert_allclose(s.dx[:, 0, -1], (right - left) / (2 * h), atol=1e-6)
     assert np.abs(s.dx[:, 0, -1]).max() > 0.1
+
+
+def test_events_at_the_start() -> None:
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("b", mass=1), axis="y", coordinate="h")
+    m.event("floor", "h")
+    found = m.compile(target="numpy").sensitivities(["h_dot"], 0.5, {"h": 0.0})  # at rest, and only watched
+    assert found["h", "h_dot"][-1] == pytest.approx(0.5, rel=1e-8)  # h = v t - g t^2 / 2
+    m.event("end", "h", direction=-1, terminal=True)
+    with pytest.raises(eg.NoDerivativeError, match="end happens at the start of the run"):
+        m.compile(target="numpy").sensitivities(["h_dot"], 0.5, {"h": 0.0, "h_dot": -2.0})

@@ -74,6 +74,7 @@ def test_equilibrium(call: Call) -> None:
     found = call(*words, "--hold", "theta=0.4", "--unknown", "tau").json
     assert found["coordinates"]["theta"] == 0.4
     assert set(found["unknowns"]) == {"tau"}
+    assert "--hold theta=: write name=value" in call(*words, "--hold", "theta=").err
     held = call(*words, "--set", "theta=0.4", "--hold", "theta").json
     assert held["supports"]["theta"] == pytest.approx(found["unknowns"]["tau"], rel=1e-9)
     falls = call("equilibrium", EXAMPLES / "spherical_pendulum.yaml", "--hold", "nothing", "--target", "numpy")

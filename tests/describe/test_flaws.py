@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -98,3 +100,35 @@ def test_a_mapping_of_parameters_in_a_call_is_told_of_bind(target: str) -> None:
     module = m.compile(target=target)
     with pytest.raises(UsageError, match=r"array in the order of p_names; by name: bind\(p=\{\.\.\.\}\)"):
         module.rhs(0, [0.0, 0.0], p={"l": 1})
+
+
+def test_markers_without_their_names_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text(
+        "name: x\nbodies: {a: {mass: 1, inertia: {zz: 1}, markers: [0.1, 0, 0]}}\n"
+        "joints: {A: {type: revolute, between: [ground, a]}}\n"
+    )
+    with pytest.raises(ModelError, match=r"x.yaml:2: bodies.a.markers: \[0.1, 0, 0\] is not a mapping of marker names"):
+        eg.load(path).check()
+
+
+def test_lengths_whose_squares_overflow_are_told() -> None:
+    m = eg.Model("huge")
+    a, b, c = (m.body(name, mass=0) for name in "abc")
+    m.revolute("A", m.ground, a, coordinate="th")
+    m.revolute("B", a.at(0.1, 0, 0), b)
+    m.revolute("C", b.at(0.3, 1e308, 0), c)
+    m.prismatic("D", m.ground, c, axis="x", coordinate="s")
+    with np.errstate(all="ignore"), pytest.raises(AssemblyError, match="C.r_x: not finite at the initial"):
+        m.compile(target="numpy")
+
+
+def test_a_singular_position_without_freedom_names_no_independent_coordinates() -> None:
+    m = eg.Model("triangle")  # 0.2 + 0.2 = 0.4: flat, where both can turn for a moment
+    a, b = (m.body(name, mass=1, inertia={"zz": 0.1}) for name in "ab")
+    m.revolute("A", m.ground, a)
+    m.revolute("B", a.at(0.2, 0, 0), b)
+    m.revolute("C", b.at(0.2, 0, 0), m.ground.at(0.4, 0, 0))
+    module = m.compile(target="numpy")
+    with pytest.raises(EvaluationError, match="no freedom; start a little away"):
+        module.rhs(0.0, [0.0] * module.n_x)

@@ -127,3 +127,27 @@ def test_resets_at_the_end_at_corners_and_backwards() -> None:
     assert jumps["s_dot"][-1] == pytest.approx(2.5, rel=1e-9)
     assert jumps.t_events["noted"] == pytest.approx([1.25], abs=1e-9)
     assert mod.dae.solve((2.0, 0.0))["s_dot"][-1] == 2.0
+
+
+@pytest.mark.parametrize("speed", [0.0, -2.0])
+@pytest.mark.parametrize("law", [{"restitution": 0.5}, {"terminal": True, "direction": -1}, {"direction": 1}])
+def test_an_event_at_the_start_is_as_in_simulate(law: dict[str, Any], speed: float) -> None:
+    # a ball on the floor: at rest it is about to fall through, by h = -g t^2 / 2
+    m = eg.Model("ball", gravity=(0, -9.81, 0))
+    m.prismatic("J", m.ground, m.body("b", mass=1), axis="y", coordinate="h")
+    m.event("floor", "h", **law)
+    mod, start = m.compile(target="numpy"), {"h": 0.0, "h_dot": speed}
+    if law.get("restitution") and not speed:
+        for run in (mod.simulate, mod.dae.solve):
+            with pytest.raises(eg.ZenoError, match=r"events floor .* near t = 0 s"):
+                run(0.1, start)
+        return
+    runs = [mod.simulate(0.1, start), mod.dae.solve(0.1, start)]
+    for run in runs:
+        assert len(run.t_events["floor"]) == ("direction" not in law or law["direction"] < 0)
+        falls = speed * 0.1 - 0.5 * 9.81 * 0.01 if "restitution" not in law else 0.1 - 0.5 * 9.81 * 0.01
+        if law.get("terminal"):
+            assert run.t.tolist() == [0.0, 0.0]
+            assert run.status == 1
+            falls = 0.0
+        assert run["h"][-1] == pytest.approx(falls, abs=1e-6)

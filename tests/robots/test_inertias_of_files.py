@@ -5,6 +5,7 @@ Published robots are held against Pinocchio; faults of inertia are made by hand.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -258,3 +259,16 @@ def test_from_the_command_line(tmp_path: Path) -> None:
     assert "negative principal moment" in noted.stderr
     assert "limits" not in noted.stderr
     assert check("--check-inertia", "off", "--limits", "off").stderr == ""
+
+
+def test_negative_masses_and_locks_that_are_no_numbers(tmp_path: Path) -> None:
+    path = write(tmp_path, {})
+    for value in (float("nan"), "x"):
+        with pytest.raises(eg.UsageError, match="lock=.*finite number"):
+            eg.load(path, lock={"j": value})
+    text = path.read_text()
+    path.write_text(re.sub(r'<mass value="[^"]*"', '<mass value="-0.7"', text))
+    with pytest.raises(eg.ModelError, match="is -0.7; a mass is 0 or positive; check_inertia: note takes it"):
+        eg.load(path)
+    assert any("mass: is -0.7; taken as it is" in note for note in eg.load(path, check_inertia="note").notes)
+    assert not any("mass" in note for note in eg.load(path, check_inertia="off").notes)

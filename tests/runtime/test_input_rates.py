@@ -372,3 +372,13 @@ def test_an_exported_package_takes_the_rates_of_tables(tmp_path: Path) -> None:
     code = "import reel; print(reel.simulate(1.0, {'th_dot': 1.0}, inputs={'l': ([0, 1], [1, 2])})['th_dot'][-1])"
     found = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert abs(float(found.stdout) - 0.25) < 1e-8
+
+
+def test_a_spline_of_scipy_as_input() -> None:
+    from scipy.interpolate import CubicSpline
+
+    length, th, th_dot = sp.symbols("l th th_dot")
+    reel = eg.Model.from_lagrangian("reel", length**2 * th_dot**2 / 2, [th], inputs={length: 1.0})
+    spline = CubicSpline([0.0, 0.5, 1.0], [1.0, 1.5, 2.5])
+    run = reel.compile(target="numpy").simulate(1.0, {"th_dot": 1.0}, inputs={"l": spline}, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(run["th_dot"], spline(run.t) ** -2.0, rtol=1e-8)  # l^2 th' stays
