@@ -136,7 +136,9 @@ def _balance(module: Module, cases: Sequence[Case]) -> Finding:
         free = _null(C * scale) * scale[:, None]
         size = np.abs(free).T @ (np.abs(M) @ np.abs(a) + np.abs(h))
         condition = _condition(M, C, scale)
-        found.add(c.number, free.T @ (M @ a + h), KERNEL * condition * size + 1e-300, size_of(size))
+        # terms of M and h as large as the largest force may cancel in a direction without any force
+        limit = KERNEL * (condition * size + size_of(size))
+        found.add(c.number, free.T @ (M @ a + h), limit, size_of(size))
     return found.finding()
 
 

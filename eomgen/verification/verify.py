@@ -10,7 +10,7 @@ from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from ..errors import EomgenError
+from ..errors import EomgenError, UsageError
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
@@ -48,16 +48,23 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
         The loops do not close at the declared initial values.
     MissingDependencyError
         mpmath or SciPy is missing where the equations are there.
+    UsageError
+        ``states`` is no whole number from 1.
     """
     start = perf_counter()
+    if isinstance(states, bool) or not isinstance(states, int) or states < 1:
+        raise UsageError(f"verify: states is {states!r}; it is the number of random states, a whole number from 1")
     if module.metadata.get("no_inertia"):
         why = f"it is there for kinematics only: {module.metadata['no_inertia']}"
         return Verification(module.name, (Finding.skipped("all that moves by forces", why),))
+    if not module.n_x:
+        why = "the model has no coordinate: its bodies are fixed to ground"
+        return Verification(module.name, (Finding.skipped("all that moves", why),))
     cases = random_cases(module, states, seed)
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
     if equations is None:
-        why = "the module came without its equations; verify it where it is made, or run the package's selftest"
+        why = "they need the equations, which a package does not carry: verify the model that it was made from"
         found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
     else:
         found += _with_equations(module, equations, cases)
@@ -81,6 +88,8 @@ def verify_model(
     from .variants import variant_findings
 
     own = verify(module, states=states, seed=seed)
+    if not module.n_x or module.metadata.get("no_inertia"):
+        return Verification(own.name, (*own.findings, Finding.skipped("variants", own.findings[0].note)), own.seconds)
     found = (*own.findings, *variant_findings(model, seed=seed, seconds=max(LEAST, seconds - own.seconds)))
     return Verification(own.name, found, perf_counter() - start)
 
