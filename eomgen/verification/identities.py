@@ -156,6 +156,11 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     return float(own * (np.linalg.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
+def condition_at(module: Module, c: Case) -> float:
+    """By how much solving for accelerations at a case magnifies rounding."""
+    return _condition(_mass(module, c), _jacobian(module, c), module.layout.scales.q)
+
+
 def _holding(module: Module, cases: Sequence[Case]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs."""
     check = "rhs: constraints go on holding"

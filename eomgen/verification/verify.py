@@ -15,6 +15,7 @@ from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
 from .identities import identities
+from .jacobians import jacobians
 from .recorded import recorded_findings
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0) -> Verificati
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
     if equations is None:
+        found += jacobians(module, cases)
         why = "they need the equations, which a package does not carry: verify the model that it was made from"
         found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
     else:
