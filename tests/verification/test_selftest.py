@@ -93,7 +93,7 @@ def found_in(module: eg.Module) -> list[Finding]:
     return jacobians(module, random_cases(module, 2))
 
 
-@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "double_pendulum"])
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "double_pendulum", "peaucellier", "delta_robot"])
 def test_jacobians_of_correct_modules_agree(name: str) -> None:
     found = found_in(eg.load(EXAMPLES / f"{name}.yaml").compile(target="numpy"))
     assert found
