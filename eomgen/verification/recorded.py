@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import EomgenError
 from ..numeric.scales import Array
 from ..runtime.layout import KERNELS
 from .comparison import FAILED, Comparison, size_of
@@ -33,7 +34,7 @@ def recorded_findings(module: Module, file: Path | None = None) -> list[Finding]
         if data["name"] != module.name:
             return [_unusable(f"{FILE} is that of the model {str(data['name'])[:80]!r}")]
         found = [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+    except (EomgenError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         return [_unusable(f"{FILE} is damaged ({type(error).__name__}: {str(error)[:80]})")]
     return found or [Finding.skipped("recorded figures", f"{FILE} has none: all kernels call code in C")]
 
