@@ -37,7 +37,7 @@ ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FOR
 #: Files of verification/ that need no equations.
 VERIFICATION = (
     *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
-    *("identities.py", "recorded.py", "selftest.py", "verify.py"),
+    *("identities.py", "jacobians.py", "recorded.py", "selftest.py", "verify.py"),
 )
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
 

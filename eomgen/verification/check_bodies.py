@@ -33,6 +33,24 @@ def source(bench: Bench) -> str:
     return "equations as they were given" if bench.mechanism.given is not None else "free bodies"
 
 
+def _inertia_sizes(truth: Truth) -> Array:
+    """Sizes (n_v,) of the terms that the bias is a sum of, which may cancel: bodies' inertia forces, gravity, loads."""
+    if truth.system.mechanism.bare:
+        return np.zeros(truth.n)
+
+    def norm(vector: list[Number]) -> float:
+        return float(truth.mp.sqrt(bodies.dot(vector, vector)))
+
+    rates, sizes = truth.body_rates([truth.zero] * truth.n), np.abs(numbers(truth.applied()))
+    for j in range(truth.n):
+        for body, w, rate, twist in zip(truth.bodies, truth.virtual[j], rates, truth.twists, strict=True):
+            turning, inertia = norm(twist.angular) ** 2, max(norm(row) for row in body.inertia)
+            a = norm(rate.at(body.arm)) + turning * norm(body.arm) + norm(truth.gravity)
+            moment = inertia * (norm(rate.angular) + turning)
+            sizes[j] += float(body.mass) * a * norm(w.at(body.arm)) + moment * norm(w.angular)
+    return sizes
+
+
 def _tree(bench: Bench, name: str) -> Finding:
     found, layout = Comparison(f"{name}: {source(bench)}"), bench.layout
     labels = pairs(layout.v, layout.v) if name == "mass_matrix" else list(layout.v)
@@ -49,6 +67,8 @@ def _tree(bench: Bench, name: str) -> Finding:
         else:
             bound = layout.n_v * bench.bounds("inverse_dynamics", lambda: bench.terms.inverse_dynamics)[1][:, k].max()
         size = size_of(expected)
+        if name == "bias":
+            size = max(size, size_of(_inertia_sizes(truth)))
         floor = np.full(len(expected), FOLDED * size)
         if name == "mass_matrix":
             d = np.sqrt(np.maximum(np.diag(expected.reshape(layout.n_v, layout.n_v)), 0.0))
@@ -66,8 +86,10 @@ def _accelerations(bench: Bench) -> Finding:
         except ZeroDivisionError:
             return Finding.skipped(found.check, "the system of accelerations and multipliers is singular")
         actual = bench.rhs(truth.case)
-        limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * size_of(a)
-        found.add(k, actual[n_q:] - a, limit, size_of(a), [f"{n}'" for n in bench.layout.v])
+        mass = np.diag(numbers([x for row in truth.mass_matrix for x in row]).reshape(len(a), len(a)))
+        own = np.divide(_inertia_sizes(truth), mass, out=np.zeros_like(mass), where=mass > 0.0)
+        limit = bench.acceleration_limit(k, a, multipliers) + FOLDED * (size_of(a) + own)
+        found.add(k, actual[n_q:] - a, limit, max(size_of(a), size_of(own)), [f"{n}'" for n in bench.layout.v])
     return found.finding()
 
 

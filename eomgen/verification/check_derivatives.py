@@ -105,6 +105,8 @@ def _along(bench: Bench) -> Finding:
     if bench.terms.by_columns or bench.layout.given_rates:
         why = "the mass matrix is not written out" if bench.terms.by_columns else "rates of coordinates are given"
         return Finding.skipped(check, why)
+    if not bench.module.n_dof:
+        return Finding.skipped(check, "the constraints leave no motion")
     found, rng = Comparison(check), np.random.default_rng(1)
     for k, truth in enumerate(bench.truths):
         case = truth.case
@@ -165,7 +167,9 @@ def _all_directions(bench: Bench) -> Finding:
 
         return f
 
-    return _compare(bench, check, J * scales, [column(j) for j in range(layout.n_x)], layout.x)
+    return _compare(
+        bench, check, J * scales, [column(j) for j in range(layout.n_x)], layout.x, size_of(layout.scales.q)
+    )
 
 
 def _coordinate_sizes(bench: Bench) -> Array:
@@ -192,8 +196,14 @@ def _by(bench: Bench, name: str) -> Finding:
 
 
 def _compare(
-    bench: Bench, check: str, J: Array, columns: list[Callable[[float], Array]], names: tuple[str, ...]
+    bench: Bench,
+    check: str,
+    J: Array,
+    columns: list[Callable[[float], Array]],
+    names: tuple[str, ...],
+    least: float = 0.0,
 ) -> Finding:
+    """``least``: size of columns of any such Jacobian, which counts where constraints leave no motion."""
     found, condition = Comparison(check), _condition(bench, bench.cases[0])
     try:
         noise = _noise(bench, 0)
@@ -211,7 +221,7 @@ def _compare(
     if left_out:
         found.note = f"without {', '.join(left_out)}: no state nearby"
     expected, error = np.array(slopes).T, np.array(errors).T
-    size = max(size_of(expected), size_of(bench.rhs(bench.cases[0])))
+    size = max(size_of(expected), size_of(bench.rhs(bench.cases[0])), least)
     limit = error + 4.0 * bench.layout.n_x * UNIT * condition * size
     found.add(0, J - expected, limit, size, pairs(bench.labels("rhs"), names))
     return found.finding()

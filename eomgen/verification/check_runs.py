@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
 from ..numeric.scales import Array
+from ..runtime.events import Events
 from ..runtime.names import require
 from .bench import Bench
 from .cases import Case
@@ -60,8 +61,8 @@ def check(bench: Bench) -> list[Finding]:
 def _inapplicable(bench: Bench) -> str:
     if not bench.module.n_dof:
         return "drivers move all of it, and nothing is integrated"
-    if bench.layout.n_resets:
-        return "events reset its state"
+    if Events(bench.layout, None).resets:
+        return "events reset its state, and an integrator watches none"
     if not bench.layout.projects:
         return "derived with baumgarte="
     return ""

@@ -140,7 +140,9 @@ def _balance(module: Module, cases: Sequence[Case]) -> Finding:
         free = _null(C * scale) * scale[:, None]
         size = np.abs(free).T @ (np.abs(M) @ np.abs(a) + np.abs(h))
         condition = _condition(M, C, scale)
-        found.add(c.number, free.T @ (M @ a + h), KERNEL * condition * size + 1e-300, size_of(size))
+        # terms of M and h as large as the largest force may cancel in a direction without any force
+        limit = KERNEL * (condition * size + size_of(size))
+        found.add(c.number, free.T @ (M @ a + h), limit, size_of(size))
     return found.finding()
 
 
@@ -156,6 +158,11 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     own = np.linalg.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
     rows = np.linalg.norm(C * scale, axis=1)
     return float(own * (np.linalg.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
+
+
+def condition_at(module: Module, c: Case) -> float:
+    """By how much solving for accelerations at a case magnifies rounding."""
+    return _condition(_mass(module, c), _jacobian(module, c), module.layout.scales.q)
 
 
 def _holding(module: Module, cases: Sequence[Case]) -> Finding:

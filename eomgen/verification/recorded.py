@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import EomgenError
 from ..numeric.scales import Array
 from ..runtime.layout import KERNELS
-from .comparison import Comparison, size_of
+from .comparison import FAILED, Comparison, size_of
 from .finding import Finding
 
 if TYPE_CHECKING:
@@ -23,14 +24,24 @@ FILE = "selftest.json"  #: in the folder of the package
 
 
 def recorded_findings(module: Module, file: Path | None = None) -> list[Finding]:
-    """One finding for each kernel with figures; none where there is no file of them."""
+    """One finding for each kernel with figures; none where there is no package, a breach where its file is no use."""
     place = Path(__file__).parents[1] / FILE if file is None else file
     if not place.is_file():
-        return []
-    data: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
-    if data["name"] != module.name:
-        return []
-    return [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
+        packaged = file is not None or place.with_name("model.json").is_file()
+        return [_unusable(f"{FILE} is missing from the package")] if packaged else []
+    try:
+        data: dict[str, Any] = json.loads(place.read_text(encoding="utf-8"))
+        if data["name"] != module.name:
+            return [_unusable(f"{FILE} is that of the model {str(data['name'])[:80]!r}")]
+        found = [_compare(module, name, figures, data["states"]) for name, figures in data["kernels"].items()]
+    except (EomgenError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        return [_unusable(f"{FILE} is damaged ({type(error).__name__}: {str(error)[:80]})")]
+    return found or [Finding.skipped("recorded figures", f"{FILE} has none: all kernels call code in C")]
+
+
+def _unusable(why: str) -> Finding:
+    """Figures that cannot be compared are a breach: nothing else tells a package that is not what was generated."""
+    return Finding("recorded figures", FAILED, 0.0, note=f"{why}; install it again, or generate it anew")
 
 
 def _compare(module: Module, name: str, figures: list[dict[str, Any]], states: list[dict[str, Any]]) -> Finding:

@@ -10,11 +10,12 @@ from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from ..errors import EomgenError
+from ..errors import EomgenError, UsageError
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
 from .identities import identities
+from .jacobians import jacobians
 from .recorded import recorded_findings
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0, seconds: floa
         The loops do not close at the declared initial values.
     MissingDependencyError
         mpmath or SciPy is missing where the equations are there.
+    UsageError
+        ``states`` is no whole number from 1.
     """
     start = perf_counter()
     found = _of_module(module, states, seed)
@@ -62,11 +65,16 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0, seconds: floa
 
 def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
     """What the module says of itself, and what follows from its equations."""
+    if isinstance(states, bool) or not isinstance(states, int) or states < 1:
+        raise UsageError(f"verify: states is {states!r}; it is the number of random states, a whole number from 1")
+    if not module.n_x:
+        return [Finding.skipped("all that moves", "the model has no coordinate: its bodies are fixed to ground")]
     cases = random_cases(module, states, seed)
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
     if equations is None:
-        why = "the module came without its equations; verify it where it is made, or run the package's selftest"
+        found += jacobians(module, cases)
+        why = "they need the equations, which a package does not carry: verify the model that it was made from"
         found.append(Finding.skipped("graph, free bodies, derivatives, runs", why))
     else:
         found += _with_equations(module, equations, cases)
@@ -99,6 +107,8 @@ def _variants(module: Module, model: Any, seed: int, seconds: float) -> list[Fin
         return [Finding.skipped(check, "the model is not known: compile with Model.compile, or use eomgen verify")]
     if module.metadata.get("no_inertia"):
         return [Finding.skipped(check, "the model is there for kinematics only")]
+    if not module.n_x:
+        return [Finding.skipped(check, "the model has no coordinate")]
     if why := _only_in_c(getattr(module, "equations", None)):
         return [Finding.skipped(check, why)]
     from .variants import variant_findings

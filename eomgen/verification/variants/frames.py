@@ -23,6 +23,7 @@ _PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), 
 _KINDS = (
     *(("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az")),
     *(("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot")),
+    ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z"),
 )
 
 
