@@ -11,6 +11,8 @@ import pytest
 import sympy
 
 import eomgen as eg
+from eomgen.analysis.sensitivities import _refuse_change_point
+from eomgen.runtime.signals import Forcing
 
 Compiled = Callable[..., Any]
 
@@ -184,3 +186,20 @@ def test_mistakes_and_files(compiled: Compiled, tmp_path: Path) -> None:
     loop = compiled("slider_crank")
     with pytest.raises(eg.UsageError, match="the start cannot follow a change of r"):
         loop.sensitivities(["r"], 0.1, loop.x0(), hold=["theta", "s"])
+
+
+def test_a_change_point_is_named() -> None:
+    # 0.3 + 0.6 = 0.5 + 0.4: flat at th = 0, where the slopes of both closure rows are parallel
+    m = eg.Model("flat")
+    crank, rod, rock = (m.body(name, mass=1, inertia={"zz": 0.01}) for name in ("crank", "rod", "rock"))
+    m.revolute("A", m.ground, crank, coordinate="th")
+    m.revolute("B", crank.at(0.3, 0, 0), rod)
+    m.revolute("C", rod.at(0.5, 0, 0), rock.at(0.4, 0, 0))
+    m.revolute("D", m.ground.at(-0.6, 0, 0), rock, coordinate="ps")
+    m.initial(th=0.1)
+    m.guess(ps=0.1, B=3.0)
+    mod = m.compile(target="numpy")
+    flat = np.array([{"B": np.pi}.get(name, 0.0) for name in mod.x_names])
+    _refuse_change_point(mod, Forcing(mod.layout, None), 0.0, mod.x0())
+    with pytest.raises(eg.NoDerivativeError, match="passes a change point at t = 0.5 s, th = 0.*end the run before"):
+        _refuse_change_point(mod, Forcing(mod.layout, None), 0.5, flat)
