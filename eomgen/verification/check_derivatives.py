@@ -209,6 +209,7 @@ def _compare(
         noise = _noise(bench, 0)
     except ZeroDivisionError:
         return Finding.skipped(check, "the system of accelerations and multipliers is singular")
+    noise = np.maximum(noise, 2.0 * EPS * size_of(bench.rhs(bench.cases[0])))  # where drivers alone give accelerations
     slopes, errors, left_out = [], [], []
     for j, f in enumerate(columns):
         try:

@@ -46,7 +46,7 @@ def check(bench: Bench) -> list[Finding]:
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
     kinked = _kinked(bench)
-    judges = [(case, cache(_judge(bench, case))) for case in bench.cases[:JUDGED]]
+    judges = [(case, cache(_judge(bench, case))) for case in _held(bench)[:JUDGED]]
     found = [_order(bench, method, judges) for method in ORDERS if method in _methods(bench)]
     if not found:
         found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
@@ -80,6 +80,19 @@ def _methods(bench: Bench) -> tuple[str, ...]:
 
     known = tuple(getattr(eager(bench.module.core), "methods", ()))
     return (*known, "RK4") if known else ()
+
+
+def _held(bench: Bench) -> list[Case]:
+    """The states as runs with held inputs have them: rates of inputs are 0, and the state is on the constraints."""
+    rates = [bench.layout.u.index(rate) for of in bench.layout.input_rates.values() for rate, _ in of]
+    if not rates:
+        return list(bench.cases)
+    found = []
+    for case in bench.cases:
+        u = np.array(case.u)
+        u[rates] = 0.0
+        found.append(case._replace(u=u, x=bench.module.project(case.x, t=case.t, p=case.p, u=u)))
+    return found
 
 
 def _pace(bench: Bench, case: Case) -> float:
@@ -171,7 +184,7 @@ def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> F
 
 def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
     """DOP853, RK45 and Radau at tight tolerances end where SciPy's DOP853 does."""
-    check, case = "runs: methods agree", bench.cases[0]
+    check, case = "runs: methods agree", _held(bench)[0]
     methods = [m for m in ("DOP853", "RK45", "Radau", "Taylor") if m in _methods(bench)] or ["DOP853"]
     bound = bench.module.bind(case.p, case.u)
     found = Comparison(check, ", ".join(methods))
@@ -186,7 +199,7 @@ def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
 
 def _energy(bench: Bench, h: float) -> Finding:
     """Loops stay closed over a run; where nothing but potentials acts, the energy stays what it was."""
-    module, case = bench.module, bench.cases[0]
+    module, case = bench.module, _held(bench)[0]
     found = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
     rtol = 1e-10

@@ -10,7 +10,10 @@ from importlib import import_module
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import EomgenError, UsageError
+from ..limits.rounding import EPS
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
@@ -68,7 +71,7 @@ def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
     if isinstance(states, bool) or not isinstance(states, int) or states < 1:
         raise UsageError(f"verify: states is {states!r}; it is the number of random states, a whole number from 1")
     if not module.n_x:
-        return [Finding.skipped("all that moves", "the model has no coordinate: its bodies are fixed to ground")]
+        return _of_fixed_bodies(module)
     cases = random_cases(module, states, seed)
     found = identities(module, cases) + recorded_findings(module)
     equations = getattr(module, "equations", None)
@@ -79,6 +82,17 @@ def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
     else:
         found += _with_equations(module, equations, cases)
     return found
+
+
+def _of_fixed_bodies(module: Module) -> list[Finding]:
+    """Of a model without coordinates: its poses."""
+    R = module.poses(np.empty(0))[:, :3, :3]
+    worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
+    why = "the model has no coordinate: its bodies are fixed to ground"
+    return [
+        Finding("poses: rotations are rotations", worst, 16.0 * EPS, cases=1),
+        Finding.skipped("all that moves", why),
+    ]
 
 
 def verify_model(
