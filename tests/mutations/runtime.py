@@ -72,8 +72,8 @@ FAULTS = (
     ),
     Fault(
         "gap-rate-of-inputs", "eomgen/runtime/signal_rates.py",
-        "rates[layout.u.index(base)] = u[layout.u.index(rate)]",
-        "rates[layout.u.index(base)] = 0.0",
+        "rates[base] = u[rate]",
+        "rates[base] = 0.0",
         "impacts: the rate of a gap that an input moves is dropped",
         ("tests/runtime/test_moving_floors.py",),
     ),
