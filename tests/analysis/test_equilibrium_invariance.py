@@ -48,7 +48,7 @@ def loop(
     return m.compile(method=method, target=target)
 
 
-CLOTHES: dict[str, dict[str, Any]] = {
+DESCRIPTIONS: dict[str, dict[str, Any]] = {
     "millimetres": {"unit": 1000.0},
     "kilometres": {"unit": 1e-3},
     "frames turned": {"turn": 0.7},
@@ -74,10 +74,10 @@ def plain() -> Any:
 
 
 @pytest.mark.parametrize(
-    "clothes", [pytest.param(name, marks=pytest.mark.slow if name == "cython" else ()) for name in CLOTHES]
+    "described", [pytest.param(name, marks=pytest.mark.slow if name == "cython" else ()) for name in DESCRIPTIONS]
 )
-def test_a_loop_with_soft_and_stiff_springs(clothes: str, plain: Any) -> None:
-    mod, first = loop(**CLOTHES[clothes]), plain
+def test_a_loop_with_soft_and_stiff_springs(described: str, plain: Any) -> None:
+    mod, first = loop(**DESCRIPTIONS[described]), plain
     other = mod.equilibrium(GUESS)
     np.testing.assert_allclose(angles(other), angles(first), atol=1e-10)
     assert other.stability == first.stability == "marginal"
