@@ -25,6 +25,7 @@ from ..numeric.scales import Array
 from ..numeric.space import settle
 from .failure import place
 from .kernels import Kernels
+from .late_rank import require_rank
 from .names import UnknownNameError, unknown
 
 if TYPE_CHECKING:
@@ -256,32 +257,14 @@ class Initial:
 
     def velocities(self, q: Array, given: Mapping[str, float] | None) -> Array:
         """Velocities with the given rates exact, and the declared ones where they leave room; None: declared exact."""
-        self.require_rank(q)
+        if self.layout.n_c:
+            require_rank(self.kernels, self.scales.jacobian(self._C_q(q, t=self.t)))
         declared = self.sort(self.layout.initial).rates
         if given is None:
             return self._solve_rates(q, declared).v
         self._require_motion(q, given)
         rest = {name: value for name, value in declared.items() if name not in given}
         return self._solve_rates(q, {**given, **self.compatible(q, given, rest, positions=False)}).v
-
-    def require_rank(self, q: Array) -> None:
-        """Refuse parameters with which more constraint rows are independent than with the declared ones.
-
-        Raises
-        ------
-        UsageError
-        """
-        layout = self.layout
-        declared = layout.metadata["p_values"]
-        if not layout.n_c or all(a == b for a, b in zip(self.kernels.context.p, declared, strict=True)):
-            return
-        found = rank(self.scales.jacobian(self._C_q(q, t=self.t))).rank
-        if found > layout.rank:
-            changed = [n for n, a, b in zip(layout.p, self.kernels.context.p, declared, strict=True) if a != b]
-            raise UsageError(
-                f"with {', '.join(changed)} as given {found} constraint rows are independent, {layout.rank} with the "
-                "declared values, by which the degrees of freedom were judged; declare values with which they all act"
-            )
 
     def _require_motion(self, q: Array, given: Mapping[str, float]) -> None:
         """Refuse the rate of a coordinate that stands still at q, whatever moves: it would need boundless rates.

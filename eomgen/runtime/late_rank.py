@@ -1,0 +1,35 @@
+"""Stage runtime: constraints with parameters given late -> whether as many rows are independent as were declared."""
+
+from __future__ import annotations
+
+from ..errors import UsageError
+from ..numeric.ranks import rank
+from ..numeric.scales import Array
+from .kernels import Kernels
+
+
+def require_rank(kernels: Kernels, J: Array) -> None:
+    """Refuse parameters with which more constraint rows are independent than with the declared ones.
+
+    Parameters
+    ----------
+    kernels : Kernels
+        With the parameters.
+    J : (n_c, n_v) array
+        Scaled constraint Jacobian at an assembled position.
+
+    Raises
+    ------
+    UsageError
+    """
+    layout = kernels.layout
+    pairs = list(zip(layout.p, kernels.context.p, layout.metadata["p_values"], strict=True))
+    changed = [name for name, value, declared in pairs if value != declared]
+    if not changed:
+        return
+    found = rank(J).rank
+    if found > layout.rank:
+        raise UsageError(
+            f"with {', '.join(changed)} as given {found} constraint rows are independent, {layout.rank} with the "
+            "declared values, by which the degrees of freedom were judged; declare values with which they all act"
+        )
