@@ -18,6 +18,7 @@ from ..graph.substitute import symbols_of
 from .input_names import chains, rate_of, split_rate
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output
 from .reading import Reader
+from .time_jumps import jumps_in_time
 
 
 def clock(graph: Graph, inputs: Sequence[Input]) -> dict[Expr, Expr]:
@@ -41,7 +42,12 @@ def add_rates(
     would need accelerations.
     """
     needed: dict[str, str] = {}
-    for expressions, times, why in _differentiated(reader, lagrangian, given, constraints, events, outputs):
+    differentiated = _differentiated(reader, lagrangian, given, constraints, events, outputs)
+    for expressions, _, why, place in differentiated:
+        if place is not None and jumps_in_time(expressions):
+            message = f"{why} is differentiated by time, and jumps at a time that a condition on t gives"
+            reader.faults.add(place, message, "a jump is an impact: write it smoothly, or as an event with a reset")
+    for expressions, times, why, _ in differentiated:
         for name in sorted(symbols_of(expressions) & {u.name for u in inputs}):
             for k in range(1, times + 1):
                 needed.setdefault(rate_of(name, k), f"input {name!r}, whose rate {why} needs")
@@ -70,32 +76,38 @@ def _differentiated(
     constraints: Sequence[Constraint],
     events: Sequence[Event],
     outputs: Sequence[Output],
-) -> list[tuple[list[Expr], int, str]]:
-    """Expressions that the equations differentiate by time, how often, and what they are."""
+) -> list[tuple[list[Expr], int, str, str | None]]:
+    """Expressions that the equations differentiate by time, how often, what they are, and where they stand.
+
+    The place is None for drivers, whose jumps are told by the runs that they lead.
+    """
     symbol = reader.graph.symbol
-    found: list[tuple[list[Expr], int, str]] = []
+    found: list[tuple[list[Expr], int, str, str | None]] = []
     rates: set[str] = set()
     if lagrangian is not None:
         v = [symbol(f"{name}_dot") for name in lagrangian.coordinates]
-        found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)"))
+        found.append((gradient(lagrangian.expression, v), 1, "d/dt (dL/dq_dot)", "lagrangian"))
         rates = {f"{name}_dot" for name in lagrangian.coordinates}
     if given is not None:
         rates = {f"{name}_dot" for name in given.coordinates} | set(given.velocities)
     bare = lagrangian or given
     positions = [e for e in bare.constraints if symbols_of([e]).isdisjoint(rates)] if bare is not None else []
     velocities = [e for e in bare.constraints if not symbols_of([e]).isdisjoint(rates)] if bare is not None else []
-    found += [(positions, 2, "a constraint"), (velocities, 1, "a constraint of velocities")]
+    section = "lagrangian.constraints" if given is None else "equations.constraints"
+    found += [(positions, 2, "a constraint", section), (velocities, 1, "a constraint of velocities", section)]
     if given is not None:
         seconds = {f"{name}_ddot" for name in given.coordinates}
         shown = not symbols_of([o.expression for o in outputs]).isdisjoint(seconds)
         if positions or shown:
-            found.append((list(given.rates), 1, "q'' of the given rates"))
+            found.append((list(given.rates), 1, "q'' of the given rates", "equations.rates"))
     for c in constraints:
         if isinstance(c, Driver):
-            found.append(([c.value], 2, f"the driver {c.name!r}"))
+            found.append(([c.value], 2, f"the driver {c.name!r}", None))
         elif isinstance(c, Equation):
-            found.append(([c.expression], 2 if c.level == POSITION else 1, f"the constraint {c.name!r}"))
-    found += [([e.expression], 1, f"the gap {e.name!r}") for e in events if e.restitution is not None]
+            times = 2 if c.level == POSITION else 1
+            found.append(([c.expression], times, f"the constraint {c.name!r}", f"constraints.{c.name}"))
+    hits = [e for e in events if e.restitution is not None]
+    found += [([e.expression], 1, f"the gap {e.name!r}", f"events.{e.name}") for e in hits]
     return found
 
 

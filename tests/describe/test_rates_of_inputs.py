@@ -116,3 +116,20 @@ def test_names_of_rates() -> None:
     ]
     assert [split_rate("u_ddot"), split_rate("u")] == [("u", 2), ("u", 0)]
     assert chains(["a", "b", "a_ddot", "b_dot", "c_dot"]) == {"a": ["a_ddot"], "b": ["b_dot"]}
+
+
+@pytest.mark.parametrize(
+    ("factor", "jumps"),
+    [("where(t > t0, 1.5, 1)", True), ("where(t > t0, 1 + (t - t0), 1)", False), ("1 + max(t - 0.5, 0)", False)],
+)
+def test_what_jumps_in_time_by_a_condition_is_refused(factor: str, jumps: bool) -> None:
+    """Differentiated by time the branch taken is constant, so that the impulse of the jump would be passed over."""
+    m = eg.Model("lift", gravity=(0, -9.81, 0))
+    m.parameter("t0", 0.3)
+    m.prismatic("s", m.ground, m.body("b", mass=1), axis="x")
+    m.coupling("led", equation=f"s - 0.1*({factor})")
+    if jumps:
+        with pytest.raises(eg.ModelError, match=r"constraints.led: the constraint 'led' .* jumps at a time"):
+            m.check()
+    else:
+        assert m.check().degrees_of_freedom == 0
