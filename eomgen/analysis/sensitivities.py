@@ -26,6 +26,7 @@ from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.signals import Forcing
 from ..runtime.simulate import DEFAULTS, find_span, find_state, ordered_times
+from .lost_branch import refuse_lost_branches
 from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .start import held_names, keep_consistent, split_columns, start_sensitivity
@@ -105,11 +106,15 @@ def differentiate_run(
     t_events, x_events = [np.empty(0)] * len(watched), [np.empty((n, 0))] * len(watched)
     for (i, _), event_times, found in zip(salts.listed, solution.t_events, solution.x_events, strict=True):
         t_events[i], x_events[i] = event_times, found[:n]
-    states = solution._replace(t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events)
+    steps = None if solution.steps is None else (solution.steps[0], solution.steps[1][:n])
+    states = solution._replace(
+        t=solution.t[kept], x=solution.x[:n, kept], t_events=t_events, x_events=x_events, steps=steps
+    )
     raw = solution.x[n:, kept].reshape(n, k, -1) / run.weights[:, None]
     trajectory = record(bound, forcing, states, title, options, watched.names)
     if alone is not None:
         _require_same(trajectory, alone)
+    refuse_lost_branches(bound, forcing, trajectory, columns)
     dx, dy = np.empty_like(raw), np.empty((layout.n_y, k, raw.shape[2]))
     for j, time in enumerate(trajectory.t):
         t, x = float(time), trajectory.x[:, j]

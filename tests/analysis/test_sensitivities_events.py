@@ -318,3 +318,28 @@ def test_events_at_the_start() -> None:
     m.event("end", "h", direction=-1, terminal=True)
     with pytest.raises(eg.NoDerivativeError, match="end happens at the start of the run"):
         m.compile(target="numpy").sensitivities(["h_dot"], 0.5, {"h": 0.0, "h_dot": -2.0})
+
+
+def test_a_length_that_opens_a_change_point_has_no_derivative() -> None:
+    """A driven parallelogram through its flat position: the torque has a derivative, the crank's length has none."""
+    m = eg.Model("flat", gravity=(0, -9.81, 0))
+    length = m.parameter("a", 0.3)
+    m.parameter("k", 1.0)
+    rods = {n: m.body(n, mass=1, com=(0.1, 0, 0), inertia=(0.01, 0.01, 0.01)) for n in "abc"}
+    m.revolute("A", m.ground, rods["a"], coordinate="th")
+    m.revolute("B", rods["a"].at(length, 0, 0), rods["b"], coordinate="be")
+    m.revolute("D", m.ground.at(0.6, 0, 0), rods["c"], coordinate="ps")
+    m.revolute("C", rods["b"].at(0.6, 0, 0), rods["c"].at(0.3, 0, 0))
+    m.actuator("drive", "A", "k")
+    m.initial(th=0.2)
+    m.guess(be=-0.2, ps=0.2)
+    m.independent("th")
+    mod = m.compile()
+    start = {"th": 0.2, "th_dot": -3.0}
+    ends = [mod.simulate(0.2, start, parameters={"k": k}, rtol=1e-11, atol=1e-12)["th"][-1] for k in (1.001, 0.999)]
+    found = mod.sensitivities(["k"], 0.2, start)
+    assert len(found.trajectory.change_points) == 1
+    assert len(mod.sensitivities(["k"], 0.2, start, t_eval=[0.0, 0.2]).trajectory.change_points) == 1
+    assert found["th", "k"][-1] == pytest.approx((ends[0] - ends[1]) / 0.002, rel=1e-5)
+    with pytest.raises(eg.NoDerivativeError, match="a change of a opens the crossing"):
+        mod.sensitivities(["a"], 0.2, start)

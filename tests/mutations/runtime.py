@@ -14,8 +14,8 @@ FAULTS = (
     ),
     Fault(
         "input-second-rates", "eomgen/describe/input_rates.py",
-        '(positions, 2, "a constraint")',
-        '(positions, 1, "a constraint")',
+        '(positions, 2, "a constraint", section)',
+        '(positions, 1, "a constraint", section)',
         "second rates of inputs in constraints are taken for 0",
         ("tests/equations/test_bare_lagrangian.py::test_a_constraint_that_an_input_moves[lagrange]",),
     ),
