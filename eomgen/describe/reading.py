@@ -162,7 +162,7 @@ class Reader:
             for key in value:
                 if key not in INERTIA:
                     self.faults.add(f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"))
-            given = {k: self.expression(f"{path}.{k}", v) for k, v in value.items() if k in INERTIA}
+            given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
             xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         parts = items(value)
