@@ -36,6 +36,10 @@ def lone_surrogate(text: str) -> str:
     return f"U+{ord(found[0]):04X}" if found else ""
 
 
+#: What to do about one.
+WHOLE = "write the character itself, or both halves of its pair"
+
+
 def _number(c: str) -> str:
     """A character as Python and TOML both write it where it cannot stand for itself."""
     if c in '\\"':
