@@ -66,6 +66,7 @@ class Crossings:
         self.t: list[list[float]] = [[] for _ in events]
         self.x: list[list[Array]] = [[] for _ in events]
         self.fired: list[int] = []  #: those at which the run stopped last
+        self.ways: list[float] = []  #: how their values went there
         self.g, self.slope, self.slope_new = np.empty(n), np.empty(n), np.zeros(n)
         self.size, self.leaving, self.touch = np.empty(n), [0] * n, [0] * n
         self.resets, self.crowded, self.last = 0, 0, np.inf
@@ -91,11 +92,11 @@ class Crossings:
         """Note the zeros of a step, up to one at which the run stops: its time, and whether the run ends there."""
         new, f = self._values(step.t, step.x), np.asarray(self.rhs(step.t, step.x))
         self.slope_new = self._slopes(step.t, step.x, f, new, step.length)
-        found = [(self._zero(step, bracket), bracket.event) for bracket in self._brackets(step, new)]
-        found.sort(key=lambda pair: self.forward * pair[0])
-        self.fired = []
+        found = [(self._zero(step, z), z.event, z.fb - z.fa) for z in self._brackets(step, new)]
+        found.sort(key=lambda triple: self.forward * triple[0])
+        self.fired, self.ways = [], []
         stop: tuple[float, bool] | None = None
-        for zero, i in found:
+        for zero, i, way in found:
             if stop and (stop[1] or abs(zero - stop[0]) > INSTANT * max(abs(stop[0]), self.span)):
                 break
             event = self.events[i]
@@ -109,6 +110,7 @@ class Crossings:
             elif event.action != GO_ON:
                 stop = stop or (zero, False)
                 self.fired.append(i)
+                self.ways.append(way)
         self.g, self.slope, self.slope_new = new, self.slope_new, self.slope
         self.slope = self._slopes(step.t, step.x, f, new, step.length, -1.0)
         return stop
@@ -224,6 +226,10 @@ class Crossings:
         return float(b)
 
     # -- resets ---------------------------------------------------------------------------------------------------
+    def arrive(self, t: float, x: Array, length: float) -> None:
+        """Take note how fast values come, right before a reset."""
+        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self._values(t, x), length)
+
     def depart(self, t: float, x: Array, length: float = 0.0) -> None:
         """Go on from another state, after the events that fired.
 
@@ -232,15 +238,17 @@ class Crossings:
         ZenoError
             Resets follow each other ever faster, or one leads nowhere.
         """
-        came = np.fmax(np.abs(self.slope), np.abs(self.slope_new))
+        arrived, came = self.slope, np.fmax(np.abs(self.slope), np.abs(self.slope_new))
         self.g = self._values(t, x)
         self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
         stuck = False
-        for i in self.fired:
+        for i, way in zip(self.fired, self.ways, strict=True):
             rate, action = self.forward * float(self.slope[i]), self.events[i].action
             touching = abs(self.g[i]) <= TOUCHING * self.size[i]
             if self.leaving[i]:  # it only touched zero
                 continue
+            if action in (RESET, WAIT) and way * self.forward * float(arrived[i]) < 0.0:
+                stuck = True  # it goes the other way: less than the accuracy is left
             nowhere = (action == WAIT and rate < 0.0) or not abs(rate) > TOUCHING * came[i]
             stuck = stuck or bool(touching and nowhere and action in (RESET, WAIT))
             self.leaving[i] = (1 if rate > 0.0 else -1) if touching and (rate or action in (RESET, WAIT)) else 0

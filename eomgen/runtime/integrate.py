@@ -210,6 +210,7 @@ class _Journey:
                 return
             if stop is not None and self.crossings is not None:
                 fired = list(self.crossings.fired)
+                self.crossings.arrive(self.t, self.x, float(solver.t - solver.t_old))
                 if reset is not None:
                     self.x = np.array(reset(self.t, self.x, fired), dtype=float)
                 self._keep()

@@ -113,17 +113,18 @@ static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_ev
     return n;
 }
 
-/* Zeros of the brackets in place of their first ends, in order. */
+/* Zeros of the brackets in place of their first ends, in order, and in place of the second the way the value goes there. */
 static void sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n)
 {
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
-        const double t = zero_between(method, run, ev, i, ev->bracket + 4 * k);
+        const double *const row = ev->bracket + 4 * k, way = row[3] - row[2], t = zero_between(method, run, ev, i, row);
         int at = k;
         for (; at > 0 && run->direction * (ev->bracket[4 * (at - 1)] - t) > 0.0; at--) {
-            ev->bracket[4 * at] = ev->bracket[4 * (at - 1)], ev->whose[at] = ev->whose[at - 1];
+            memcpy(ev->bracket + 4 * at, ev->bracket + 4 * (at - 1), 2 * sizeof(double));
+            ev->whose[at] = ev->whose[at - 1];
         }
-        ev->bracket[4 * at] = t, ev->whose[at] = i;
+        ev->bracket[4 * at] = t, ev->bracket[4 * at + 1] = way, ev->whose[at] = i;
     }
 }
 
@@ -139,7 +140,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
     sort_zeros(method, run, ev, n);
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
-        const double zero = ev->bracket[4 * k];
+        const double zero = ev->bracket[4 * k], way = ev->bracket[4 * k + 1];
         if (stop && (stop == 2 || fabs(zero - *t) > RUNS_INSTANT * fmax(fabs(*t), j->span))) {
             break;
         }
@@ -155,7 +156,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
             stop = 2, *t = zero;
         } else if (ev->action[i] != EOMGEN_GO_ON) {
             *t = stop ? *t : zero;
-            stop = 1, ev->fired[i] = 1;
+            stop = 1, ev->fired[i] = way > 0.0 ? 1 : way < 0.0 ? -1 : 2;
         }
     }
     double *const spare = ev->g, *const other = ev->slope;

@@ -1,6 +1,7 @@
 /* Events: zeros of functions of time and state within a step, by the dense output. A change of sign is found as SciPy's
    solve_ivp does; a value that comes to zero and back within one step is looked for as well. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "eomgen_loop.h"
@@ -54,10 +55,19 @@ void eomgen_arm(eomgen_run *run, eomgen_events *ev)
     }
 }
 
+void eomgen_arrive(eomgen_run *run, eomgen_events *ev)
+{
+    eomgen_evaluate(run, run->t, run->y, run->f);
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
+}
+
 int eomgen_depart(eomgen_run *run, eomgen_events *ev)
 {
     int stuck = 0;
     for (int i = 0; i < ev->n; i++) {
+        const double came = run->direction * ev->slope[i] * (ev->leaving[i] == 0 ? ev->fired[i] : 0);
+        stuck = stuck || (abs(ev->fired[i]) == 1 && came < 0.0); /* it goes the other way: less than the accuracy is left */
         ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
     }
     run->step = 0.0;

@@ -122,6 +122,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         eomgen_between(method, run, t, j->events->y);
         memcpy(run->y, j->events->y, (size_t)run->n * sizeof(double));
         run->t = t;
+        eomgen_arrive(run, j->events);
     }
     store_step(run, j);
     if (stop == 2) {
