@@ -64,16 +64,19 @@ def generator(kind: str, seed: int) -> random.Random:
     return random.Random(f"{kind} {seed}")
 
 
-def text_of(case: Any) -> str:
-    """A case as it is written to a file."""
-    return case if isinstance(case, str) else json.dumps(case, indent=1)
+def keep(case: Any, stem: Path) -> Path:
+    """Write a case beside ``stem``: a text as ``.txt``, a tree as ``.json``."""
+    path = stem.with_suffix(".txt" if isinstance(case, str) else ".json")
+    text = case if isinstance(case, str) else json.dumps(case, indent=1)
+    path.write_text(text, encoding="utf-8", errors="surrogatepass", newline="")
+    return path
 
 
-def case_of(text: str) -> Any:
-    """The case of a file that :func:`text_of` wrote; a text that is no JSON object is itself the case."""
-    if text.startswith("{\n"):
-        return json.loads(text)
-    return text
+def kept(path: Path) -> Any:
+    """The case of a file that :func:`keep` wrote."""
+    with path.open(encoding="utf-8", errors="surrogatepass", newline="") as file:
+        text = file.read()
+    return json.loads(text) if path.suffix == ".json" else text
 
 
 def fewer(parts: list[Any]) -> Iterator[list[Any]]:
