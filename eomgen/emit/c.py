@@ -10,6 +10,7 @@ from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
 from ..program.loops import LARGE
 from ..program.series import NoSeriesError
+from ..texts import c_literals
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
@@ -126,7 +127,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "series": program.metadata["series"],
         "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
-        "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
+        "metadata_lines": c_literals(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
 
 
@@ -138,9 +139,3 @@ def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
     closes = any(d.name == "rhs" for d in program.drivers) and program.has_loops and program.projects
     closes = closes and program.sizes.n_v > LARGE
     return next(start for name, start, _ in areas if name == "X") if closes else 0
-
-
-def _literal_lines(text: str, width: int = 100) -> list[str]:
-    """A text as the insides of adjacent C string literals; ``?`` is escaped, so that no trigraph appears."""
-    escape = {"\\": "\\\\", '"': '\\"', "?": "\\?"}
-    return ["".join(escape.get(ch, ch) for ch in text[k : k + width]) for k in range(0, len(text), width)]
