@@ -87,11 +87,12 @@ cdef class Dense:
         cdef int n = self.run.n
         cdef cnp.ndarray result = rows(k, n)
         cdef double *piece
+        cdef eomgen_run run = self.run  # of this call: threads may share the object
         for i in range(k):
             piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
                 3 + n * (1 + self.method.rows_F))
-            self.run.t_old, self.run.step, self.run.y_old, self.run.F = piece[0], piece[1], piece + 3, piece + 3 + n
-            self.method.interpolate(&self.run, (<double *>cnp.PyArray_DATA(at))[i],
+            run.t_old, run.step, run.y_old, run.F = piece[0], piece[1], piece + 3, piece + 3 + n
+            self.method.interpolate(&run, (<double *>cnp.PyArray_DATA(at))[i],
                                     <double *>cnp.PyArray_DATA(result) + i * n)
         return np.ascontiguousarray(result.T)
 

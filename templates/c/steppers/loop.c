@@ -37,7 +37,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     set_out(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
-        j->events->last_reset = NAN;
+        j->events->last_reset = (double)NAN;
         eomgen_arm(run, j->events);
     }
     store_step(run, j);
@@ -160,5 +160,8 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
             eomgen_start(method, run);
         }
     }
-    return run->stopped ? EOMGEN_STOPPED : EOMGEN_END;
+    if (run->stopped) {
+        return EOMGEN_STOPPED;
+    }
+    return EOMGEN_END;
 }
