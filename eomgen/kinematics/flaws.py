@@ -21,6 +21,7 @@ from .motion import Motion
 
 if TYPE_CHECKING:
     from .kinematics import Kinematics
+    from .loops import Constraints
     from .mobility import Array, ConstraintFunctions
 
 
@@ -95,6 +96,27 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     if all(label.partition(".")[0] in discs for label in bad):
         raise AssemblyError(f"{what}: {LYING}; tilt it in initial or guess", bad)
     raise AssemblyError(f"{what}; give another one in initial or guess", bad)
+
+
+def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
+    """Refuse constraints in which only time, inputs and parameters stand: no coordinate can hold them.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
+    free = [*constraints.values, *constraints.velocity[len(constraints.values) :]]
+    for label, row, left in zip(constraints.labels, constraints.jacobian, free, strict=True):
+        moving = sorted(symbols_of([left]) & clock)
+        if moving and all(x.is_zero for x in row):
+            what = f"{label} depends on {', '.join(moving)} and on no coordinate, so nothing can hold it"
+            own = "lagrangian." if mechanism.lagrangian else "equations." if mechanism.given else ""
+            place = f"{own}constraints" if own else f"constraints.{label.partition('.')[0]}"
+            problems.append(mechanism.problem(place, what, "let a coordinate follow it, or take it away"))
+    if problems:
+        raise ModelError(problems)
 
 
 def refuse_idle_rows(kinematics: Kinematics) -> None:

@@ -110,6 +110,7 @@ class LoopBlocks:
         """The factor of J J^T + relative max(diag) I, and what was added."""
         G = gram(rows)
         size = largest([row.get(i, self.terms.graph.zero) for i, row in enumerate(G)])
+        size = self.terms.graph.apply("max", size, self.terms.graph.constant(NOTHING))  # rows of zeros ask for no step
         for i, row in enumerate(G):
             row[i] = row.get(i, self.terms.graph.zero) + size * relative
         return factorize(G), size * relative
@@ -237,7 +238,9 @@ class LoopBlocks:
             *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
         ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
-        if blocks is None or any(len(b.rows) > 2 for b in blocks):
+        if not dependent:  # the rows hold nothing: parameters alone decide whether they are closed
+            first, *found = ([] for _ in right)
+        elif blocks is None or any(len(b.rows) > 2 for b in blocks):
             first, *found = self._least_squares(left, right, conditions)
         else:
             first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))

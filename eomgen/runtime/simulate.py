@@ -16,7 +16,7 @@ from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
-from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, takes_jacobian
+from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .layout import number
 from .names import check_names
 from .pace import Crawling, Pace
@@ -260,6 +260,7 @@ def _check(run: Run, solution: Solution, start: float, end: float, method: str) 
         reached = float(solution.t[-1]) if solution.t.size else start
         last = solution.x[:, -1] if solution.t.size else None
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
+    require_end(solution, end)
 
 
 def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
