@@ -105,10 +105,10 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, limits/, numeric/, runtime/, analysis/, ensembles/, parts of verification/, as in eomgen itself."""
+    """errors.py, the folders limits to ensembles, and parts of verification, as in eomgen itself."""
     root = files("eomgen")
     found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
-    for folder in ("limits", "numeric", "runtime", "analysis", "ensembles"):
+    for folder in ("limits", "files", "numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
