@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .identity import code_digest, differences, digest
@@ -31,7 +32,7 @@ EVERY = 60.0  #: seconds between two writings
 
 
 class Checkpoint:
-    """The file of one run.
+    """The file of one run.  A run that has ended is kept too: the same call again gives its result.
 
     Parameters
     ----------

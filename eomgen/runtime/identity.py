@@ -70,6 +70,6 @@ def differences(wanted: Mapping[str, Any], found: Mapping[str, Any], path: str =
         a, b = wanted.get(name), found.get(name)
         if isinstance(a, Mapping) and isinstance(b, Mapping):
             names += differences(a, b, f"{path}{name}.")
-        elif a != b:
+        elif a != b and not (a != a and b != b):  # NaN is like NaN here
             names.append(f"{path}{name}")
     return names

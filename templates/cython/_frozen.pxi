@@ -76,7 +76,7 @@ cdef long thaw(Journey j, dict kept) except -1000:
         raise ValueError("results of other sizes")
     most_order = SERIES.most if j.method.expands else 0
     at_times = j.journey.n_eval >= 0
-    bounds = {7: most_order, 8: 1, 9: 1, 10: j.journey.n_nodes - 1, 11: max(j.journey.n_eval, 0), 15: 1}
+    bounds = {7: most_order, 8: 1, 9: 1, 10: j.journey.n_nodes - 1, 11: max(j.journey.n_eval, 0), 15: 1, 16: 2}
     if any(not 0 <= whole[place] <= most for place, most in bounds.items()) or min(whole[1:7]) < -1000:
         raise ValueError("counts that cannot be")
     if len(stored[0]) != len(stored[1]) or (at_times and len(stored[0]) != whole[11]):
