@@ -85,12 +85,6 @@ def docstring_text(text: str) -> str:
     return "\n".join(_ESCAPED.sub(lambda c: _number(c[0]), line) for line in text.split("\n"))
 
 
-def c_literals(text: str) -> list[str]:
-    """Adjacent C string literals, without their quotes, of a text in ASCII: octal numbers end by themselves."""
-    parts = (text[k : k + 100].encode("ascii") for k in range(0, len(text), 100))
-    return ["".join(chr(b) if 32 <= b < 127 and chr(b) not in '\\"?' else f"\\{b:03o}" for b in part) for part in parts]
-
-
 def toml_text(text: str) -> str:
     """A TOML string with its quotes, whose value is the text."""
     return f'"{_ESCAPED.sub(lambda c: _number(c[0]), text)}"'

@@ -108,20 +108,6 @@ def test_toml_and_yaml_read_back_the_text() -> None:
     assert reader.load("\n".join(f"- {texts.yaml_quoted(text)}" for text in chosen)) == chosen
 
 
-def test_a_c_literal_has_the_value_of_the_text(tmp_path: Path) -> None:
-    text = "".join(map(chr, range(1, 128))) + "??/??=" * 40 + "\\x41\\0019" * 30 + '%s%n"'
-    literals = "\n".join(f'"{part}"' for part in texts.c_literals(text))
-    numbers = ",".join(str(ord(c)) for c in text)
-    (tmp_path / "literal.c").write_text(
-        f"#include <string.h>\nstatic const char text[] =\n{literals};\nstatic const char wanted[] = {{{numbers},0}};\n"
-        "int main(void) { return strcmp(text, wanted) != 0 || sizeof text != sizeof wanted; }\n",
-        encoding="ascii",
-    )
-    command = ["gcc", "-std=c99", "-trigraphs", "-Wall", "-Werror", "literal.c", "-o", "literal"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    assert subprocess.run([tmp_path / "literal"], check=False).returncode == 0
-
-
 def test_only_what_prints_reaches_a_terminal() -> None:
     for lines in (True, False):
         shown = texts.visible(ALL, lines)

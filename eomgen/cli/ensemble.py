@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import UsageError
+from ..files.writing import save_figure, write_whole
 from ..runtime.names import require
 from .analysis import Prepared, analysis_options
 from .options import require_folder
@@ -79,10 +80,12 @@ def ensemble(
             rtol=rtol, atol=atol,
         )  # fmt: skip
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        found.to_pandas().to_csv(out, index=False) if out.suffix == ".csv" else found.save(out)
+        if out.suffix == ".csv":
+            write_whole(out, found.to_pandas().to_csv(index=False))
+        else:
+            found.save(out)
     if plot is not None:
-        found.plot(plot[0]).figure.savefig(plot[1], dpi=150)
+        save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
     files = [str(path) for path in (out, plot and plot[1]) if path]
     _tell(work, found, sorted(values), files, as_json)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import click
 
 from ..errors import UsageError
+from ..files.writing import write_whole
 from .failures import reports_failures
 from .options import json_option
 from .screen import print_json, print_table, say
@@ -78,5 +79,5 @@ def _copy(name: str, found: dict[str, Traversable], force: bool) -> Path:
     target = Path(file.name)
     if target.exists() and not force:
         raise UsageError(f"{target} exists; add --force to overwrite it")
-    target.write_bytes(file.read_bytes())
+    write_whole(target, file.read_bytes())
     return target

@@ -113,7 +113,6 @@ def kinematics(
     seconds = {**equations.seconds, "analysis": perf_counter() - start}
     files: list[str] = []
     if motion is not None and out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         motion.save(out)
         files.append(str(out))
     if motion is not None and plot is not None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ModelError, UsageError
+from ..files.writing import refuse_link
 
 if TYPE_CHECKING:
     from ..describe import Model
@@ -257,6 +258,7 @@ def require_folder(option: str, file: Path | None) -> None:
     """
     if file is None:
         return
+    refuse_link(file)
     if file.is_dir():
         raise UsageError(f"{option} {file}: is a folder; name a file in it")
     above = file.absolute().parents

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files.writing import save_figure
 from ..texts import visible
 from .plot import BELOW, BESIDE
 
@@ -59,5 +60,4 @@ def plot_motion(motion: KinematicAnalysis, paths: list[tuple[str, str]], file: P
         plane.grid(alpha=0.3)
         plane.legend(**BELOW)
     figure.suptitle(motion.name)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file)
+    save_figure(figure, file)

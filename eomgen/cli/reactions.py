@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .options import require_folder
@@ -45,12 +46,13 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     multipliers = module.multipliers(times, x)
     names = [f"{joint}.{component}" for joint in module.joint_names for component in COMPONENTS]
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         flat = found.reshape(len(names), -1)
-        if out.suffix == ".npz":
-            np.savez(out, t=times, names=np.array(names), reactions=flat)
-        else:
-            np.savetxt(out, np.vstack([times, flat]).T, delimiter=",", header=",".join(["t", *names]), comments="")
+        with whole_file(out) as file:
+            if out.suffix == ".npz":
+                np.savez(file, t=times, names=np.array(names), reactions=flat)
+            else:
+                table, head = np.vstack([times, flat]).T, ",".join(["t", *names])
+                np.savetxt(file, table, delimiter=",", header=head, comments="", encoding="utf-8")
     if end is not None:
         places = np.abs(found).argmax(axis=-1)
         found = np.take_along_axis(found, places[..., None], axis=-1)[..., 0]

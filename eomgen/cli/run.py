@@ -154,7 +154,6 @@ def sort_settings(
 
 def _write(equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None) -> list[str]:
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         trajectory.save(out)
     if plot is not None:
         from .plot import find_paths, plot_run

@@ -29,7 +29,6 @@ def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Pat
     with stage("integrate"):
         found = module.sensitivities(names, end, work.initial or None)
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         found.save(out)
     rows = dict.fromkeys((*module.x_names, *module.y_names))
     final = {row: {name: finite(found[row, name][-1]) for name in found.names} for row in rows}

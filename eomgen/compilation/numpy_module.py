@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ToolchainError
+from ..runtime.pickling import TEXTS
 from .cache import Cache, cache_directory, compute_key
 
 SOURCE = "_core.py"
@@ -37,15 +37,15 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if module_name in sys.modules and not twins:
-        return sys.modules[module_name]
+    if not twins and (loaded := TEXTS.get(module_name)) is not None:
+        return loaded
     try:
         module = _execute(module_name, _cached(key, name, text), twins)
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
             module = _execute(module_name, _written(Path(private), text), twins)
     if not twins:  # other twins make another module of the same text
-        sys.modules[module_name] = module
+        TEXTS[module_name] = module
     return module
 
 

@@ -10,7 +10,6 @@ from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
 from ..program.loops import LARGE
 from ..program.series import NoSeriesError
-from ..texts import c_literals
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
 from .c_layout import driver_files, work_areas
@@ -127,7 +126,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "series": program.metadata["series"],
         "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
-        "metadata_lines": c_literals(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
+        "metadata_lines": _number_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
 
 
@@ -139,3 +138,9 @@ def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
     closes = any(d.name == "rhs" for d in program.drivers) and program.has_loops and program.projects
     closes = closes and program.sizes.n_v > LARGE
     return next(start for name, start, _ in areas if name == "X") if closes else 0
+
+
+def _number_lines(text: str, width: int = 30) -> list[str]:
+    """A text of ASCII characters as the inside of a C initialiser, some numbers a line."""
+    numbers = text.encode("ascii")
+    return [",".join(map(str, numbers[k : k + width])) for k in range(0, len(numbers), width)]

@@ -109,7 +109,7 @@ def _runtime_files() -> dict[str, str]:
     """errors.py, texts.py, and limits/ to ensembles/ and parts of verification/, as in eomgen itself."""
     root = files("eomgen")
     found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "texts.py")}
-    for folder in ("limits", "numeric", "runtime", "analysis", "ensembles"):
+    for folder in ("limits", "files", "numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")

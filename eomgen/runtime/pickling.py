@@ -13,6 +13,7 @@ from importlib import import_module, machinery, util
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+from weakref import WeakValueDictionary
 
 from ..errors import ToolchainError, UsageError
 from ..numeric.scales import Array
@@ -20,6 +21,9 @@ from .late import LateCore, eager
 
 if TYPE_CHECKING:
     from .module import Module
+
+#: Cores of the numpy target by name, as long as a module uses them: ``sys.modules`` would keep each for ever.
+TEXTS: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()
 
 #: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
 Late = tuple[tuple[str, ...], tuple[str, str] | None]
@@ -35,7 +39,7 @@ def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
     """
     core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
-    if not file or sys.modules.get(name) is not core:
+    if not file or _loaded(name) is not core:
         raise TypeError(
             f"the module of {module.name!r} cannot be pickled: its code is not in a file of its own (a core made by "
             "hand, or the numpy target with native functions); target cython can be pickled"
@@ -70,8 +74,8 @@ def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: 
 
 
 def _find_core(name: str, file: str) -> ModuleType:
-    if name in sys.modules:
-        return sys.modules[name]
+    if (loaded := _loaded(name)) is not None:
+        return loaded
     try:
         return import_module(name)  # of a generated package
     except ModuleNotFoundError:
@@ -87,8 +91,13 @@ def _find_core(name: str, file: str) -> ModuleType:
     loader.exec_module(core)
     if compiled:
         core.offer_lanes(partial(_find_lanes, path))
-    sys.modules[name] = core
+    (sys.modules if compiled else TEXTS)[name] = core
     return core
+
+
+def _loaded(name: str) -> ModuleType | None:
+    """The core of a name if it is loaded."""
+    return TEXTS.get(name) or sys.modules.get(name)
 
 
 def _find_lanes(file: Path) -> int:
