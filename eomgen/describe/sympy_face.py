@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError
@@ -42,6 +42,13 @@ def name_of(value: object) -> Any:
     if isinstance(value, sympy.Symbol):
         return value.name
     return function_name(value) or value
+
+
+def in_order(given: Mapping[Any, Any], known: Sequence[str]) -> list[tuple[Any, Any]]:
+    """Names and values of a mapping in the order of the known names, others last, however it was written."""
+    places = {name: k for k, name in enumerate(known)}
+    named = [(name_of(key), value) for key, value in given.items()]
+    return sorted(named, key=lambda pair: places.get(pair[0], len(places)))
 
 
 def function_name(value: Any) -> str | None:

@@ -71,6 +71,11 @@ class Campaign:
 
     def run(self, cases: int | None, seconds: float | None, tell: Callable[[Campaign], None]) -> None:
         """Run so many cases, or so long."""
+        with tempfile.TemporaryDirectory(prefix="eomgen-fuzz-cache-", ignore_cleanup_errors=True) as cache:
+            self.cache = Path(cache)  # one for all workers: compiling takes half a minute
+            self._run(cases, seconds, tell)
+
+    def _run(self, cases: int | None, seconds: float | None, tell: Callable[[Campaign], None]) -> None:
         self.begun = time.monotonic()
         self.wanted = {name: cases and max(1, round(cases * part)) for name, part in self.parts.items()}
         self.end = self.begun + seconds if seconds else float("inf")
@@ -106,7 +111,7 @@ class Campaign:
                 name, first, count = batch
                 end, skip = first + count, []
                 while first < end or not count:
-                    worker = worker or Process(Path(folder))
+                    worker = worker or Process(Path(folder), self.cache)
                     job = {"name": name, "first": first, "count": end - first, "skip": skip}
                     try:
                         for report in worker.reports(job):
@@ -162,10 +167,10 @@ class Campaign:
 class Process:
     """A worker process."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, cache: Path) -> None:
         self.beat_file = folder / "beat"
         self.beat_file.write_bytes(BEAT.pack(IDLE, 0.0))
-        command = [sys.executable, "-m", "hostile.worker", str(folder), str(self.beat_file)]
+        command = [sys.executable, "-m", "hostile.worker", str(folder), str(cache), str(self.beat_file)]
         self.errors = (folder / "stderr").open("w+b")
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.errors, cwd=Path(__file__).parents[1]

@@ -34,6 +34,7 @@ class Expressions:
 
     name = "expressions"
     programs: frozenset[str] = frozenset()
+    refusals: tuple[type[Exception], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         """Nothing."""

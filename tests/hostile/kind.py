@@ -31,6 +31,8 @@ class Kind(Protocol):
     name: str
     #: Programs that the package may start for such a case, by the last part of their path; none for most kinds.
     programs: frozenset[str]
+    #: Exceptions that refuse an argument by Python's own convention (TypeError and ValueError of calls); none for files.
+    refusals: tuple[type[Exception], ...]
 
     def prepare(self, folder: Path) -> None:
         """Import and compile what the cases need, once in each process, before the guard is armed."""

@@ -44,11 +44,10 @@ class Outcome(NamedTuple):
 class Runner:
     """Runs cases of any kind in this process, in a folder that is emptied when a case left something behind."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, cache: Path) -> None:
         self.home = folder
         self.folder = folder / "case"
         self.folder.mkdir(parents=True, exist_ok=True)
-        cache = folder / "cache"
         os.environ.update(EOMGEN_CACHE_DIR=str(cache), TMPDIR=str(self.folder), HOME=str(self.folder))
         self.guard = Guard(str(self.folder), str(cache))
         self.warned: list[str] = []
@@ -93,7 +92,7 @@ class Runner:
         except EomgenError as error:
             found = Outcome("named error", type(error).__name__)
         except BaseException as error:
-            found = judge(error)
+            found = judge(error, kind.refusals)
         else:
             found = Outcome("fine", word)
         seconds = time.perf_counter() - start
@@ -118,7 +117,7 @@ def _alarm(number: int, frame: FrameType | None) -> None:
     raise Hang
 
 
-def judge(error: BaseException) -> Outcome:
+def judge(error: BaseException, refusals: tuple[type[Exception], ...] = ()) -> Outcome:
     """The outcome of an exception that is no named error."""
     if isinstance(error, KeyboardInterrupt) and not isinstance(error, EomgenError):
         raise error
@@ -135,8 +134,9 @@ def judge(error: BaseException) -> Outcome:
         return Outcome("hang", place, f"hang {place}", text)
     if isinstance(error, MemoryError):
         return Outcome("memory", place, f"memory {place}", text)
-    if not own and isinstance(error, TypeError):
-        return Outcome("refused", name)  # Python's own check of a call's arguments
+    too_large = isinstance(error, OverflowError) and str(error) == "int too large to convert to float"
+    if isinstance(error, refusals) or (refusals and too_large):
+        return Outcome("refused", name)
     last = frames[-1] if frames else None
     inner = f" in {Path(last.filename).name}:{last.name}" if last is not None and last not in own else ""
     return Outcome("traceback", f"{name} {place}", f"{name} {place}{inner}", text)

@@ -52,7 +52,7 @@ def one(name: str, seed: int) -> int:
     """Make one case again and say what comes of it."""
     with tempfile.TemporaryDirectory(prefix="eomgen-fuzz-") as folder:
         kind = find(name)
-        runner = Runner(Path(folder))
+        runner = Runner(Path(folder) / "home", Path(folder) / "cache")
         runner.prepare(kind)
         case = kind.make(generator(name, seed))
         path = keep(case, Path(folder) / "shown")

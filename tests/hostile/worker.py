@@ -57,8 +57,8 @@ class Tally:
 class Worker:
     """Runs jobs until stdin ends."""
 
-    def __init__(self, folder: Path, beat: mmap.mmap, report: Report) -> None:
-        self.runner = Runner(folder)
+    def __init__(self, folder: Path, cache: Path, beat: mmap.mmap, report: Report) -> None:
+        self.runner = Runner(folder, cache)
         self.runner.limit()
         self.beat, self.report = beat, report
 
@@ -117,8 +117,8 @@ def smaller(kind: Kind, case: Any, same: Callable[[Any], bool]) -> Any:
 
 
 def main() -> None:
-    """``python -m hostile.worker FOLDER BEAT``."""
-    folder, beat = Path(sys.argv[1]), Path(sys.argv[2])
+    """``python -m hostile.worker FOLDER CACHE BEAT``."""
+    folder, cache, beat = (Path(word) for word in sys.argv[1:4])
     jobs = sys.stdin
     # what a case prints goes nowhere; reports have a descriptor of their own
     out = os.fdopen(os.dup(1), "w", buffering=1)
@@ -129,7 +129,7 @@ def main() -> None:
         out.write(json.dumps(line) + "\n")
 
     with beat.open("r+b") as file, mmap.mmap(file.fileno(), BEAT.size) as shared:
-        worker = Worker(folder, shared, report)
+        worker = Worker(folder, cache, shared, report)
         for line in jobs:
             job = json.loads(line)
             (worker.minimise if "key" in job else worker.batch)(**job)

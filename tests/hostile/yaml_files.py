@@ -38,6 +38,7 @@ class YamlFiles:
 
     name = "yaml"
     programs: frozenset[str] = frozenset()
+    refusals: tuple[type[Exception], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         self.texts = [path.read_text() for path in sorted((PACKAGE.parent / "examples").glob("*.yaml"))]
@@ -174,8 +175,8 @@ SMALL = {
     "lagrangian": "name: made\nparameters: {m: 1, k: 2}\nlagrangian: {coordinates: [q], expression: m*q_dot**2/2 - k*q**2/2}\ninitial: {q: 1}\n",
     "pendulum": "name: made\ngravity: [0, -9.81, 0]\nbodies: {bob: {mass: 1, com: [0, -0.5, 0]}}\njoints: {hinge: {type: revolute, between: [ground, bob], coordinate: q}}\noutputs: {h: y(bob)}\n",
     "spring": "name: made\nparameters: {k: 3, c: 0.1}\ninputs: {u: 0}\nbodies: {bob: {mass: 2}}\njoints: {slide: {type: prismatic, between: [ground, bob], axis: x, coordinate: q}}\n"
-    "forces: {s: {type: spring, between: [{body: ground, at: [0, 1, 0]}, bob], stiffness: k, length: 0.5}, d: {type: force, joint: slide, value: u - c*q_dot}}\nevents: {e: {expression: q - 1, terminal: true}}\n",
+    "forces: {s: {type: spring, between: [{body: ground, at: [0, 1, 0]}, bob], stiffness: k, length: 0.5}, d: {type: torque, joint: slide, value: u - c*q_dot}}\nevents: {e: {expression: q - 1, terminal: true}}\n",
     "equations": "name: made\nparameters: {m: 1}\nequations: {coordinates: [q], mass_matrix: [[m]], forcing: [-q]}\ninitial: {q: 1}\n",
-    "table": "name: made\nfunctions: {f: {type: table, x: [0, 1, 2], y: [0, 1, 0]}}\nbodies: {bob: {mass: 1}}\njoints: {slide: {type: prismatic, between: [ground, bob], coordinate: q}}\nforces: {d: {type: force, joint: slide, value: f(q)}}\n",
+    "table": "name: made\nfunctions: {f: {type: table, x: [0, 1, 2], y: [0, 1, 0]}}\nbodies: {bob: {mass: 1}}\njoints: {slide: {type: prismatic, between: [ground, bob], coordinate: q}}\nforces: {d: {type: torque, joint: slide, value: f(q)}}\n",
 }  # fmt: skip
 KIND = YamlFiles()
