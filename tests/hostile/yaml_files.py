@@ -20,7 +20,7 @@ from eomgen.describe.yaml_nodes import Document
 from eomgen.errors import ModelError
 
 from .guard import PACKAGE
-from .kind import Wrong, pruned, trimmed
+from .kind import Wrong, trimmed
 from .trees import Schema, change, copied, paths, yaml_text
 from .words import TEXTS
 
