@@ -13,6 +13,8 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
+import sympy
+
 import eomgen
 
 PACKAGE = Path(eomgen.__file__).resolve().parent
@@ -33,11 +35,7 @@ ROOTS = tuple(
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/", "/usr/lib/", "/usr/share/", "/lib/", "/etc/ld.so")
 DEVICES = ("/dev/null", "/dev/urandom", "/dev/tty")
 #: Events that no case may cause.
-FORBIDDEN = (
-    "os.system os.exec os.spawn os.startfile os.fork os.forkpty pty.spawn socket. urllib. http. ftplib. smtplib. "
-    "imaplib. poplib. telnetlib. webbrowser. pickle. ctypes. sys.addaudithook sys.setprofile sys.settrace "
-    "os.setxattr os.chflags os.chroot os.kill os.killpg resource. syslog. sqlite3. fcntl. mmap. gc.get_objects code.__new__"
-).split()
+FORBIDDEN = ["os.system", "os.exec", "os.spawn", "os.startfile", "os.fork", "os.forkpty", "pty.spawn", "socket.", "urllib.", "http.", "ftplib.", "smtplib.", "imaplib.", "poplib.", "telnetlib.", "webbrowser.", "pickle.", "ctypes.", "sys.addaudithook", "sys.setprofile", "sys.settrace", "os.setxattr", "os.chflags", "os.chroot", "os.kill", "os.killpg", "resource.", "syslog.", "sqlite3.", "fcntl.", "mmap.", "gc.get_objects", "code.__new__"]
 #: Events whose first arguments are paths that the case changes.
 CHANGES = {
     "os.remove": 1, "os.rename": 2, "os.mkdir": 1, "os.rmdir": 1, "os.chmod": 1, "os.chown": 1, "os.link": 2,
@@ -49,7 +47,7 @@ LOOKS = ("os.listdir", "os.scandir", "os.walk", "os.chdir", "glob.glob", "os.get
 MAKERS = tuple(
     os.path.join(sysconfig.get_paths()["stdlib"], name)
     for name in ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")
-)
+) + (os.path.join(os.path.dirname(sympy.__file__), "polys", "monomials.py"),)  # a function for each number of symbols
 
 
 class Escape(BaseException):
