@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import sympy
 
-from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.model import Model
+from eomgen.describe.yaml_file import describe_yaml
 from eomgen.errors import EomgenError
 
 from .guard import PACKAGE
@@ -47,6 +47,7 @@ class Calls:
     name = "calls"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = (TypeError, ValueError)
+    unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         self.modules: dict[str, Any] = {}
@@ -77,6 +78,9 @@ class Calls:
         if r.random() < 0.1:
             chosen[r.choice(("x", "out", "foo", "p", "__class__", "t", "rows", "theta"))] = odd(r, "")
         return {"module": module, "on": on, "call": call, "arguments": chosen}
+
+    def build(self, case: Any) -> Any:
+        return case
 
     def run(self, case: Any, folder: Path) -> str:
         module, good = self.modules[case["module"]], self.good[case["module"]]

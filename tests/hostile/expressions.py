@@ -35,6 +35,7 @@ class Expressions:
     name = "expressions"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         """Nothing."""
@@ -44,6 +45,9 @@ class Expressions:
         for _ in range(r.choice((0, 0, 0, 1, 1, 3))):
             text = disturbed(text, r)
         return text
+
+    def build(self, case: Any) -> Any:
+        return case
 
     def run(self, case: Any, folder: Path) -> str:
         graph = Graph()

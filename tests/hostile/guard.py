@@ -13,6 +13,8 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
+import sympy
+
 import eomgen
 
 PACKAGE = Path(eomgen.__file__).resolve().parent
@@ -45,7 +47,7 @@ LOOKS = ("os.listdir", "os.scandir", "os.walk", "os.chdir", "glob.glob", "os.get
 MAKERS = tuple(
     os.path.join(sysconfig.get_paths()["stdlib"], name)
     for name in ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")
-)
+) + (os.path.join(os.path.dirname(sympy.__file__), "polys", "monomials.py"),)  # a function for each number of symbols
 
 
 class Escape(BaseException):

@@ -39,6 +39,7 @@ class YamlFiles:
     name = "yaml"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         self.texts = [path.read_text() for path in sorted((PACKAGE.parent / "examples").glob("*.yaml"))]
@@ -73,6 +74,9 @@ class YamlFiles:
             with contextlib.suppress(KeyError, TypeError, IndexError):
                 change(tree, r, self.trees, self.keys, self.types)
         return {"stage": stage, "text": yaml_text(tree, r)}
+
+    def build(self, case: Any) -> Any:
+        return case
 
     def run(self, case: Any, folder: Path) -> str:
         text, stage = case["text"], case["stage"]
