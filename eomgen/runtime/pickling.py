@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import ToolchainError, UsageError
 from ..files.entry import MANIFEST, read_entry
 from ..files.ownership import read_trusted, require_trusted
-from ..files.source import load_source
+from ..files.source import find_module, load_source
 from ..numeric.scales import Array
 from .late import LateCore, eager
 
@@ -38,7 +38,7 @@ def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
     """
     core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
-    if not file or sys.modules.get(name) is not core:
+    if not file or find_module(name) is not core:
         raise TypeError(
             f"the module of {module.name!r} cannot be pickled: its code is not in a file of its own (a core made by "
             "hand, or the numpy target with native functions); target cython can be pickled"
@@ -73,8 +73,8 @@ def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: 
 
 
 def _find_core(name: str, file: str) -> ModuleType:
-    if name in sys.modules:
-        return sys.modules[name]
+    if (loaded := find_module(name)) is not None:
+        return loaded
     try:
         return import_module(name)  # of a generated package
     except ModuleNotFoundError:
@@ -85,9 +85,7 @@ def _find_core(name: str, file: str) -> ModuleType:
             read_entry(path.parent)
         require_trusted(path)
         if not path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES)):
-            source = load_source(name, file, read_trusted(path))
-            sys.modules[name] = source
-            return source
+            return load_source(name, file, read_trusted(path))
     except (OSError, ValueError) as error:
         what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
         raise ToolchainError(
