@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
 from ..limits.rounding import ROUNDED
+from . import algebra
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
@@ -54,10 +55,11 @@ def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
     longest = 0.0
     for points in bodies:
         places = np.asarray(points, dtype=float).reshape(-1, 3)
-        rounding = ROUNDED * float(np.abs(places).max(initial=0.0))
+        size = float(np.abs(places).max(initial=0.0))
+        places = places / (size or 1.0)  # squares of what is large overflow
         for k, place in enumerate(places):
             apart = float(np.linalg.norm(places[k + 1 :] - place, axis=1).max(initial=0.0))
-            longest = max(longest, apart if apart > rounding else 0.0)
+            longest = max(longest, apart * size if apart > ROUNDED else 0.0)
     return longest
 
 
@@ -83,7 +85,7 @@ def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length
     if heaviest == 0.0:
         return [max((float(np.abs(tensor).max()) for tensor in tensors), default=0.0)] * len(masses)
     sizes = [abs(m) or heaviest for m in masses]
-    square = length**2 or max(abs(float(np.trace(tensor))) / m for m, tensor in zip(sizes, tensors, strict=True))
+    square = length * length or max(abs(float(np.trace(tensor))) / m for m, tensor in zip(sizes, tensors, strict=True))
     return [m * square for m in sizes]
 
 
@@ -108,6 +110,8 @@ def fault_of_inertia(
         that moves in a plane.
     """
     full = np.asarray(tensor, dtype=float).reshape(3, 3)
+    if not np.isfinite(full).all():
+        return "is not finite", "give numbers, and masses and lengths whose products do not overflow"
     computed = COMPUTED * scale
     if plane is not None:
         n = np.asarray(plane, dtype=float)
@@ -115,7 +119,8 @@ def fault_of_inertia(
         if moment < -max(DIGITS * size, computed):
             return f"the moment about the centre of mass is {moment:.6g}", SHIFTED
         return None
-    a, b, c = np.linalg.eigvalsh(full)
+    largest = float(np.abs(full).max()) or 1.0
+    a, b, c = algebra.eigvalsh(full / largest) * largest
     size = max(abs(a), abs(c))
     if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a:.6g}", NEGATIVE
