@@ -20,6 +20,7 @@ from ..kinematics.loads import drive_inertias
 from .energies import form_energies, generalized_forces
 from .equations import TreeEquations
 
+
 def derive(kinematics: Kinematics) -> TreeEquations:
     """Canonical equations of the spanning tree, or of a bare Lagrangian."""
     graph, v = kinematics.graph, list(kinematics.v)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
@@ -372,7 +373,7 @@ def find_state(
             if before is not None:  # Broyden's update: the slope that explains the last step
                 move, change = before
                 secant += np.outer(gap - change - secant @ move, move) / (move @ move)
-            move = np.linalg.lstsq(secant, -gap, rcond=None)[0]
+            move = algebra.lstsq(secant, -gap, rcond=None)
             if not np.isfinite(move).all() or not move.any():
                 break
             before, u = (move, gap), found.copy()
