@@ -176,7 +176,7 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
 
     if target not in TARGETS:
         raise UsageError(f"no target {target!r}; there are: {', '.join(TARGETS)}")
-    kinematics, mobility, tree = equations.kinematics, equations.mobility, equations.tree
+    kinematics, mobility, tree = equations.fresh()
     kinematics.mechanism.require_values()
     idle = require_inertia(kinematics, mobility, tree)
     strange = bool(idle or kinematics.mechanism.negative)
@@ -257,8 +257,7 @@ def _load(
             from .emit import emit_c
             from .emit.sources import keep_bytecode
 
-            if (folder := shortcut.cache.open_templates()) is not None:
-                keep_bytecode(folder)
+            keep_bytecode(shortcut.cache.templates)
             sources = emit_c(program)
     with _timed(seconds, "compile"):
         if artifact is None:

@@ -20,7 +20,7 @@ from ..runtime.change_points import singular_values
 from ..runtime.events import Events, warn_of_unknown
 from ..runtime.failure import place
 from ..runtime.input_slopes import Slopes
-from ..runtime.integrate import Solution, choose_solver, integrate
+from ..runtime.integrate import Solution, choose_solver, integrate, require_end
 from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
@@ -98,6 +98,7 @@ def differentiate_run(
         failure = run.rhs.failure or run.tangent.failure
         cause = None if failure is None else bound.kernels.fail.exception("rhs", *failure)
         raise SimulationError(f"{title} stopped: {solution.message} {cause or ''}".strip()) from cause
+    require_end(solution, stop)
     warn_of_unknown([event.name for event in salts.watched if not event.known])
     if solution.status == 1:
         _note_end(salts, solution)

@@ -63,7 +63,7 @@ class Namespace:
         fault = fault_of_name(name, symbol=True)
         if fault or not isinstance(name, str):
             self.faults.add(path, *(fault or ("", "")))
-            self._refuse(kind, name, path)
+            self._refuse(_RATES_OF.get(kind, (kind,))[0], name, path)
             return False
         levels = _RATES_OF.get(kind, (kind,))
         names = [name + suffix for suffix in RATES[: len(levels)]]

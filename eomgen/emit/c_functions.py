@@ -144,7 +144,7 @@ def _native(program: Program, group: Sequence[tuple[Function, list[Orders]]]) ->
         "name": program.name,
         "functions": ", ".join(f.name for f, _ in group),
         "first": first,
-        "file": re.sub(r"[^\w.\-]", "_", code.file),
+        "file": re.sub(r"[^\w.\-]", "_", code.file, flags=re.ASCII),
         "source": code.text if code.text.endswith("\n") else code.text + "\n",
         "renamed": [(name, f"{program.name}_native_{first}_{name}") for name in sorted(renamed)],
         "wrappers": list(wrappers.values()),

@@ -16,6 +16,7 @@ STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrat
 
 # -- events ----------------------------------------------------------------------------------------------------------
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time
+TOUCHED = 1e-13  #: part of its largest size within which a value that comes to zero and back was there: 500 roundings
 TOUCHING = 1e-9  #: part of its size at which the value of an event counts as zero, and its rate as none
 INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end
 AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken: the root of its rounding

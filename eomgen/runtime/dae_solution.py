@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
-from .integrate import Solution
+from .integrate import Solution, require_end
 from .names import require
 from .recording import record
 from .resets import Resets
@@ -60,7 +60,9 @@ def integrate_dae(
     run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
     warn_of_unknown([event.name for event in run.listed if not event.known])
-    return record(bound, forcing, run.solution(), "IDA", dict(tolerances), watched.names)
+    solution = run.solution()
+    require_end(solution, end)
+    return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)
 
 
 class _Run:

@@ -69,7 +69,7 @@ class Kernels:
         if name not in self.core.names:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            if layout.rank == 0 and name == "project":
+            if layout.n_c == 0 and name == "project":
                 return Identity(layout.n_x, [i for i, _ in layout.balls])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)

@@ -83,20 +83,6 @@ class Pace:
             raise Crawling(t, self.x, step)
 
 
-def watch_steps(solver: Any, pace: Pace, trail: list[tuple[float, Array]]) -> Any:
-    """A subclass of a SciPy solver that shows its steps to `pace` and leaves them in `trail`."""
-
-    def step(self: Any) -> Any:
-        message = solver.step(self)
-        if self.status != "failed":
-            trail.append((self.t, self.y))
-        if self.status == "running":
-            pace.look(self.t, self.y)
-        return message
-
-    return type(solver.__name__, (solver,), {"step": step, "__module__": solver.__module__})
-
-
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:
     """Which rate is steepest in which state where a run crawls, in words; empty if none is steep for the steps.
 

@@ -25,6 +25,7 @@ typedef uint64_t numeral __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 #define EOMGEN_BEGIN flag failed = { 0 };
 #define EOMGEN_REJECT(lost) failed |= (lost);
 #define EOMGEN_RETURN return failed;
+#define EOMGEN_REFUSE return ~(flag){ 0 };
 
 static inline real same(double a)
 {
@@ -57,6 +58,7 @@ typedef int flag;
 #define EOMGEN_BEGIN
 #define EOMGEN_REJECT(lost) if (lost) { return 2; }
 #define EOMGEN_RETURN return 0;
+#define EOMGEN_REFUSE return -1; /* EOMGEN_BAD_ARGUMENT */
 #define same(a) (a)
 #define choose(condition, a, b) ((condition) ? (a) : (b))
 #define abs_of(a) fabs(a)

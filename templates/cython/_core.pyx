@@ -38,7 +38,7 @@ cdef extern from "eomgen.h" nogil:
     ctypedef int (*eomgen_lane_function)(const double *, const double *, const double *, const double *, double *,
                                          double *, int *) noexcept nogil
     ctypedef struct eomgen_series:
-        int n_work
+        int n_work, most
     ctypedef struct eomgen_lanes:
         int width
         int (*usable)() noexcept nogil

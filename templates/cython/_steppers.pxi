@@ -43,7 +43,7 @@ cdef extern from "eomgen_steppers.h" nogil:
         eomgen_function jacobian
         long differentiations, factorizations
         const eomgen_series *series
-        int stopped
+        int order, side, expanded, stopped
     ctypedef struct eomgen_method:
         const char *name
         int rows_K, rows_F, error_order, squares, expands

@@ -43,5 +43,5 @@ static double weakness(int rows, const double *restrict J, const double *restric
         along += z[i] * z[i];
         *largest = fmax(*largest, size);
     }
-    return along > 0.0 ? across / (along * *largest) : 1.0;
+    return along * *largest > 0.0 ? across / (along * *largest) : 1.0;
 }
