@@ -16,7 +16,6 @@ import numpy as np
 
 import eomgen as eg
 from eomgen.compilation.cython_layer import HEADERS
-from eomgen.emit import emit_c
 from eomgen.layer import read_header, read_layer
 from eomgen.pipeline import build, derive
 from eomgen.program import KERNELS, Program
@@ -36,10 +35,25 @@ COMPILERS = {"gcc": C, "clang": C, "g++": CXX, "clang++": CXX}
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 #: What objects may call besides one another: mathematics, and what compilers make of copied structures.
 MATHEMATICS = frozenset(
-    ("sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt pow fabs floor ceil fmod fmin fmax cbrt hypot nextafter"
-     " log1p expm1 asinh acosh atanh sincos fma ldexp frexp log10 exp2 log2 round trunc copysign isnan isfinite")
-    .split()
-)  # fmt: skip
+    {
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "atan2",
+        "sinh",
+        "cosh",
+        "tanh",
+        "sincos",
+        "exp",
+        "log",
+        "sqrt",
+        "pow",
+    }
+    | {"fabs", "floor", "ceil", "fmod", "fmin", "fmax", "nextafter", "fma", "copysign", "trunc", "round"}
+)
 COPIES = frozenset({"memcpy", "memset", "memmove", "memcmp", "_GLOBAL_OFFSET_TABLE_"})
 
 
@@ -56,7 +70,7 @@ def installed(*names: str) -> list[str]:
 
 
 def program_of(name: str, method: str, kernels: str = "all") -> Program:
-    """An example by a method: ``all`` functions as target c has them, or those of target cython, ``now`` or ``late``."""
+    """An example by a method: ``all`` functions, as target c has them, or target cython's: ``now`` or ``late``."""
     equations = derive(eg.load(EXAMPLES / name), method)
     if kernels == "all":
         return build(equations, "c")
@@ -147,13 +161,14 @@ def drive(folder: Path, binary: str, program: Program, *before: str) -> tuple[di
     (folder / "numbers").write_bytes(numbers_of(program))
     done = run([*before, binary, "numbers"], folder)
     found = REPORT.search(done.stdout)
-    counts = dict(zip(("calls", "lanes", "widths", "kernels", "faults"), map(int, found.groups()), strict=True)) if found else {}
-    fault = "" if done.returncode == 0 and found else f"exit {done.returncode}: {done.stdout[:1500]}{done.stderr[:3000]}"
-    return counts, fault
+    words = ("calls", "lanes", "widths", "kernels", "faults")
+    counts = dict(zip(words, map(int, found.groups()), strict=True)) if found else {}
+    said = f"exit {done.returncode}: {done.stdout[:1500]}{done.stderr[:3000]}"
+    return counts, "" if done.returncode == 0 and found else said
 
 
-def state_of(objects: Sequence[str], folder: Path) -> list[str]:
-    """Writable numbers that objects keep, and functions they call that are neither theirs nor mathematics."""
+def state_of(objects: Sequence[str], folder: Path, *allowed: str) -> list[str]:
+    """Writable numbers that objects keep, and functions they call that are not theirs, mathematics or `allowed`."""
     found = []
     for section, size in re.findall(r"^(\.\S+)\s+(\d+)\s", run(["size", "-A", *objects], folder).stdout, re.M):
         constant = section.startswith((".data.rel.ro", ".data..ro"))  # written by the loader alone
@@ -165,6 +180,4 @@ def state_of(objects: Sequence[str], folder: Path) -> list[str]:
     common = {word[-1] for word in words if len(word) == 3 and word[1] in "CGgSs"}
     called = {word[-1] for word in words if len(word) == 2 and word[0] in "UwvW"} - own
     found += [f"writable: {name}" for name in sorted(common)]
-    return found + [f"calls {name}" for name in sorted(called - MATHEMATICS - COPIES)]
-
-
+    return found + [f"calls {name}" for name in sorted(called - MATHEMATICS - COPIES - {*allowed})]

@@ -148,7 +148,7 @@ static void try_series(const double *x)
         n = strcmp(model->kernels[k].name, "rhs") == 0 ? model->kernels[k].n_in : n;
     }
     double *const w = (double *)calloc((size_t)series->n_work + 1, sizeof(double));
-    for (int order = 1; order <= series->most; order++) {
+    for (int order = 0; order <= series->most; order++) {
         double *const out = room((size_t)((order + 1) * n), 1);
         (void)series->expand(times[0], x, u, c, order, out, w);
         free(out);

@@ -1,8 +1,8 @@
 """Generated C of every example by every method: warnings, sanitizers, valgrind, symbols; a table at the end.
 
-``python -m hostile.run_c_code`` from the folder ``tests`` runs everything (two hours on two cores) and exits 1 on a fault.
-``--only warnings sanitizers valgrind symbols`` and ``--examples pendulum.yaml`` choose; ``--record FILE`` keeps a line of
-JSON for each result and leaves out, in a later run, what is there already.
+``python -m hostile.run_c_code`` from the folder ``tests`` runs everything, for hours, and exits 1 on a fault.
+``--only warnings sanitizers valgrind symbols`` and ``--examples pendulum.yaml`` choose; ``--record FILE`` keeps a line
+of JSON for each result and leaves out, in a later run, what is there already.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ def sanitizers(name: str, method: str, folder: Path, layers: Layers) -> Iterator
 def valgrind(name: str, method: str, folder: Path, layers: Layers) -> Iterator[Row]:
     if method == MAIN and c_code.find("valgrind"):
         before = ("valgrind", "-q", "--error-exitcode=9", "--leak-check=full", "--undef-value-errors=yes")
-        yield {"what": "valgrind", **driven(name, method, folder, layers, "gcc", ("-O1", "-g", "-ffp-contract=off"), *before)}
+        flags = ("-O1", "-g", "-ffp-contract=off")
+        yield {"what": "valgrind", **driven(name, method, folder, layers, "gcc", flags, *before)}
 
 
 def symbols(name: str, method: str, folder: Path) -> Iterator[Row]:
@@ -99,7 +100,7 @@ def table(rows: list[Row]) -> str:
     lines = ["| check | runs | files or calls | with faults |", "|---|---|---|---|"]
     for what in sorted({row["what"] for row in rows}):
         own = [row for row in rows if row["what"] == what]
-        amount = sum(row.get("files", 0) + row.get("objects", 0) + row.get("calls", 0) + row.get("lanes", 0) for row in own)
+        amount = sum(row.get(key, 0) for row in own for key in ("files", "objects", "calls", "lanes"))
         lines.append(f"| {what} | {len(own)} | {amount} | {sum(bool(row['fault']) for row in own)} |")
     return "\n".join(lines)
 
