@@ -17,6 +17,7 @@ from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .kinematics.state import acceleration_name
 from .records import dataclass
+from .texts import html_text
 
 if TYPE_CHECKING:
     from .program.choice import Choice
@@ -220,9 +221,7 @@ class Equations:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
+        return f"<pre>{html_text(str(self))}</pre>"
 
     def _repr_latex_(self) -> str | None:
         from .graph.sympy_raise import inlined_size

@@ -29,9 +29,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from .texts import visible
+
 
 class EomgenError(Exception):
-    """Base of every error eomgen raises on purpose."""
+    """Base of every error eomgen raises on purpose; what does not print in a message is shown as its number."""
+
+    def __str__(self) -> str:
+        return visible(super().__str__())
 
 
 class Problem(NamedTuple):
@@ -46,7 +51,7 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}: " if self.file else ""
         tail = f"; {self.remedy}" if self.remedy else ""
-        return f"{place}{self.path}: {self.message}{tail}"
+        return visible(f"{place}{self.path}: {self.message}{tail}", lines=False)
 
 
 class ModelError(EomgenError):

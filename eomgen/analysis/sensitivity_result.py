@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.events import Named
 from ..runtime.names import unknown
@@ -95,11 +96,14 @@ class Sensitivities:
         target = table_path(path, "sensitivities are")
         if target.suffix == ".npz":
             x_names, y_names = self.trajectory.x_names, self.trajectory.metadata["y_names"]
-            np.savez(target, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)
+            with whole_file(target) as file:
+                np.savez(file, t=self.t, names=self.names, x_names=x_names, y_names=y_names, dx=self.dx, dy=self.dy)
             return target
         columns = {f"d({row})/d({name})": self[row, name] for row in self._rows for name in self.names}
         table = np.column_stack([self.t, *columns.values()])
-        np.savetxt(target, table, delimiter=",", header=",".join(["t", *columns]), comments="", fmt="%.17g")
+        head = ",".join(["t", *columns])
+        with whole_file(target) as file:
+            np.savetxt(file, table, delimiter=",", header=head, comments="", fmt="%.17g", encoding="utf-8")
         return target
 
     def __repr__(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.storage import table_path
@@ -152,14 +153,16 @@ class Workspace:
         target = table_path(path, "a workspace is")
         if target.suffix == ".npz":
             arrays: dict[str, Any] = {f"[{name}]": np.asarray(self[name]) for name in self.names}
-            np.savez_compressed(target, over=list(self.over), of=self.of, jacobian=self.jacobian, **arrays)
+            with whole_file(target) as stream:
+                np.savez_compressed(stream, over=list(self.over), of=self.of, jacobian=self.jacobian, **arrays)
             return target
         heads = [f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.names]
         columns = [self[name].ravel() for name in self.names]
-        with target.open("w", encoding="utf-8") as file:
-            file.write(",".join(heads) + "\n")
+        with whole_file(target) as file:
+            file.write((",".join(heads) + "\n").encode())
             for row in zip(*columns, strict=True):
-                file.write(",".join(f"{x:.17g}" if isinstance(x, float) else str(x) for x in row) + "\n")
+                line = ",".join(f"{x:.17g}" if isinstance(x, float) else str(x) for x in row)
+                file.write(f"{line}\n".encode())
         return target
 
     def plot(self, by: str = "manipulability", ax: Any = None, figure: Any = None) -> Any:

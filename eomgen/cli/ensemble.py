@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import UsageError
+from ..files.writing import save_figure, write_whole
 from ..runtime.names import require
 from .analysis import Prepared, analysis_options
 from .options import require_folder
-from .screen import finite, print_heading, print_json, print_table, stage
+from .screen import finite, print_heading, print_json, print_table, say, stage
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -79,10 +80,12 @@ def ensemble(
             rtol=rtol, atol=atol,
         )  # fmt: skip
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        found.to_pandas().to_csv(out, index=False) if out.suffix == ".csv" else found.save(out)
+        if out.suffix == ".csv":
+            write_whole(out, found.to_pandas().to_csv(index=False))
+        else:
+            found.save(out)
     if plot is not None:
-        found.plot(plot[0]).figure.savefig(plot[1], dpi=150)
+        save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
     files = [str(path) for path in (out, plot and plot[1]) if path]
     _tell(work, found, sorted(values), files, as_json)
 
@@ -101,11 +104,11 @@ def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], 
     lines = [[name, *(f"{x:.6g}" for x in row.values())] for name, row in table.items()]
     print_table(["at the end", "mean", "deviation", "least", "greatest"], lines, right=range(1, 5))
     for failure in failures[:SHOWN]:
-        click.echo(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
+        say(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
     if len(failures) > SHOWN:
-        click.echo(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+        say(f"... and {len(failures) - SHOWN} more of {found.count} failed")
     for file in files:
-        click.echo(f"wrote {file}")
+        say(f"wrote {file}")
 
 
 def _even(end: float, count: int) -> list[float]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ModelError, UsageError
+from ..files.writing import refuse_link
 
 if TYPE_CHECKING:
     from ..describe import Model
@@ -228,8 +229,10 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     if allow_native:
         options["allow_native"] = True
     model = load(path, **options)
+    from .screen import say
+
     for note in model.notes:
-        click.echo(f"note: {note}", err=True)
+        say(f"note: {note}", err=True)
     return model
 
 
@@ -255,6 +258,7 @@ def require_folder(option: str, file: Path | None) -> None:
     """
     if file is None:
         return
+    refuse_link(file)
     if file.is_dir():
         raise UsageError(f"{option} {file}: is a folder; name a file in it")
     above = file.absolute().parents

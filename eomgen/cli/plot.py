@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import MissingDependencyError, UsageError
+from ..files.writing import save_figure
 
 if TYPE_CHECKING:
     from ..describe.mechanism import Mechanism
@@ -90,5 +91,4 @@ def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, f
         plane.grid(alpha=0.3)
         plane.legend(**BELOW)
     figure.suptitle(title)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file)
+    save_figure(figure, file)

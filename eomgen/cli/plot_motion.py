@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files.writing import save_figure
+from ..texts import visible
 from .plot import BELOW, BESIDE
 
 if TYPE_CHECKING:
@@ -47,8 +49,8 @@ def plot_motion(motion: KinematicAnalysis, paths: list[tuple[str, str]], file: P
         axes.grid(alpha=0.3)
         axes.legend(**BESIDE)
     if axes is not None:
-        unit = motion.units.get(over, "rad")
-        axes.set_xlabel(f"{over} ({unit})")
+        unit = visible(motion.units.get(over, "rad"), lines=False)
+        axes.set_xlabel(f"{over} ({unit})", parse_math=False)
     if paths:
         plane = figure.add_subplot(grid[:, 1])
         for first, second in paths:
@@ -58,5 +60,4 @@ def plot_motion(motion: KinematicAnalysis, paths: list[tuple[str, str]], file: P
         plane.grid(alpha=0.3)
         plane.legend(**BELOW)
     figure.suptitle(motion.name)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file)
+    save_figure(figure, file)

@@ -9,10 +9,11 @@ import click
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .options import require_folder
-from .screen import print_heading, print_json, print_table, stage
+from .screen import print_heading, print_json, print_table, say, stage
 
 COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
@@ -45,12 +46,13 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     multipliers = module.multipliers(times, x)
     names = [f"{joint}.{component}" for joint in module.joint_names for component in COMPONENTS]
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         flat = found.reshape(len(names), -1)
-        if out.suffix == ".npz":
-            np.savez(out, t=times, names=np.array(names), reactions=flat)
-        else:
-            np.savetxt(out, np.vstack([times, flat]).T, delimiter=",", header=",".join(["t", *names]), comments="")
+        with whole_file(out) as file:
+            if out.suffix == ".npz":
+                np.savez(file, t=times, names=np.array(names), reactions=flat)
+            else:
+                table, head = np.vstack([times, flat]).T, ",".join(["t", *names])
+                np.savetxt(file, table, delimiter=",", header=head, comments="", encoding="utf-8")
     if end is not None:
         places = np.abs(found).argmax(axis=-1)
         found = np.take_along_axis(found, places[..., None], axis=-1)[..., 0]
@@ -73,6 +75,6 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     ]
     print_table(["joint", *COMPONENTS], lines, right=range(1, 7))
     if marks.any():
-        click.echo("* not determined by rigid bodies: the constraints are redundant")
+        say("* not determined by rigid bodies: the constraints are redundant")
     if out is not None:
-        click.echo(f"wrote {out}")
+        say(f"wrote {out}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import save_figure
 from .options import parse_settings
 from .screen import finite
 
@@ -51,15 +52,13 @@ def write_workspace(space: Workspace, out: Path | None, plot: Path | None) -> li
     """Write the table and the picture asked for; returns the files."""
     files = []
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
         files.append(str(space.save(out)))
     if plot is not None:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(11.0, 4.8), layout="constrained", dpi=120)
         space.plot(figure=figure)
-        plot.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(plot)
+        save_figure(figure, plot)
         files.append(str(plot))
     return files
 

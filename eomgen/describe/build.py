@@ -12,7 +12,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.operations import FOLD
 from ..graph.substitute import symbols_of
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
@@ -35,7 +35,7 @@ from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .reading import Reader
 from .scope import Namespace
-from .sympy_face import name_of
+from .sympy_face import in_order, name_of
 
 
 def build(description: Description) -> Mechanism:
@@ -247,10 +247,9 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
     if not isinstance(given, Mapping):
         reader.wrong(section, given, "table")
         return {}
-    known = dict.fromkeys(reader.names.of(*kinds))
+    known = list(dict.fromkeys(reader.names.of(*kinds)))
     result: dict[str, Expr] = {}
-    for key, value in given.items():
-        name = name_of(key)
+    for name, value in in_order(given, known):
         path = f"{section}.{name}"
         if name in known:
             result[name] = reader.expression(path, value)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from html import escape
 from typing import Any
 
+from ..texts import html_text
 from .description import Description, Entry, items, label_of, text_of
 
 
@@ -39,20 +39,20 @@ def _summary(entry: Entry) -> str:
 def model_html(description: Description) -> str:
     """The model as an HTML table, one row an entry."""
     name = str(description.values.get("name", ""))
-    rows = [f"<tr><th colspan='3' style='text-align:left'>Model {escape(name)}</th></tr>"]
+    rows = [f"<tr><th colspan='3' style='text-align:left'>Model {html_text(name)}</th></tr>"]
     lagrangian = description.values.get("lagrangian")
     if isinstance(lagrangian, Mapping):
         text = text_of(lagrangian.get("expression"))
-        rows.append(f"<tr><td>Lagrangian</td><td></td><td>{escape(text)}</td></tr>")
+        rows.append(f"<tr><td>Lagrangian</td><td></td><td>{html_text(text)}</td></tr>")
     equations = description.values.get("equations")
     if isinstance(equations, Mapping):
         shown = ", ".join(text_of(q) for q in items(equations.get("coordinates")) or ())
-        rows.append(f"<tr><td>equations</td><td></td><td>of {escape(shown)}</td></tr>")
+        rows.append(f"<tr><td>equations</td><td></td><td>of {html_text(shown)}</td></tr>")
     for section, entries in description.sections.items():
         for k, entry in enumerate(entries):
             first = section if k == 0 else ""
             rows.append(
-                f"<tr><td>{first}</td><td>{escape(str(entry.name))}</td>"
-                f"<td style='text-align:left'>{escape(_summary(entry))}</td></tr>"
+                f"<tr><td>{first}</td><td>{html_text(str(entry.name))}</td>"
+                f"<td style='text-align:left'>{html_text(_summary(entry))}</td></tr>"
             )
     return f"<table>{''.join(rows)}</table>"

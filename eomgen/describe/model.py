@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
-from ..graph.texts import shown
+from ..graph.shown import shown
 from ..joints import JOINTS
 from . import FORCE_FIELDS
 from .build import build
@@ -359,9 +359,9 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the model as a model file; one that is there already stays as it is where that fails."""
-        text = self.to_yaml()
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
+        from ..files.writing import write_whole
+
+        write_whole(path, self.to_yaml())
 
     # -- display --------------------------------------------------------------------------------------------------
     def __getattr__(self, name: str) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,9 +18,10 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.inertia import word_of_check
+from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
@@ -120,11 +122,29 @@ class Reader:
         return float(result)
 
     def text(self, path: str, value: Any) -> str:
-        """A text."""
+        """A text, pairs of surrogates as the characters that they mean."""
         if not isinstance(value, str):
             self.wrong(path, value, "text")
             return ""
-        return value
+        half = lone_surrogate(value)
+        if half:
+            self.faults.add(path, f"holds {half}, half of a pair and no character", WHOLE)
+            return ""
+        return join_surrogates(value)
+
+    def file(self, path: str, value: Any) -> str | None:
+        """The name of a file; None where no file can have it."""
+        if not isinstance(value, str | os.PathLike):
+            self.wrong(path, value, "file")
+            return None
+        name = str(os.fspath(value))
+        try:
+            usable = b"\0" not in os.fsencode(name)
+        except UnicodeEncodeError:
+            usable = False
+        if not usable:
+            self.faults.add(path, f"{name!r} holds a character that no file name can", "rename the file")
+        return name if usable else None
 
     def flag(self, path: str, value: Any) -> bool:
         """True or false; True when it is neither."""
@@ -166,7 +186,7 @@ class Reader:
             for key in value:
                 if key not in INERTIA:
                     self.faults.add(f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"))
-            given = {k: self.expression(f"{path}.{k}", v) for k, v in value.items() if k in INERTIA}
+            given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
             xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         parts = items(value)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError
-from ..graph.texts import quoted
+from ..graph.shown import quoted
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph
@@ -52,6 +52,13 @@ def sympy_name(value: object) -> str | None:
     if isinstance(value, sys.modules["sympy"].Symbol):
         return str(value.name)
     return function_name(value)
+
+
+def in_order(given: Mapping[Any, Any], known: Sequence[str]) -> list[tuple[Any, Any]]:
+    """Names and values of a mapping in the order of the known names, others last, however it was written."""
+    places = {name: k for k, name in enumerate(known)}
+    named = [(name_of(key), value) for key, value in given.items()]
+    return sorted(named, key=lambda pair: places.get(pair[0], len(places)))
 
 
 def function_name(value: Any) -> str | None:

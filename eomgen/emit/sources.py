@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import texts
 from ..program import Program
 
 if TYPE_CHECKING:
@@ -46,9 +47,14 @@ def environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    made.filters["comment"] = lambda text: str(text).replace("*/", "* /")
-    made.filters["docstring"] = lambda text: str(text).replace("\\", "\\\\").replace('"', '\\"')
-    made.filters["toml"] = lambda text: json.dumps(str(text), ensure_ascii=False)
+    made.filters |= {
+        "comment": texts.comment_text,
+        "comment_lines": texts.comment_lines,
+        "docstring": texts.docstring_text,
+        "toml": texts.toml_text,
+        "markdown": texts.markdown_text,
+        "code": texts.markdown_code,
+    }
     return made
 
 

@@ -6,12 +6,13 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
+from ..files.writing import refuse_link
 
 MANIFEST = "model.json"  #: lists the files of the package under "files"
 
@@ -35,27 +36,44 @@ def write_package(sources: Mapping[str, str], folder: Path) -> Path:
     Raises
     ------
     UsageError
-        The folder holds something else, or a file in the way that eomgen did not write.
+        The folder holds something else, or a file in the way that eomgen did not write; the folder, or one in it that
+        files go to, is a symbolic link.
     """
+    _refuse_links(folder, sources)
     earlier = _earlier_files(folder)
     for name in sources:
-        if earlier is not None and name not in earlier and (folder / name).exists():
+        if earlier is not None and name not in earlier and os.path.lexists(folder / name):
             raise UsageError(f"{folder / name} is in the way, not from eomgen; move it or choose another --out")
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as private:
         stage = Path(private) / folder.name
-        for name, text in {**sources, MANIFEST: _with_files(sources)}.items():
-            (stage / name).parent.mkdir(parents=True, exist_ok=True)
-            (stage / name).write_text(text, encoding="utf-8")
+        try:
+            for name, text in {**sources, MANIFEST: _with_files(sources)}.items():
+                (stage / name).parent.mkdir(parents=True, exist_ok=True)
+                (stage / name).write_text(text, encoding="utf-8")
+        except OSError as error:  # most often a full disk; nothing is in its place yet
+            raise OSError(error.errno, error.strerror, str(folder)) from error
         if not folder.exists():
             os.rename(stage, folder)
             return folder
         for name in sorted(sources, key=lambda name: name == MANIFEST):  # the list of files last
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            _refuse_links(folder, (name,))
             os.replace(stage / name, folder / name)
     for name in sorted((earlier or set()) - set(sources)):
         _remove(folder, name)
     return folder
+
+
+def _refuse_links(folder: Path, names: Iterable[str]) -> None:
+    """Refuse links that lead elsewhere: the folder itself, and those in it that files go to.
+
+    A link in the place of a file needs no refusal: the file replaces it.
+    """
+    refuse_link(folder)
+    inner = {parent for name in names for parent in Path(name).parents if parent.name}
+    for path in sorted(inner):
+        refuse_link(folder / path)
 
 
 def _earlier_files(folder: Path) -> set[str] | None:
@@ -84,6 +102,8 @@ def _remove(folder: Path, name: str) -> None:
     path = folder / name
     if Path(name).is_absolute() or ".." in Path(name).parts:
         return  # not a name that eomgen wrote
+    if any(parent.is_symlink() for parent in path.parents if parent.is_relative_to(folder)):
+        return  # the file lies elsewhere
     with suppress(FileNotFoundError):
         path.unlink()
     for parent in path.parents:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from .block import EVENT, MEANING, Plan, find_events
@@ -202,7 +203,7 @@ class Ensemble:
             if getattr(self, name) is not None:
                 arrays[name] = getattr(self, name)
         runs = {name: getattr(self, name) for name in ("t", "t_end", "status", "steps", "rejected", "evaluations")}
-        with target.open("wb") as file:
+        with whole_file(target) as file:
             np.savez_compressed(file, names=np.array(self.names), **runs, **arrays)
         return target
 

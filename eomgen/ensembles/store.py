@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -11,6 +10,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import write_whole
 
 FORMAT = "eomgen ensemble 1"
 
@@ -41,7 +41,7 @@ class Store:
         if self.folder.is_dir() and any(self.folder.iterdir()):
             raise UsageError(f"store {self.folder} is not empty and holds no ensemble; name another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
-        _write(manifest, json.dumps(wanted, indent=1).encode())
+        write_whole(manifest, json.dumps(wanted, indent=1).encode())
 
     def _compare(self, manifest: Path, wanted: dict[str, Any]) -> None:
         try:
@@ -64,7 +64,7 @@ class Store:
 
         buffer = io.BytesIO()
         np.savez(buffer, **arrays, words=np.array(json.dumps({str(k): text for k, text in words.items()})))
-        _write(self._path(index), buffer.getvalue())
+        write_whole(self._path(index), buffer.getvalue())
 
     def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:
         """The arrays of a block, or None if it was not finished."""
@@ -85,9 +85,3 @@ def stored_length(folder: str | Path) -> int | None:
         return int(json.loads((Path(folder) / "manifest.json").read_text(encoding="utf-8"))["block"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _write(path: Path, data: bytes) -> None:
-    attempt = path.with_name(f".{path.name}.{os.getpid()}")
-    attempt.write_bytes(data)
-    os.replace(attempt, path)

@@ -43,7 +43,7 @@ class Graph(Nodes):
         self.one = self.constant(1.0)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Graph:
-        """A graph of the same nodes by the same ids, which grows by itself; functions, which never change, are shared."""
+        """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
         twin = memo[id(self)] = Graph.__new__(Graph)
         twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
         twin.calls, twin.functions = dict(self.calls), dict(self.functions)

@@ -347,7 +347,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
     ranks = tuple(rank(J).rank for J in jacobians)
     r = max(ranks)
     if functions.m and not r:
-        refuse_idle_rows(kinematics)
+        refuse_idle_rows(kinematics, functions.values)
     n_dof = n - r
     if len(wanted) > n_dof:
         has = f"{n_dof} degree{'s' * (n_dof != 1)} of freedom"

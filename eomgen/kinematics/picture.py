@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import MissingDependencyError, UsageError
+from ..files.writing import save_figure
 
 if TYPE_CHECKING:
     from .report import MechanismReport
@@ -80,7 +81,7 @@ def draw(report: MechanismReport, file: str | Path | None = None, ax: Any = None
         ax.annotate(body, (x, y), ha="center", va="center", fontsize=font, bbox=box, zorder=4)
     _finish(ax, report, middle, half, places.layers)
     if file is not None:
-        ax.figure.savefig(file)
+        save_figure(ax.figure, file)
     return ax
 
 

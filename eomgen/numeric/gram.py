@@ -20,8 +20,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import NonFiniteError, ProjectionError
-from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV
-from ..limits.rounding import SUMMED, TINY
+from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
+from ..limits.rounding import SUMMED
 from .space import Array
 
 PASSES = 50  #: at most
@@ -30,7 +30,8 @@ PASSES = 50  #: at most
 def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
     """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k).
 
-    Rows that are zero, as where parameters alone decide whether a loop closes, ask for no step: the term is then 1.
+    Rows that are all zero to rounding, as where parameters alone decide whether a loop closes, ask for no step: the
+    term is then 1.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
     """
     G = J @ J.T
     size = G.diagonal().max(initial=0.0)
-    G.flat[:: len(G) + 1] += relative * size if size > TINY else 1.0
+    G.flat[:: len(G) + 1] += relative * size if size > UNMOVED * UNMOVED else 1.0
     if not np.isfinite(G).all():
         raise NonFiniteError("the constraint Jacobian is not finite")
     try:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, VANISHED
+from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
@@ -110,10 +110,12 @@ class LoopBlocks:
         """The factor of J J^T + relative max(diag) I, and what was added."""
         G = gram(rows)
         size = largest([row.get(i, self.terms.graph.zero) for i, row in enumerate(G)])
-        size = self.terms.graph.apply("max", size, self.terms.graph.constant(NOTHING))  # rows of zeros ask for no step
+        graph, term = self.terms.graph, size * relative
+        if self.terms.n_dof == self.terms.n_v:  # rows that are zero at the declared parameters ask for no step
+            term = graph.apply("select", graph.apply("lt", graph.constant(UNMOVED * UNMOVED), size), term, graph.one)
         for i, row in enumerate(G):
-            row[i] = row.get(i, self.terms.graph.zero) + size * relative
-        return factorize(G), size * relative
+            row[i] = row.get(i, graph.zero) + term
+        return factorize(G), term
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:

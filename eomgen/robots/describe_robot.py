@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -286,7 +287,8 @@ class _Writer:
 def _cut(law: str, bounds: Range) -> str:
     """A force or control cut to a range."""
     low, high = bounds
-    return f"min(max({law}, {low!r}), {high!r})"
+    law = f"max({law}, {low!r})" if low > -math.inf else law
+    return f"min({law}, {high!r})" if high < math.inf else law
 
 
 def _scaled(law: str, total: str, bounds: Range) -> str:

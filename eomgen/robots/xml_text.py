@@ -13,11 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import MissingDependencyError, ModelError, Problem
-
-SIZE = 20_000_000  #: bytes of a file
-ELEMENTS = 200_000
-DEPTH = 200  #: nesting
-LONGEST = 200_000  #: characters of one attribute
+from ..limits.files import ATTRIBUTES, DEPTH, ELEMENTS, LONGEST, SIZE
 
 
 @dataclass
@@ -113,7 +109,7 @@ def _handler(parser: Any, file: str) -> Any:
             super().__init__()
             self.root: Element | None = None
             self.open: list[Element] = []
-            self.count = 0
+            self.count = self.given = 0
 
         def stop(self, message: str, remedy: str) -> ModelError:
             return ModelError([Problem("file", message, remedy, file, parser.getLineNumber() or 1)])
@@ -125,6 +121,9 @@ def _handler(parser: Any, file: str) -> Any:
             if len(self.open) >= DEPTH:
                 raise self.stop("is nested too deeply", f"at most {DEPTH} levels")
             given = dict(attributes.items())
+            self.given += len(given)
+            if self.given > ATTRIBUTES:
+                raise self.stop("has too many attributes", f"at most {ATTRIBUTES:,}")
             if any(len(value) > LONGEST for value in given.values()):
                 raise self.stop("has an attribute that is too long", f"at most {LONGEST:,} characters")
             element = Element(tag, given, file, parser.getLineNumber() or 1)

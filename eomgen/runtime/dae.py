@@ -138,8 +138,9 @@ class Dae:
         t_eval : times in order, optional
             IDA's own steps by default.
         events : optional
-            As for ``Module.simulate``; IDA's root finding locates them, a reset or an impact starts it anew with
-            consistent values, a terminal event ends the run.
+            As for ``Module.simulate``; IDA's root finding locates them, by changes of sign between its steps (give
+            ``max_step`` where a value comes to zero and back), a reset or an impact starts it anew with consistent
+            values, a terminal event ends the run.
         rtol, atol : float, optional
             Tolerances of coordinates and velocities; multipliers and corrections are not controlled.
         **options

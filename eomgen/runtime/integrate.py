@@ -205,6 +205,8 @@ class _Journey:
                         self.pace.look(self.t, self.x)
             finally:
                 self._count(solver)
+            if stop is None and self.t != self.nodes[k + 1]:
+                return  # the solver ended by itself: require_end tells
             if stop is not None and stop[1]:
                 self.status, self.message = 1, MESSAGES[1]
                 return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from math import isfinite
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +36,10 @@ MOST_STEPS = 10**8
 #: Assemblies in turn, by secant steps, with inputs that depend on the state.
 ROUNDS = 50
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
-OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
+OPTIONS = (
+    *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
+    *("checkpoint", "checkpoint_every", "resume"),
+)
 
 
 def simulate(
@@ -55,6 +59,9 @@ def simulate(
     first_step: float | None = None,
     progress: bool | None = None,
     step: float | None = None,
+    checkpoint: str | FilePath | None = None,
+    checkpoint_every: float = 60.0,
+    resume: bool | None = None,
     **options: Any,
 ) -> Trajectory:
     """Integrate the equations of motion.
@@ -95,6 +102,12 @@ def simulate(
         Size of the steps of RK4 (s), and only of it.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
+    checkpoint : str or Path, optional
+        File that keeps the run: the same call again goes on from there, to the last bit, or returns the finished run.
+    checkpoint_every : float
+        Seconds between two writings of that file.
+    resume : bool, optional
+        True: the file must be there; False: begin anew; by default go on if it is there.
     **options
         Passed on to the solver; unknown ones are an error for SciPy's methods.
 
@@ -116,14 +129,23 @@ def simulate(
     EvaluationError
         The right-hand side cannot be evaluated at the initial state.
     UsageError
-        Unknown names, wrong shapes.
+        Unknown names, wrong shapes; a checkpoint of another run, or a damaged one.
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    kept = None
+    if checkpoint is not None:
+        from .checkpoint import Checkpoint, identify
+
+        kept = Checkpoint(checkpoint, checkpoint_every, resume)
+    elif resume is not None:
+        raise UsageError("resume needs checkpoint=, the file to go on from")
     if method == "kinematic" or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
         if is_driven(module) and not _led_by_inputs(module, inputs, method):
+            if kept is not None:
+                raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
             steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
@@ -171,11 +193,13 @@ def simulate(
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
     stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    if kept is not None:
+        kept.open(identify(bound, forcing, watched, nodes, x0, method, stored, dense_output, options))
     pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched, kept
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.writing import whole_file
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
     if target.suffix == ".csv":
         heads = [_head(trajectory, name) for name in ("t", *names)]
         table = np.vstack([trajectory.t, values]).T
-        np.savetxt(target, table, fmt="%.17g", delimiter=",", header=",".join(heads), comments="")
+        with whole_file(target) as file:
+            np.savetxt(file, table, fmt="%.17g", delimiter=",", header=",".join(heads), comments="", encoding="utf-8")
         return target
     header = {"format": FORMAT, "names": list(names), **trajectory.metadata}
     arrays: dict[str, Any] = {
@@ -79,7 +81,7 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
         arrays["energies"] = trajectory.energies
     for k, (t, x) in enumerate(zip(trajectory.t_events, trajectory.x_events, strict=True)):
         arrays[f"t_events_{k}"], arrays[f"x_events_{k}"] = t, x
-    with target.open("wb") as file:
+    with whole_file(target) as file:
         np.savez_compressed(file, **arrays)
     return target
 

@@ -7,6 +7,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#if defined(__cplusplus) && !defined(restrict)
+#define restrict __restrict /* C++ has no such word */
+#endif
+
 /* EOMGEN_PORTABLE: do without the vector types of GCC and Clang. */
 #if defined(__GNUC__) && !defined(EOMGEN_PORTABLE)
 #define EOMGEN_VECTORS
@@ -25,7 +29,8 @@ typedef uint64_t numeral __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 
 static inline real same(double a)
 {
-    return a - (real){ 0.0 };
+    const real zero = { 0.0 };
+    return a - zero;
 }
 
 static inline real choose(flag condition, real a, real b)
@@ -59,16 +64,16 @@ typedef int flag;
 #define abs_of(a) fabs(a)
 #endif
 
-/* NAME(a), NAME(a, b): a function of doubles in every lane. */
+/* NAME(a), NAME(a, b): a function of doubles in every lane; of files that include eomgen.h. */
 #define EOMGEN_EACH(NAME, FUNCTION) \
-    static inline real NAME(real a) \
+    EOMGEN_SHARED inline real NAME(real a) \
     { \
         real y = same(0.0); \
         for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k)); } \
         return y; \
     }
 #define EOMGEN_EACH_PAIR(NAME, FUNCTION) \
-    static inline real NAME(real a, real b) \
+    EOMGEN_SHARED inline real NAME(real a, real b) \
     { \
         real y = same(0.0); \
         for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k), EOMGEN_LANE(b, k)); } \

@@ -18,6 +18,7 @@ MODULES = {
     "command_lines": "command_lines",
     "urdf": "robot_files",
     "mjcf": "robot_files",
+    "meshes": "robot_files",
 }
 
 

@@ -5,7 +5,7 @@ static double mean_residual(const double *restrict C, const double *restrict s)
     for (int i = 0; i < MH; i++) {
         total += fabs(C[i] / s[N + i]);
     }
-    return MH > 0 ? total / MH : 0.0;
+    return MH > 0 ? total / (double)MH : 0.0;
 }
 
 /* What linear theory leaves of the scaled residual after the step -dz. */

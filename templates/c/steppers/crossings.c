@@ -59,14 +59,14 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
 {
     const double s = ev->g[i] > 0.0 ? 1.0 : -1.0;
-    double left = run->t_old, right = run->t, best = INFINITY, at = left;
+    double left = run->t_old, right = run->t, best = HUGE_VAL, at = left;
     for (int k = 1; k < SAMPLES; k++) {
-        const double t = run->t_old + k * (run->t - run->t_old) / SAMPLES, value = s * value_at(method, run, ev, i, t);
+        const double t = run->t_old + k * (run->t - run->t_old) / (double)SAMPLES, value = s * value_at(method, run, ev, i, t);
         if (value < best) {
             best = value, at = t;
         }
     }
-    const double h = (run->t - run->t_old) / SAMPLES, ratio = 0.3819660112501051;
+    const double h = (run->t - run->t_old) / (double)SAMPLES, ratio = 0.3819660112501051;
     left = at - h, right = at + h;
     for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > 1e-8 * fabs(run->step); k++) { /* golden section */
         const int low = fabs(at - left) > fabs(right - at);

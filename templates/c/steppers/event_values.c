@@ -16,7 +16,7 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     }
     if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) != 0) {
         for (int i = 0; i < ev->n_model; i++) {
-            g[i] = NAN; /* no event here */
+            g[i] = (double)NAN; /* no event here */
         }
     }
     if (ev->tape != NULL) {
@@ -51,7 +51,7 @@ void eomgen_arm(eomgen_run *run, eomgen_events *ev)
     event_values(run, ev, run->t, run->y, ev->g);
     event_slopes(run, ev, ev->g, ev->slope, 1.0);
     for (int i = 0; i < ev->n; i++) {
-        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->touch[i] = 0, ev->latest[i] = NAN;
+        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->touch[i] = 0, ev->latest[i] = (double)NAN;
     }
 }
 

@@ -37,7 +37,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     set_out(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
-        j->events->last_reset = NAN;
+        j->events->last_reset = (double)NAN;
         eomgen_arm(run, j->events);
     }
     store_step(run, j);
@@ -142,7 +142,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         begin(method, run, j);
     }
     while (run->direction * (run->t - j->nodes[j->n_nodes - 1]) < 0.0) {
-        if ((j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
+        if (j->pause || (j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
             (j->trail_room > 0 && j->n_trail + 2 > j->trail_room) ||
             (j->events != NULL && j->n_notes + 2 * j->events->n > j->notes_room)) {
             return EOMGEN_FULL;
@@ -160,5 +160,8 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
             eomgen_start(method, run);
         }
     }
-    return run->stopped ? EOMGEN_STOPPED : EOMGEN_END;
+    if (run->stopped) {
+        return EOMGEN_STOPPED;
+    }
+    return EOMGEN_END;
 }

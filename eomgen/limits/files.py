@@ -1,0 +1,31 @@
+"""Limits: what a robot file may be made of, and what reading it may cost."""
+
+from __future__ import annotations
+
+# -- XML -------------------------------------------------------------------------------------------------------------
+SIZE = 20_000_000  #: bytes of one XML file, and of all that make one model
+ELEMENTS = 200_000  #: of one file, and of a model once its files are put together
+ATTRIBUTES = 1_000_000  #: of one file
+DEPTH = 200  #: nesting, also of a model once its files are put together
+LONGEST = 200_000  #: characters of one attribute
+FILES = 200  #: XML files that a model may be made of
+
+# -- numbers ---------------------------------------------------------------------------------------------------------
+#: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
+#: mass times distance squared, stay within double precision.
+LARGEST = 1e100
+
+# -- MJCF ------------------------------------------------------------------------------------------------------------
+NAME = 1_000  #: characters of the name of a file
+COPIES = 10_000  #: bodies that <replicate>, <composite> and <flexcomp> may make, themselves counted, over all files
+PIXELS = 16_384  #: width or height of a texture, rows or columns of a height field
+ENTRIES = 1_000_000  #: any number in <size>: keys, numbers of users, contacts
+MESHES = 200_000_000  #: bytes of all meshes of a model
+
+# -- meshes of solids ------------------------------------------------------------------------------------------------
+MESH = 100_000_000  #: bytes of an STL file: two million triangles, which take 15 s and 1e9 bytes to measure
+
+# -- MuJoCo's compiler, in a process of its own ------------------------------------------------------------------------
+SECONDS = 10  #: of processor time; the largest models that packages ship (fruit fly, dog) take 2
+WAIT = 16  #: seconds until it is ended whatever it does
+MEMORY = 2_000_000_000  #: bytes of address space; those models take 0.4e9
