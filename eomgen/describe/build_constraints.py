@@ -7,7 +7,7 @@ from typing import Any
 
 from ..constraints import Constraint, KnifeEdge, RollingDisc, RollingSphere
 from ..frames import Marker
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from .build_cam_points import Contacts
 from .build_cams import cam, cam_contact
 from .build_couplings import belt, coupling, gear, planetary, rack

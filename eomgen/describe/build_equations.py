@@ -10,7 +10,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from ..limits.descriptions import TENSOR
 from .checks import check_keys
 from .description import Faults, items

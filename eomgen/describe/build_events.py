@@ -7,7 +7,7 @@ from typing import Any
 
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
-from ..graph.texts import shown
+from ..graph.shown import shown
 from .checks import check_keys
 from .description import Entry
 from .fields import EVENT, OUTPUT

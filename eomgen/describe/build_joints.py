@@ -9,7 +9,7 @@ from typing import Any
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.substitute import symbols_of
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
 from ..records import dataclass

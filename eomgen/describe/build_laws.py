@@ -8,7 +8,7 @@ from ..forces import Bushing, Element, Force, JointCoordinate, Muscle, Path, Poi
 from ..forces.bushing import Mat6
 from ..frames import Frame, Marker
 from ..graph.core import Expr
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from .description import items
 from .force_entry import ForceEntry
 from .names import nearest

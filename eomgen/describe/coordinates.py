@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from .build_joints import Declared
 from .names import nearest
 from .reading import Reader

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import Problem, UsageError
-from ..graph.texts import NO_TEXT, shortened, shown
+from ..graph.shown import NO_TEXT, shortened, shown
 
 GROUND_NAME = "ground"
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import ModelError, Problem
-from ..graph.texts import shortened
+from ..graph.shown import shortened
 from .description import Description, items
 from .expressions import names_in
 from .input_names import split_rate

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
-from ..graph.texts import shown
+from ..graph.shown import shown
 from ..joints import JOINTS
 from . import FORCE_FIELDS
 from .build import build

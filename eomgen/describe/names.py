@@ -7,7 +7,7 @@ import re
 import sys
 from collections.abc import Iterable
 
-from ..graph.texts import quoted
+from ..graph.shown import quoted
 
 #: Functions an expression may call, with the least and the greatest number of arguments.
 FUNCTIONS: dict[str, tuple[int, int]] = {

@@ -18,7 +18,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from ..graph.texts import quoted, shown
+from ..graph.shown import quoted, shown
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.inertia import word_of_check
 from ..texts import WHOLE, join_surrogates, lone_surrogate

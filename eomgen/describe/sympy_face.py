@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError
-from ..graph.texts import quoted
+from ..graph.shown import quoted
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph

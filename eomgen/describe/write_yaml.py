@@ -93,7 +93,7 @@ def _value(value: Any, functions: Names) -> str:
             return _value(listed, functions)
         if is_sympy(value):
             return _sympy(value, functions)
-        from ..graph.texts import shortened
+        from ..graph.shown import shortened
 
         raise UsageError(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):

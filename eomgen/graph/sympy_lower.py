@@ -21,7 +21,7 @@ from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
 from .core import Expr, Graph
-from .texts import shortened
+from .shown import shortened
 
 Resolve = Callable[[sympy.Basic], Expr | None]
 Build = Callable[[Graph, Sequence[int]], int]

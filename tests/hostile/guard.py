@@ -33,7 +33,7 @@ ROOTS = tuple(
 )
 #: What Python and the system read for themselves.
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/", "/usr/lib/", "/usr/share/", "/lib/", "/etc/ld.so")
-DEVICES = ("/dev/null", "/dev/urandom", "/dev/tty")
+DEVICES = ("/dev/null", "/dev/full", "/dev/urandom", "/dev/tty")
 #: Events that no case may cause.
 FORBIDDEN = ["os.system", "os.exec", "os.spawn", "os.startfile", "os.fork", "os.forkpty", "pty.spawn", "socket.", "urllib.", "http.", "ftplib.", "smtplib.", "imaplib.", "poplib.", "telnetlib.", "webbrowser.", "pickle.", "ctypes.", "sys.addaudithook", "sys.setprofile", "sys.settrace", "os.setxattr", "os.chflags", "os.chroot", "os.kill", "os.killpg", "resource.", "syslog.", "sqlite3.", "fcntl.", "mmap.", "gc.get_objects", "code.__new__"]
 #: Events whose first arguments are paths that the case changes.
