@@ -168,6 +168,16 @@ def test_ensembles_side_by_side(crank: Any) -> None:
     agree(task)
 
 
+def test_different_models_are_derived_side_by_side() -> None:
+    names = ("pendulum", "slider_crank", "cart_pendulum", "double_pendulum", "four_bar", "spherical_pendulum")
+
+    def task(k: int) -> list[Any]:
+        module = eg.load(EXAMPLES / f"{names[k % len(names)]}.yaml").compile(target="numpy")
+        return [module.rhs(0.0, module.x0())]
+
+    agree(task)
+
+
 def test_the_layer_keeps_the_gil_off(crank: Any) -> None:
     """In a Python without the GIL, importing a compiled module does not bring it back."""
     enabled = getattr(sys, "_is_gil_enabled", lambda: True)
