@@ -11,8 +11,8 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.operations import FOLD
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints

@@ -7,8 +7,8 @@ from typing import Any
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
 from .fields import LAGRANGIAN, MOTION

@@ -47,7 +47,8 @@ class Calls:
     name = "calls"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = (TypeError, ValueError)
-    unjudged: tuple[type[Warning], ...] = ()
+    #: NumPy's of a complex array given for a real one, SciPy's of options that a solver does not know.
+    unjudged: tuple[type[Warning], ...] = (np.exceptions.ComplexWarning, UserWarning)
 
     def prepare(self, folder: Path) -> None:
         self.modules: dict[str, Any] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import warnings
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ import sympy
 from sympy.utilities.exceptions import SymPyDeprecationWarning
 
 import eomgen
+from eomgen.errors import EomgenError
 
 from .kind import pruned
 
@@ -150,6 +152,8 @@ class SympyObjects:
         model = MODELS["output"](Q)
         model.derive()
         model.to_yaml()
+        with contextlib.suppress(EomgenError):
+            eomgen.from_sympy(Q)
 
     def make(self, r: random.Random) -> dict[str, Any]:
         return {"place": r.choice(list(PLACES)), "object": words(r, r.choice((0, 0, 1, 1, 2, 3))), "derive": r.random() < 0.1}
