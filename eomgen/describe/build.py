@@ -274,7 +274,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known:
-            reader.faults.add(f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates"))
+            reader.faults.add(
+                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
+            )
         elif name in result:
             reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
         else:

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from hostile.kind import MODULES, find, generator, kept
 from hostile.outcome import FINDINGS
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 HERE = Path(__file__).parent
 KEPT = sorted((HERE / "kept").glob("*/*.*"))
@@ -34,7 +33,9 @@ def test_a_short_attack_finds_nothing(tmp_path: Path) -> None:
 def test_a_seed_makes_the_same_case_again(name: str, tmp_path: Path) -> None:
     kind = find(name)
     kind.prepare(tmp_path)
-    assert [kind.make(generator(name, seed)) for seed in range(20)] == [kind.make(generator(name, seed)) for seed in range(20)]
+    assert [kind.make(generator(name, seed)) for seed in range(20)] == [
+        kind.make(generator(name, seed)) for seed in range(20)
+    ]
 
 
 @settings(max_examples=300, database=None)
@@ -50,13 +51,21 @@ def test_any_text_is_an_expression_or_named(text: str) -> None:
 
 
 @settings(max_examples=100, database=None)
-@given(st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8), lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=6), x, max_size=3), max_leaves=12))
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=8),
+        lambda x: st.lists(x, max_size=3) | st.dictionaries(st.text(max_size=6), x, max_size=3),
+        max_leaves=12,
+    )
+)
 def test_any_tree_is_a_model_or_named(tree: Any) -> None:
     from eomgen.errors import ModelError
 
     kind = find("yaml")
     try:
-        kind.run({"stage": "build", "text": json.dumps({"name": "made", "bodies": {"b": tree}, "parameters": tree})}, HERE)
+        kind.run(
+            {"stage": "build", "text": json.dumps({"name": "made", "bodies": {"b": tree}, "parameters": tree})}, HERE
+        )
     except ModelError as error:
         assert error.problems
 
