@@ -65,6 +65,8 @@ _C_KEYWORDS = frozenset(
 #: Packages that an exported package imports, or the like, and its own parts.
 _NEEDED = frozenset(("numpy", "scipy", "pandas", "matplotlib", "sympy", "cython", "setuptools", "eomgen"))
 _NEEDED |= {"errors", "limits", "numeric", "runtime"}
+#: Headers in quotes in what Cython writes, in lower case: some systems do not tell it from upper case in file names.
+_HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
@@ -112,6 +114,8 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     if isinstance(name, str) and (name in _NEEDED or name in sys.stdlib_module_names):
         whose = "that it needs" if name in _NEEDED else "of Python's library"
         return f"a package {name!r} would hide the module {whose}", f"choose another name, e.g. {name}_model"
+    if isinstance(name, str) and (name.lower() in _HEADERS or name.lower().startswith("eomgen")):
+        return f"{name[:LONGEST]!r} is the name of a file that every package has", "choose another name, e.g. my_model"
     return fault_of_name(name, symbol=True)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 # -- XML -------------------------------------------------------------------------------------------------------------
 SIZE = 20_000_000  #: bytes of one XML file, and of all that make one model
-ELEMENTS = 200_000  #: of one file, and of a model once its files are put together
-ATTRIBUTES = 1_000_000  #: of one file
+ELEMENTS = 100_000  #: of one file, and of a model once its files are put together
+PIECE = 2_000_000  #: bytes between two ">": a tag with its attributes, a comment, a text
 DEPTH = 200  #: nesting, also of a model once its files are put together
 LONGEST = 200_000  #: characters of one attribute
 FILES = 200  #: XML files that a model may be made of
@@ -14,6 +14,11 @@ FILES = 200  #: XML files that a model may be made of
 #: Magnitude of a number of a robot file, limits of joints aside: the products of three that a reader forms, such as
 #: mass times distance squared, stay within double precision.
 LARGEST = 1e100
+
+# -- what a robot becomes ---------------------------------------------------------------------------------------------
+FREEDOMS = 800  #: coordinates of its joints; checking a model of so many takes 10 s
+TIES = 800  #: joints that close loops, couplings, drives
+LAWS = 10_000_000  #: characters of the laws of all drives, which tendons of many joints multiply
 
 # -- MJCF ------------------------------------------------------------------------------------------------------------
 NAME = 1_000  #: characters of the name of a file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
@@ -77,7 +78,7 @@ def make_options(given: dict[str, Any]) -> Options:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
         if key in given and not (isinstance(given[key], str) and given[key] in allowed):
-            hint = "; stops do not act yet, limits are data" if given[key] == "stop" else ""
+            hint = "; stops do not act yet, limits are data" if str(given[key]) == "stop" else ""
             raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}{hint}")
     if "check_inertia" in given:
         word = word_of_check(given["check_inertia"])
@@ -100,7 +101,8 @@ def make_options(given: dict[str, Any]) -> Options:
 
 def _is_number(value: Any) -> bool:
     """Whether a value is a finite number that the reader's products stay finite with."""
-    return isinstance(value, int | float | np.integer | np.floating) and bool(abs(value) <= LARGEST)
+    size: Any = abs(value) if isinstance(value, int | float | np.integer | np.floating) else math.inf
+    return bool(size <= LARGEST)
 
 
 def _names(key: str, given: Any) -> Any:

@@ -31,7 +31,11 @@ static int pivot_lost(double d, double size, double largest)
    or of a zero beside the largest. */
 static int ldl_factor(const double *restrict B, const double *restrict mass, double *restrict a)
 {
+<<<<<<< HEAD
+    double sizes[F + 1]; /* of none too */
+=======
     double sizes[F + !F];
+>>>>>>> main
     const double largest = embedded_sizes(B, mass, sizes);
     for (int j = 0; j < F; j++) {
         double d = a[j * F + j];
