@@ -11,8 +11,8 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.operations import FOLD
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
 from .build_constraints import build_constraints
@@ -274,7 +274,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known:
-            reader.faults.add(f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates"))
+            reader.faults.add(
+                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
+            )
         elif name in result:
             reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
         else:

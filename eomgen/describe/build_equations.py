@@ -9,8 +9,8 @@ from typing import Any
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
-from ..graph.substitute import substitute, symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import substitute, symbols_of
 from ..limits.descriptions import TENSOR
 from .checks import check_keys
 from .description import Faults, items

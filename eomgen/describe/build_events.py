@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graph.core import Expr
-from ..graph.substitute import symbols_of
 from ..graph.shown import shown
+from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import Entry
 from .fields import EVENT, OUTPUT

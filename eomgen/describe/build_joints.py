@@ -8,8 +8,8 @@ from typing import Any
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
 from ..records import dataclass

@@ -175,5 +175,7 @@ def label_of(reference: Mapping[str, Any]) -> str:
     if turn is not None and not is_zero(turn):
         text = f"{text[:-1]}, rpy={text_of(turn)})"
     if NO_TEXT in text:  # two such markers would bear one label
-        raise UsageError(f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker")
+        raise UsageError(
+            f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"
+        )
     return f"{reference.get('body')}.at{text}"

@@ -9,8 +9,8 @@ from ..forces import JointCoordinate, Line, Path, Route, Turn
 from ..frames import Marker
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from ..graph.vectors import Vec3
 from .build_joints import Declared
 from .build_paths import read_via

@@ -17,8 +17,8 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
 from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.inertia import word_of_check
 from ..texts import WHOLE, join_surrogates, lone_surrogate

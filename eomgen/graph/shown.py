@@ -12,7 +12,7 @@ NO_TEXT = "<unprintable "
 
 def shown(value: Any) -> str:
     """The text of a value, whole."""
-    if _is_tower(value):
+    if not _prints(value):
         return f"{NO_TEXT}{type(value).__name__}>"
     try:
         return str(value)
@@ -38,16 +38,28 @@ def quoted(value: Any, longest: int = LONGEST) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def _is_tower(value: Any) -> bool:
-    """Whether a SymPy expression holds powers of powers of numbers, such as 9**(9**9), that its printer works out."""
+def _prints(value: Any) -> bool:
+    """Whether a value can be printed at all: of SymPy only plain expressions.
+
+    SymPy's printer asks for signs, and works out powers of powers of numbers, sums and roots to tell them: for any
+    time, and by running texts as code.
+    """
     sympy = sys.modules.get("sympy")
     if sympy is None or not isinstance(value, sympy.Basic):
-        return False
-    stack, seen, powers = [value], set(), 0
+        return not isinstance(value, type)
+    plain = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
+    plain += (sympy.Function, sympy.core.relational.Relational, sympy.logic.boolalg.Boolean, sympy.Tuple)
+    plain += (sympy.functions.elementary.piecewise.ExprCondPair, sympy.core.symbol.Str)
+    stack: list[Any] = [value]
+    seen: set[int] = set()
     while stack:
         part = stack.pop()
-        if id(part) not in seen:
-            seen.add(id(part))
-            stack += part.args
-            powers += isinstance(part, sympy.Pow) and all(x.is_number and not x.is_Number for x in part.args[1:])
-    return powers > 0
+        if id(part) in seen:
+            continue
+        seen.add(id(part))
+        if not isinstance(part, plain):
+            return False
+        if isinstance(part, sympy.Pow) and part.exp.is_number and not part.exp.is_Number:
+            return False
+        stack += part.args
+    return True

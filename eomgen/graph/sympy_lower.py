@@ -227,6 +227,8 @@ def _worked_out(part: Any) -> Any:
     Of others (sums, integrals, limits) SymPy searches for a closed form, for any time, and runs texts as code.
     """
     for inner in _inside(part):
+        if not isinstance(inner, sympy.Basic):
+            raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
         if not (inner.func in BUILD or isinstance(inner, DIFFERENTIABLE)):
             raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {KNOWN}")
         orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
@@ -246,7 +248,7 @@ def _inside(part: Any) -> Iterator[Any]:
         if id(inner) not in seen:
             seen.add(id(inner))
             yield inner
-            stack += inner.args
+            stack += inner.args if isinstance(inner, sympy.Basic) else ()
 
 
 def _evaluated(part: Any) -> Any:

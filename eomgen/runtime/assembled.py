@@ -132,8 +132,11 @@ class Assembled:
             1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
             coordinates.
         """
+        state = np.asarray(x, dtype=float)
+        if state.shape not in ((self.n_q,), (self.n_x,)):
+            raise UsageError(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
         initial = self._initial(t, None, None)
-        here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
+        here = initial.side(state[: self.n_q])
         there = initial.side(initial.reference())
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 

@@ -92,8 +92,10 @@ class Minimal:
     def reduce(self, x: ArrayLike) -> Array:
         """The independent part (n_x,) or (n_x, k) of full states (2 n,) or (2 n, k)."""
         full = np.asarray(x, dtype=float)
-        chosen = self._layout.independent
-        return np.concatenate([full[self._layout.independent_q], full[self._layout.n_q + chosen]])
+        layout = self._layout
+        if full.ndim not in (1, 2) or len(full) != layout.n_x:
+            raise UsageError(f"x must be of shape ({layout.n_x},) or ({layout.n_x}, k), not {full.shape}")
+        return np.concatenate([full[layout.independent_q], full[layout.n_q + layout.independent]])
 
     def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Full states from minimal ones.

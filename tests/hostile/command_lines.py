@@ -36,12 +36,80 @@ FILES = {
     "robot.urdf": "<robot name='r'><link name='a'/></robot>",
     "other.txt": "text",
 }
-PATHS = (*FILES, "none.yaml", "out.npz", "out.csv", "full.csv", "out.yaml", "out.png", "out", ".", "..", "", "sub/none/out.csv", "a" * 300 + ".csv", "\x00", "é.csv", "-", "--json", "\ud800.csv", "\udc80.csv")  # fmt: skip
+PATHS = (
+    *FILES,
+    "none.yaml",
+    "out.npz",
+    "out.csv",
+    "full.csv",
+    "out.yaml",
+    "out.png",
+    "out",
+    ".",
+    "..",
+    "",
+    "sub/none/out.csv",
+    "a" * 300 + ".csv",
+    "\x00",
+    "é.csv",
+    "-",
+    "--json",
+    "\ud800.csv",
+    "\udc80.csv",
+)
 WORDS = (
-    *("q", "q_dot", "u", "k", "h", "t", "x", "nothing", "q=1", "q=", "=1", "q=nan", "q=1e400", "q=1=2", "k=-1", "k=0", "u=sin(t)", "u=9**9**9"),
-    *("q=0:1:3", "q=1:0", "q=0:1:0", "q=0:1:-1", "q=0:0:2", "q=nan:1:2", "q=0:inf:2", "q=a:b:c", "t=0:0.1:3", "0,0", "1,2", "-1,1", "a,b", "1"),
-    *("embedding", "lagrange", "hamilton", "augmented", "recursive", "auto", "DOP853", "RK4", "Radau", "LSODA", "BDF", "Taylor", "foo"),
-)  # fmt: skip
+    *(
+        "q",
+        "q_dot",
+        "u",
+        "k",
+        "h",
+        "t",
+        "x",
+        "nothing",
+        "q=1",
+        "q=",
+        "=1",
+        "q=nan",
+        "q=1e400",
+        "q=1=2",
+        "k=-1",
+        "k=0",
+        "u=sin(t)",
+        "u=9**9**9",
+    ),
+    *(
+        "q=0:1:3",
+        "q=1:0",
+        "q=0:1:0",
+        "q=0:1:-1",
+        "q=0:0:2",
+        "q=nan:1:2",
+        "q=0:inf:2",
+        "q=a:b:c",
+        "t=0:0.1:3",
+        "0,0",
+        "1,2",
+        "-1,1",
+        "a,b",
+        "1",
+    ),
+    *(
+        "embedding",
+        "lagrange",
+        "hamilton",
+        "augmented",
+        "recursive",
+        "auto",
+        "DOP853",
+        "RK4",
+        "Radau",
+        "LSODA",
+        "BDF",
+        "Taylor",
+        "foo",
+    ),
+)
 #: Large numbers rightly take long where they count; these do not.
 COUNTS = ("0", "-1", "1", "2", "3", "1.5", "nan", "inf", "", "x", "1e3", "٣", "1_0")
 TIMES = ("0.01", "0.02", "0", "-1", "nan", "inf", "1e-300", "5e-324", "", "x", "0x1", "1e400")
@@ -66,7 +134,13 @@ class CommandLines:
             self.options[verb] = [p for p in command.params if isinstance(p, click.Option)]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            for words in (["run", "model.yaml", "--plot", "a.png"], ["run", "model.yaml", "--out", "a.csv"], ["verify", "model.yaml", "--seconds", "1"], ["modes", "model.yaml"], ["check", "model.yaml", "--graph", "b.png"]):  # fmt: skip
+            for words in (
+                ["run", "model.yaml", "--plot", "a.png"],
+                ["run", "model.yaml", "--out", "a.csv"],
+                ["verify", "model.yaml", "--seconds", "1"],
+                ["modes", "model.yaml"],
+                ["check", "model.yaml", "--graph", "b.png"],
+            ):
                 files(Path.cwd())
                 self.answer([*words, "--target", "numpy"] if words[0] != "check" else words, Path.cwd())
 

@@ -9,6 +9,7 @@ import resource
 import shutil
 import signal
 import sys
+import tempfile
 import time
 import traceback
 import warnings
@@ -50,6 +51,7 @@ class Runner:
         self.folder = folder / "case"
         self.folder.mkdir(parents=True, exist_ok=True)
         os.environ.update(EOMGEN_CACHE_DIR=str(cache), TMPDIR=str(self.folder), HOME=str(self.folder))
+        tempfile.tempdir = str(self.folder)
         self.guard = Guard(str(self.folder), str(cache))
         self.warned: list[str] = []
         self.prepared: set[str] = set()
