@@ -1,6 +1,6 @@
 """Hostile robot files: URDF, MJCF with the files it names, and meshes; trees of elements changed, and texts broken.
 
-A file called ``secret`` lies beside the folder of the case.  What is in it must not come out, whatever a model calls it.
+A file called ``secret`` lies beside the folder of the case.  What is in it must not come out, whatever a model says.
 """
 
 from __future__ import annotations
