@@ -32,6 +32,7 @@ class Assembly(NamedTuple):
     distance: float  #: largest scaled distance of a coordinate from the guess
 
 
+@np.errstate(all="ignore")
 def assemble(
     position: Position,
     guess: Array,

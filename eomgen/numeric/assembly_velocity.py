@@ -31,6 +31,7 @@ class Rates(NamedTuple):
     residual: float  #: largest scaled residual
 
 
+@np.errstate(all="ignore")
 def assemble_velocity(
     C_q: Array,
     C_t: Array,

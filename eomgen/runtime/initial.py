@@ -174,6 +174,7 @@ class Initial:
         except AssemblyError:
             return None
 
+    @np.errstate(all="ignore")
     def assembled(self, given: Mapping[str, float]) -> Array:
         """Position with the given values exact, and the declared ones where they leave room."""
         layout = self.layout
