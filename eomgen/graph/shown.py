@@ -47,7 +47,7 @@ def _prints(value: Any) -> bool:
     sympy = sys.modules.get("sympy")
     if sympy is None or not isinstance(value, sympy.Basic):
         return not isinstance(value, type)
-    plain = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
+    plain: tuple[Any, ...] = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
     plain += (sympy.Function, sympy.core.relational.Relational, sympy.logic.boolalg.Boolean, sympy.Tuple)
     plain += (sympy.functions.elementary.piecewise.ExprCondPair, sympy.core.symbol.Str)
     stack: list[Any] = [value]

@@ -98,7 +98,7 @@ class Campaign:
                 return None
             name = min(open_kinds, key=lambda n: (self.next[n] - self.first) / self.parts[n])
             record = self.records[name]
-            rate = record.cases / record.seconds if record.seconds > 0.5 else 20.0
+            rate = record.cases / record.seconds if record.seconds > 0.5 else 4.0
             first, count = self.next[name], max(1, min(left[name], int(rate * BATCH_SECONDS), 50_000))
             self.next[name] += count
             return name, first, count
