@@ -20,7 +20,7 @@ from .worker import BEAT, IDLE
 
 BATCH_SECONDS = 5.0  #: aimed at for one batch
 GRACE = 10.0  #: seconds after which a case that outlived its alarm is killed with its process
-SILENCE = 300.0  #: seconds a worker may take to prepare
+SILENCE = 900.0  #: seconds a worker may take to prepare
 RENEWAL = 1 << 30  #: a worker that holds more (bytes) is replaced after its batch
 EACH = 20  #: most findings of one key that are kept as files
 
