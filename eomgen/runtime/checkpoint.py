@@ -138,7 +138,7 @@ def identify(
         "eomgen": module.metadata.get("eomgen"),
         "code": code_digest(module),
         "method": method,
-        "options": {name: digest(value) for name, value in options.items() if name != "jac"},
+        "options": {name: digest(value) for name, value in options.items()},
         "span": [nodes[0], nodes[-1]],
         "initial": digest(x0),
         "parameters": dict(zip(module.p_names, module.p.tolist(), strict=True)),

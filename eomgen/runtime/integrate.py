@@ -6,7 +6,7 @@ Runs ``solve_ivp`` once between two corners of tabulated inputs, so that no corn
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,15 @@ from .names import require, unknown
 from .pace import Pace, watch_steps
 from .resets import Resets
 
+if TYPE_CHECKING:
+    from .solver_state import Pause
+
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
+UNDER_WAY = 2  #: a status beside SciPy's
+WORDS = {
+    0: "The solver successfully reached the end of the integration interval.",
+    1: "A termination event occurred.",
+}
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 
 
@@ -126,6 +134,7 @@ def integrate(
     pace: Pace,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
+    pause: Pause | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
 
@@ -148,12 +157,22 @@ def integrate(
     counts = {"nfev": 0, "njev": 0, "nlu": 0}
     x, k, start, jumped = x0, 0, nodes[0], True
     resets = Resets(events, rhs, nodes[0], nodes[-1])
-    while True:
+    status, message, resumed = UNDER_WAY, "", False
+    if pause is not None and pause.checkpoint.kept is not None:
+        try:
+            x, k, start, status = pause.go_on(
+                (times, states, walked), (t_events, x_events), counts, events, resets, len(nodes) - 1
+            )
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise pause.checkpoint.damaged(error) from None
+        jumped, resumed = False, True
+    while status == UNDER_WAY:
         span, last = (start, nodes[k + 1]), k == len(nodes) - 2
         if enter is not None:
             enter(nodes[k], nodes[k + 1])
         asked = None if t_eval is None else _between(t_eval, span, last)
-        if asked is not None and resets.count and asked.size and asked[0] == start:  # stored before the reset
+        stored = resumed or (jumped and resets.count > 0)  # what is asked for here, before a reset or a checkpoint
+        if asked is not None and stored and asked.size and asked[0] == start:
             asked = asked[1:]
         first = (
             {} if "first_step" not in options else {"first_step": min(options["first_step"], abs(span[1] - span[0]))}
@@ -162,15 +181,19 @@ def integrate(
         for event in events:
             event.terminal = event.terminal if event.action == GO_ON else 1
         trail: list[tuple[float, Array]] = [(start, x)]
+        counted_before = {key: pause.carried.get(key, 0) if pause is not None else 0 for key in counts}
         try:
             part = scipy.solve_ivp(
-                rhs, span, x, method=watch_steps(solver, pace, trail), t_eval=asked, events=list(events) or None,
+                rhs, span, x, method=watch_steps(solver, pace, trail, pause), t_eval=asked, events=list(events) or None,
                 dense_output=dense, **options | first,
             )  # fmt: skip
         except KeyboardInterrupt as interrupt:
             raise Interrupted(_cut_short(times, states, trail, t_events, x_events, nodes[0], counts)) from interrupt
         for key in counts:
-            counts[key] += int(getattr(part, key, 0) or 0)
+            counts[key] += int(getattr(part, key, 0) or 0) - counted_before[key]
+        resumed = pause is not None and pause.cut and part.status == 0
+        if pause is not None and not resumed:
+            pause.carried = {}  # an event in the same step: the next part begins anew
         if part.status == 1:
             _complete(part, events, trail)
         t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
@@ -193,16 +216,18 @@ def integrate(
             walked += trail[0 if jumped else 1 :]
             if part.status == 1:  # an event, beyond which the last step went
                 walked[-1] = _stopped(part, nodes[-1] >= nodes[0])
-        done = (last and not fired) or part.status == -1 or (part.status == 1 and not fired)
+        done = (last and not fired and not resumed) or part.status == -1 or (part.status == 1 and not fired)
         if t_eval is None:
             skip = 0 if jumped else 1  # a part starts where the last one ended
             times.append(t[skip:])
             states.append(y[:, skip:])
         else:
-            keep = len(t) if done or fired or last else len(t) - 1  # the corner was asked for only to go on from
+            keep = len(t) if done or fired or last or resumed else len(t) - 1  # the corner was asked for to go on from
             times.append(t[:keep])
             states.append(y[:, :keep])
+        message = str(part.message)
         if done:
+            status = int(part.status)
             break
         jumped = bool(fired)
         if fired and reset is not None:
@@ -211,10 +236,15 @@ def integrate(
             resets.note(ended, before, x, fired)
             start = ended
             if start == nodes[-1]:
-                part.status = 0
+                status = 0
                 break
+        elif resumed and pause is not None:
+            x, start = pause.carried["y"], pause.carried["t"]
+            pause.keep((times, states, walked), (t_events, x_events), counts, events, resets, (x, k, start, UNDER_WAY))
         else:
             x, k, start = y[:, -1], k + 1, nodes[k + 1]
+    if pause is not None and status >= 0:
+        pause.keep((times, states, walked), (t_events, x_events), counts, events, resets, (x, k, start, status))
     joined = (
         pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
     )
@@ -230,8 +260,8 @@ def integrate(
         [np.concatenate(found) for found in t_events],
         [np.concatenate(found, axis=1) for found in x_events],
         joined,
-        int(part.status),
-        str(part.message),
+        status,
+        WORDS.get(status, message),
         counts,
         ends,
         _columns(walked, len(x0)) if t_eval is not None else None,

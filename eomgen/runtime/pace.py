@@ -6,13 +6,16 @@ Next to a singular position, or where a force jumps, an integrator may go on for
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..limits.runs import NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from .failure import place
+
+if TYPE_CHECKING:
+    from .solver_state import Pause
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any pace
@@ -83,8 +86,13 @@ class Pace:
             raise Crawling(t, self.x, step)
 
 
-def watch_steps(solver: Any, pace: Pace, trail: list[tuple[float, Array]]) -> Any:
-    """A subclass of a SciPy solver that shows its steps to `pace` and leaves them in `trail`."""
+def watch_steps(solver: Any, pace: Pace, trail: list[tuple[float, Array]], pause: Pause | None = None) -> Any:
+    """A subclass of a SciPy solver that shows its steps to `pace`, leaves them in `trail`, and ends at a `pause`."""
+
+    def begin(self: Any, *args: Any, **options: Any) -> None:
+        solver.__init__(self, *args, **options)
+        if pause is not None:
+            pause.begin(self)
 
     def step(self: Any) -> Any:
         message = solver.step(self)
@@ -92,9 +100,11 @@ def watch_steps(solver: Any, pace: Pace, trail: list[tuple[float, Array]]) -> An
             trail.append((self.t, self.y))
         if self.status == "running":
             pace.look(self.t, self.y)
+        if pause is not None:
+            pause.look(self)
         return message
 
-    return type(solver.__name__, (solver,), {"step": step, "__module__": solver.__module__})
+    return type(solver.__name__, (solver,), {"__init__": begin, "step": step, "__module__": solver.__module__})
 
 
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:

@@ -136,6 +136,7 @@ def simulate(
     kept = None
     if checkpoint is not None:
         from .checkpoint import Checkpoint, identify
+        from .solver_state import Pause
 
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
@@ -189,12 +190,14 @@ def simulate(
     options = {**tolerances, **steps, **options}
     if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
         options = check_tolerances(module.n_x, abs(end - start), options)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    pause = None
+    if kept is not None:
+        pause = None if compiled else Pause(kept, solver, dense_output)
+        kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, options))
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    stored = None if t_eval is None else ordered_times(t_eval, start, end)
-    if kept is not None:
-        kept.open(identify(bound, forcing, watched, nodes, x0, method, stored, dense_output, options))
     pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
     try:
         if compiled:
@@ -211,7 +214,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, pace,
-                    partial(watched.reset, bound, forcing), forcing.enter,
+                    partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:
