@@ -58,7 +58,7 @@ class Pause:
         if dense:
             raise UsageError(
                 f"a checkpoint of a run by SciPy's {name} keeps no continuous solution: leave dense_output out and "
-                "give t_eval, or take a method that runs in compiled code"
+                "give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code"
             )
         self.checkpoint, self.names, self.carried = checkpoint, STATE[name], dict[str, Any]()
         self.due, self.cut = perf_counter() + checkpoint.every, False

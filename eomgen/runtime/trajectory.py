@@ -71,7 +71,9 @@ class Trajectory:
         Calls of the right-hand side and the Jacobian, factorisations, SciPy's status (1: a terminal event).
     message : str
     metadata : dict
-        Model, parameters, method and tolerances.
+        ``name`` and ``model_method``, ``parameters``, ``inputs`` as they were given, ``method``, ``rtol``, ``atol`` and
+        all ``options``, ``span``, and ``origin``: ``model_digest`` (SHA-256 of the model), ``target`` and ``versions``
+        of eomgen, Python, NumPy and the compiler.  Runs that are the same have the same metadata.
     """
 
     def __init__(

@@ -56,6 +56,18 @@ cdef extern from "eomgen.h" nogil:
         const eomgen_series *series
     const eomgen_model *eomgen_model_table() noexcept
 
+cdef extern from *:
+    """
+    #if defined(__clang__)
+    #define EOMGEN_COMPILER "clang " __clang_version__
+    #elif defined(__GNUC__)
+    #define EOMGEN_COMPILER "gcc " __VERSION__
+    #else
+    #define EOMGEN_COMPILER "unknown"
+    #endif
+    """
+    const char *EOMGEN_COMPILER
+
 cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
@@ -67,6 +79,7 @@ if MODEL.abi != 3:
     raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 3: generate both again")
 
 metadata = MODEL.metadata.decode()
+compiler = EOMGEN_COMPILER.decode()  # of this layer, and of the model that is linked with it
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])
 sizes = {"n_p": MODEL.n_p, "n_u": MODEL.n_u, "n_const": MODEL.n_const, "n_work": MODEL.n_work}
 _FACTS = json.loads(metadata)

@@ -13,29 +13,29 @@ CRANK = EXAMPLES / "slider_crank.yaml"
 PENDULUM = EXAMPLES / "double_pendulum.yaml"
 KEYS = {
     "linearise": {
-        "name", "method", "t", "x", "states", "inputs", "outputs", "A", "B", "C", "D", "mass", "damping", "stiffness",
+        "name", "method", "origin", "t", "x", "states", "inputs", "outputs", "A", "B", "C", "D", "mass", "damping", "stiffness",
         "drift", "velocities", "positions", "equilibrium", "steady", "eigenvalues", "stability",
     },
     "modes": {
-        "name", "method", "t", "coordinates", "stability", "names", "squares", "frequencies", "hertz", "shapes",
+        "name", "method", "origin", "t", "coordinates", "stability", "names", "squares", "frequencies", "hertz", "shapes",
         "rigid", "diverging", "damped",
     },
     "equilibrium": {
-        "name", "method", "t", "coordinates", "unknowns", "supports", "forces", "steps", "eigenvalues", "stability",
+        "name", "method", "origin", "t", "coordinates", "unknowns", "supports", "forces", "steps", "eigenvalues", "stability",
     },
     "reactions": {
-        "name", "method", "t", "end", "joints", "components", "reactions", "undetermined", "constraints",
+        "name", "method", "origin", "t", "end", "joints", "components", "reactions", "undetermined", "constraints",
         "multipliers", "files",
     },
     "inverse": {
-        "name", "method", "t", "forces", "accelerations", "constraints", "multipliers", "joints", "reactions",
+        "name", "method", "origin", "t", "forces", "accelerations", "constraints", "multipliers", "joints", "reactions",
     },
     "impact": {
-        "name", "method", "t", "names", "impulses", "energy_lost", "x", "rates_before", "rates_after", "constraints",
+        "name", "method", "origin", "t", "names", "impulses", "energy_lost", "x", "rates_before", "rates_after", "constraints",
         "constraint_impulses",
     },
-    "consistent": {"name", "method", "t", "x", "rough", "change"},
-    "sensitivity": {"name", "method", "t", "names", "held", "steps", "final", "events", "files"},
+    "consistent": {"name", "method", "origin", "t", "x", "rough", "change"},
+    "sensitivity": {"name", "method", "origin", "t", "names", "held", "steps", "final", "events", "files"},
 }  # fmt: skip
 
 
