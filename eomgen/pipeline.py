@@ -260,8 +260,7 @@ def _load(
             from .emit import emit_c
             from .emit.sources import keep_bytecode
 
-            if (folder := shortcut.cache.open_templates()) is not None:
-                keep_bytecode(folder)
+            keep_bytecode(shortcut.cache.templates)
             sources = emit_c(program)
     with _timed(seconds, "compile"):
         if artifact is None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.writing import whole_file
+from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .identity import code_digest, differences, digest
@@ -74,6 +74,7 @@ class Checkpoint:
             The file is of another run, is damaged, is missing where it must be there, or could not be written.
         """
         self.identity = json.loads(json.dumps({"format": FORMAT, **identity}))
+        remove_parts(self.file)
         if self.resume is False:
             return
         try:

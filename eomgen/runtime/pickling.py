@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
 from ..errors import ToolchainError, UsageError
+from ..files.entry import MANIFEST, read_entry
+from ..files.ownership import read_trusted, require_trusted
+from ..files.source import load_source
 from ..numeric.scales import Array
 from .late import LateCore, eager
 
@@ -57,7 +60,7 @@ def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: 
     Raises
     ------
     ToolchainError
-        The file of its code is gone.
+        The file of its code is gone or damaged, or another user could have written it.
     """
     core: Any = _find_core(name, file)
     if late is None:
@@ -81,17 +84,26 @@ def _find_core(name: str, file: str) -> ModuleType:
     except ModuleNotFoundError:
         pass
     path = Path(file)
-    compiled = path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES))
-    loader = machinery.ExtensionFileLoader(name, file) if compiled else machinery.SourceFileLoader(name, file)
+    try:
+        if (path.parent / MANIFEST).exists():
+            read_entry(path.parent)
+        require_trusted(path)
+        if not path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES)):
+            source = load_source(name, file, read_trusted(path))
+            TEXTS[name] = source
+            return source
+    except (OSError, ValueError) as error:
+        what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
+        raise ToolchainError(
+            f"the compiled code of the pickled module is {what}: {file}; compile the model again"
+        ) from error
+    loader = machinery.ExtensionFileLoader(name, file)
     spec = util.spec_from_file_location(name, file, loader=loader)
     assert spec is not None
-    core = util.module_from_spec(spec) if path.is_file() else None
-    if core is None:
-        raise ToolchainError(f"the compiled code of the pickled module is gone: {file}; compile the model again")
+    core = util.module_from_spec(spec)
     loader.exec_module(core)
-    if compiled:
-        core.offer_lanes(partial(_find_lanes, path))
-    (sys.modules if compiled else TEXTS)[name] = core
+    core.offer_lanes(partial(_find_lanes, path))
+    sys.modules[name] = core
     return core
 
 
