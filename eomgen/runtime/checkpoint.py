@@ -80,7 +80,7 @@ class Checkpoint:
         try:
             found = read_arrays(self.file, compressed=False)
             header = json.loads(found.pop("header").tobytes())
-            if header["format"] != FORMAT:
+            if header["format"] != FORMAT or any(array.dtype.kind == "U" for array in found.values()):
                 raise ValueError("another format")
         except FileNotFoundError:
             if self.resume:
