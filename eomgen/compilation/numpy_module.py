@@ -8,8 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ToolchainError
-from ..files.source import load_source
-from ..runtime.pickling import TEXTS
+from ..files.source import find_module, load_source
 from .cache import Cache, cache_directory, compute_key
 
 SOURCE = "_core.py"
@@ -36,16 +35,13 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if not twins and (loaded := TEXTS.get(module_name)) is not None:
+    if not twins and (loaded := find_module(module_name)) is not None:
         return loaded
     try:
         path = str(_cached(key, name, text))
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
         path = f"<{module_name}>"
-    module = load_source(module_name, path, text.encode(), twins)
-    if not twins:  # other twins make another module of the same text
-        TEXTS[module_name] = module
-    return module
+    return load_source(module_name, path, text.encode(), twins)
 
 
 def _cached(key: str, name: str, text: str) -> Path:

@@ -18,6 +18,15 @@ from ..errors import ToolchainError
 #: What link-time optimisation writes in the place of code: its strings are found only after linking.
 DEFERRED = (b".gnu.lto_", b"BC\xc0\xde", b"\xde\xc0\x17\x0b")
 ELF = b"\x7fELF"
+#: Kept by compilers, and by linkers that collect what nobody calls.
+STAMP = """\
+#if defined __has_attribute
+#if __has_attribute(retain)
+__attribute__((retain))
+#endif
+#endif
+__attribute__((used)) static const char eomgen_stamp[] = "{}";
+"""
 
 
 def stamp(key: str, name: str) -> bytes:
@@ -28,7 +37,7 @@ def stamp(key: str, name: str) -> bytes:
 def write_stamp(directory: Path, key: str, name: str) -> list[str]:
     """Write the header that puts a stamp into an object file; returns the flags that include it."""
     header = f"{name}.stamp.h"
-    text = f'static const char eomgen_stamp[] __attribute__((used)) = "{stamp(key, name).decode()}";\n'
+    text = STAMP.format(stamp(key, name).decode())
     (directory / header).write_text(text, encoding="ascii")
     return ["-include", header]
 

@@ -14,7 +14,8 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import Events, warn_of_unknown
-from .integrate import KEPT, WORDS, Solution
+from .integrate import KEPT, Solution
+from .integrate import MESSAGES as WORDS
 from .names import check_names
 from .signals import Forcing
 from .tolerances import check_tolerances

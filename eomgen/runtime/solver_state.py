@@ -1,24 +1,19 @@
 """Stage runtime: one of SciPy's solvers between two steps <-> numbers, so that another of its class goes on from there.
 
-A run by SciPy that keeps a checkpoint is cut where one is due: the solver says that it has finished, and the next one
-takes over what it held.  The same steps follow, to the last bit.
+The same steps follow, to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
-from ..numeric.scales import Array
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
-    from .events import Event
-    from .resets import Resets
 
 _COMMON = ("t", "t_old", "y", "h_abs", "nfev", "njev", "nlu")
 _RUNGE_KUTTA = (*_COMMON, "y_old", "f", "h_previous")
@@ -29,11 +24,13 @@ STATE = {
     "Radau": (*_NEWTON, "y_old", "f", "Z", "current_jac", "LU_real", "LU_complex"),
     "BDF": (*_NEWTON, "D", "order", "n_equal_steps", "LU"),
 }  # fmt: skip
+RESULTS = ("x", "asked", "walked_t", "walked_x")
+CROSSING = ("g", "slope", "slope_new", "size", "leaving", "touch", "resets", "crowded", "last")
 _WHOLE = ("nfev", "njev", "nlu", "order", "n_equal_steps")
 
 
 class Pause:
-    """Cuts a run where a checkpoint is due, and keeps what goes on from there.
+    """Keeps a run by one of SciPy's solvers in a checkpoint.
 
     Parameters
     ----------
@@ -61,83 +58,69 @@ class Pause:
                 "give t_eval, or take DOP853, RK45, RK23 or Radau in compiled code"
             )
         self.checkpoint, self.names, self.carried = checkpoint, STATE[name], dict[str, Any]()
-        self.due, self.cut = perf_counter() + checkpoint.every, False
+        self.due = perf_counter() + checkpoint.every
 
-    def begin(self, solver: Any) -> None:
-        """Give a new solver the state of the one before."""
+    def thaw(self, solver: Any) -> None:
+        """Give a new solver the state of the one that was kept."""
         for name, value in self.carried.items():
             setattr(solver, name, value)
         if self.carried.get("Z") is not None:  # Radau goes on from the polynomial of its last step
             solver.sol = solver._compute_dense_output()
-        self.carried, self.cut = {}, False
+        self.carried = {}
 
-    def look(self, solver: Any) -> None:
-        """Cut the run after a step, if it is time."""
-        if solver.status == "running" and perf_counter() >= self.due:
-            self.carried = {name: getattr(solver, name) for name in self.names}
-            solver.status, self.cut = "finished", True
-
-    def keep(
-        self, paths: Sequence[Any], found: Sequence[Any], counts: dict[str, int], events: Sequence[Event],
-        resets: Resets, at: tuple[Array, int, float, int],
-    ) -> None:  # fmt: skip
-        """Write what the run and its solver hold: times, states and walked steps; times and states of events; the state
-        from which the part after `k` corners goes on at a time; and the status."""
-        (times, states, walked), (x, k, start, status) = paths, at
-        for parts, axis in ((times, 0), (states, 1)):
-            parts[:] = [np.concatenate(parts, axis=axis)] if parts else []
+    def save(self, journey: Any, k: int, solver: Any = None, ended: int = 2) -> None:
+        """Write a journey after a step in the part after `k` corners, or one that has ended with a status."""
+        n, walked, found = len(journey.x), journey.walked, journey.crossings
         kept = {
-            "times": times[0], "states": states[0], "x": x, "counts": np.array(list(counts.values())),
-            "place": np.array([k, status], dtype=np.int64), "start": np.array(start),
+            "x": journey.x, "place": np.array([k, ended, journey.kept], dtype=np.int64), "start": np.array(journey.t),
+            "counts": np.array(list(journey.counts.values())), "asked": np.array(journey.asked).reshape(-1, n),
             "walked_t": np.array([t for t, _ in walked]),
-            "walked_x": np.array([state for _, state in walked]).reshape(len(walked), len(x)),
-            **_freeze_events(events, resets),
+            "walked_x": np.array([x for _, x in walked]).reshape(len(walked), n),
         }  # fmt: skip
-        for e in range(len(events)):
-            kept[f"t_events_{e}"] = np.concatenate([np.empty(0), *found[0][e]])
-            kept[f"x_events_{e}"] = np.concatenate([np.empty((len(x), 0)), *found[1][e]], axis=1)
-        for name, value in self.carried.items():
+        if found is not None:
+            kept |= {name: np.array(getattr(found, name), dtype=float) for name in CROSSING}
+            kept["known"] = np.array([event.known for event in found.events], dtype=bool)
+            for e, (t, x) in enumerate(zip(found.t, found.x, strict=True)):
+                kept[f"t_events_{e}"], kept[f"x_events_{e}"] = np.array(t, dtype=float), np.array(x).reshape(len(t), n)
+        for name in self.names if solver is not None else ():
+            value = getattr(solver, name)
             own = value if isinstance(value, tuple) else () if value is None else (value,)
             kept |= {f"solver_{name}_{i}": np.asarray(part) for i, part in enumerate(own)}
         self.checkpoint.save(kept)
         self.due = perf_counter() + self.checkpoint.every
 
-    def go_on(
-        self, paths: Sequence[Any], found: Sequence[Any], counts: dict[str, int], events: Sequence[Event],
-        resets: Resets, corners: int,
-    ) -> tuple[Array, int, float, int]:  # fmt: skip
-        """Fill what :meth:`keep` wrote into the same lists, and return the state, the part, the time and the status.
+    def go_on(self, journey: Any, corners: int) -> tuple[int, int]:
+        """Give a journey what was kept, and return its part and its status, 2 on the way.
 
         Raises
         ------
-        ValueError, KeyError, TypeError, IndexError
+        UsageError
             It cannot be of such a run.
         """
-        kept: dict[str, Any] = self.checkpoint.kept or {}
-        times, states, x = (np.asarray(kept[name], dtype=float) for name in ("times", "states", "x"))
-        k, status = kept["place"].tolist()
-        t_walked, x_walked = kept["walked_t"], kept["walked_x"]
-        if states.shape != (len(x), *times.shape) or x_walked.shape != (len(t_walked), len(x)):
+        try:
+            return self._go_on(journey, corners, self.checkpoint.kept or {})
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise self.checkpoint.damaged(error) from None
+
+    def _go_on(self, journey: Any, corners: int, kept: dict[str, Any]) -> tuple[int, int]:
+        n, found = len(journey.x), journey.crossings
+        k, ended, journey.kept = kept["place"].tolist()
+        x, asked, t_walked, x_walked = (np.asarray(kept[name], dtype=float) for name in RESULTS)
+        if x.shape != (n,) or asked.shape[1:] != (n,) or x_walked.shape != (*t_walked.shape, n):
             raise ValueError("results that do not fit each other")
-        if not (0 <= k < corners and status in (0, 1, 2)):
+        if not (0 <= k < corners and ended in (0, 1, 2)) or len(asked) > len(journey.t_eval if asked.size else asked):
             raise ValueError("a place that is not there")
-        paths[0].append(times)
-        paths[1].append(states)
-        paths[2].extend(zip(t_walked.tolist(), x_walked, strict=True))
-        for e in range(len(events)):
-            t, columns = kept[f"t_events_{e}"], kept[f"x_events_{e}"]
-            if columns.shape != (len(x), *t.shape):
-                raise ValueError("events that do not fit each other")
-            found[0][e].append(t)
-            found[1][e].append(columns)
-        counts |= zip(counts, kept["counts"].tolist(), strict=True)
-        _thaw_events(kept, events, resets)
-        if status == 2:  # under way
-            self.restore(kept, len(x))
-        return x, k, float(kept["start"]), status
+        journey.x, journey.t, journey.asked = x, float(kept["start"]), list(asked)
+        journey.walked = list(zip(t_walked.tolist(), x_walked, strict=True))
+        journey.counts |= zip(journey.counts, kept["counts"].tolist(), strict=True)
+        if found is not None:
+            _thaw_crossings(found, kept, n)
+        if ended == 2:
+            self.restore(kept, n)
+        return k, ended
 
     def restore(self, kept: dict[str, Any], n: int) -> None:
-        """Take what :meth:`keep` wrote of the solver.
+        """Take what :meth:`save` wrote of the solver.
 
         Raises
         ------
@@ -169,21 +152,16 @@ class Pause:
             raise ValueError("order must be 1 to 5")
 
 
-def _freeze_events(events: Sequence[Event], resets: Resets) -> dict[str, Any]:
-    """What the loop knows of its events."""
-    left = [event.left or (np.nan, np.nan) for event in events]
-    return {
-        "terminal": np.array([event.terminal for event in events], dtype=np.int64),
-        "known": np.array([event.known for event in events], dtype=bool),
-        "left": np.array(left, dtype=float).reshape(len(events), 2),
-        "resets": np.array([resets.count, resets.crowded, resets.last], dtype=float),
-    }
-
-
-def _thaw_events(kept: dict[str, Any], events: Sequence[Event], resets: Resets) -> None:
-    """Take back what :func:`_freeze_events` gave."""
-    count, crowded, last = kept["resets"].tolist()
-    resets.count, resets.crowded, resets.last = int(count), int(crowded), last
-    rows = zip(events, kept["terminal"].tolist(), kept["known"].tolist(), kept["left"].tolist(), strict=True)
-    for event, terminal, known, (t, side) in rows:
-        event.terminal, event.known, event.left = terminal, known, None if t != t else (t, side)
+def _thaw_crossings(found: Any, kept: dict[str, Any], n: int) -> None:
+    for name in CROSSING:
+        value = np.asarray(kept[name], dtype=float)
+        if value.shape != np.shape(getattr(found, name)):
+            raise ValueError(f"{name} has shape {value.shape}")
+        whole = name in ("leaving", "touch", "resets", "crowded")
+        plain = value.astype(np.int64).tolist() if whole else value if value.ndim else float(value)
+        setattr(found, name, plain)
+    for e, (event, known) in enumerate(zip(found.events, kept["known"].tolist(), strict=True)):
+        t, x = (np.asarray(kept[f"{name}_events_{e}"], dtype=float) for name in "tx")
+        if x.shape != (*t.shape, n):
+            raise ValueError("events that do not fit each other")
+        event.known, found.t[e], found.x[e] = known, t.tolist(), list(x)

@@ -32,6 +32,8 @@ cdef extern from "eomgen_loop.h" nogil:
         double *bracket
         int *whose
         int *fired
+        int *touch
+        int crowd
         double *latest
         double last_reset
         int crowded
@@ -87,11 +89,12 @@ cdef class Dense:
         cdef int n = self.run.n
         cdef cnp.ndarray result = rows(k, n)
         cdef double *piece
+        cdef eomgen_run run = self.run  # of this call: threads may share the object
         for i in range(k):
             piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
                 3 + n * (1 + self.method.rows_F))
-            self.run.t_old, self.run.step, self.run.y_old, self.run.F = piece[0], piece[1], piece + 3, piece + 3 + n
-            self.method.interpolate(&self.run, (<double *>cnp.PyArray_DATA(at))[i],
+            run.t_old, run.step, run.y_old, run.F = piece[0], piece[1], piece + 3, piece + 3 + n
+            self.method.interpolate(&run, (<double *>cnp.PyArray_DATA(at))[i],
                                     <double *>cnp.PyArray_DATA(result) + i * n)
         return np.ascontiguousarray(result.T)
 
@@ -107,8 +110,8 @@ cdef class Journey(Stepper):
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
         trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
         tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
-        resets: rows (event, state) of the model's kernel; keep: (seconds, function), called about so often, between
-        two steps, with what freeze gives; or None.
+        resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many; keep: (seconds, function),
+        called about so often, between two steps, with what freeze gives; or None.
 
     Attributes
     ----------
@@ -158,10 +161,10 @@ cdef class Journey(Stepper):
         self.held.append(array)
         return cnp.PyArray_DATA(<cnp.ndarray>array)
 
-    def expect(self, int model, tape, outside, direction, most, action, resets):
+    def expect(self, int model, tape, outside, direction, most, action, resets, int crowd):
         cdef eomgen_events *ev = &self.events
         cdef int n = len(direction), n_resets = len(resets)
-        ev.n, ev.n_model, ev.n_resets = n, model, n_resets
+        ev.n, ev.n_model, ev.n_resets, ev.crowd = n, model, n_resets, crowd
         if model:
             ev.values = MODEL.kernels[find("events", ValueError)].call
         if n_resets:
@@ -187,8 +190,8 @@ cdef class Journey(Stepper):
         ev.size, ev.trial, ev.latest = numbers + 4 * n, numbers + 5 * n, numbers + 6 * n
         ev.bracket, ev.y = numbers + 7 * n, numbers + 15 * n
         ev.count = <long *>self.work(n, np.dtype("l"))
-        cdef int *whole = <int *>self.work(4 * n, np.intc)
-        ev.leaving, ev.fired, ev.whose = whole, whole + n, whole + 2 * n
+        cdef int *whole = <int *>self.work(5 * n, np.intc)
+        ev.leaving, ev.fired, ev.touch, ev.whose = whole, whole + n, whole + 2 * n, whole + 3 * n
         self.journey.events = ev
 
     cdef allocate(self, long room):

@@ -160,6 +160,8 @@ def damaged_kept(work: Work, fast: bool) -> Iterator[Result]:
             else:
                 places = [*sorted((cache / "shortcuts").iterdir())[:1], *sorted((cache / "templates").iterdir())[:3]]
             for place in places[:1] if fast else places:
+                if place.is_dir():  # what is kept goes on without this file
+                    place.rmdir()
                 if not place.is_file():
                     work.run(cache, WHOLE, target=target)
                 DAMAGES[name](place)

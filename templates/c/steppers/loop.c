@@ -37,7 +37,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     set_out(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
-        j->events->last_reset = NAN;
+        j->events->last_reset = (double)NAN;
         eomgen_arm(run, j->events);
     }
     store_step(run, j);
@@ -66,7 +66,7 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
     ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
     ev->last_reset = run->t;
     j->resets++;
-    return eomgen_depart(run, ev) || ev->crowded >= (2 * ev->n > RUNS_CROWD ? 2 * ev->n : RUNS_CROWD) ? EOMGEN_ZENO : 0;
+    return eomgen_depart(run, ev) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */
@@ -104,7 +104,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     double t = run->t;
     const int stop = j->events != NULL ? eomgen_find_events(method, run, j, &t) : 0;
     if (stop < 0) {
-        return EOMGEN_STOPPED;
+        return stop == -1 ? EOMGEN_STOPPED : EOMGEN_ZENO;
     }
     if (j->pieces_room > 0) {
         keep_piece(method, run, j, t);
@@ -122,6 +122,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         eomgen_between(method, run, t, j->events->y);
         memcpy(run->y, j->events->y, (size_t)run->n * sizeof(double));
         run->t = t;
+        eomgen_arrive(run, j->events);
     }
     store_step(run, j);
     if (stop == 2) {
@@ -159,5 +160,8 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
             eomgen_start(method, run);
         }
     }
-    return run->stopped ? EOMGEN_STOPPED : EOMGEN_END;
+    if (run->stopped) {
+        return EOMGEN_STOPPED;
+    }
+    return EOMGEN_END;
 }
