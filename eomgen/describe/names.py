@@ -7,6 +7,8 @@ import re
 import sys
 from collections.abc import Iterable
 
+from ..graph.shown import quoted
+
 #: Functions an expression may call, with the least and the greatest number of arguments.
 FUNCTIONS: dict[str, tuple[int, int]] = {
     "sin": (1, 1),
@@ -88,9 +90,9 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         None if the name can be used.
     """
     if not isinstance(name, str):
-        return f"{name!r} is not a name", IDENTIFIER_RULE
+        return f"{quoted(name)} is not a name", IDENTIFIER_RULE
     if not _IDENTIFIER.match(name):
-        return f"{name!r} is not an identifier", IDENTIFIER_RULE
+        return f"{quoted(name)} is not an identifier", IDENTIFIER_RULE
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
     if keyword.iskeyword(name):

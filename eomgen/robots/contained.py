@@ -69,7 +69,7 @@ class Folder:
                 return element.problem(path, message, remedy)
             if os.path.isfile(place):
                 return place
-        return element.problem(path, f"{name!r} cannot be read: there is no such file", remedy) if needed else ""
+        return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy) if needed else ""
 
     def read(self, element: Element, path: str, most: int) -> bytes:
         """The bytes of a file that :meth:`find` found.

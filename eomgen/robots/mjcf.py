@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError, UsageError
+from ..limits.files import LARGEST
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf
@@ -65,11 +66,12 @@ class _Reader:
         return any(self.m.opt.disableflags & self.m.flags.get(flag, 0) for flag in flags)
 
     def _check(self) -> None:
-        """Refuse numbers that are not finite, which MuJoCo takes."""
+        """Refuse numbers that are not finite or far too large, which MuJoCo takes."""
         for key, what in FINITE.items():
             values = getattr(self.m.opt if key == "gravity" else self.m, key, 0.0)
-            if not np.isfinite(values).all():
-                problem = self.root.problem("mujoco", f"{what} ({key}) come out not finite", "give smaller numbers")
+            if not (np.abs(values) <= LARGEST).all():
+                remedy = f"at most {LARGEST:g}, so that products stay finite"
+                problem = self.root.problem("mujoco", f"{what} ({key}) come out too large or not finite", remedy)
                 self.robot.problems.append(problem)
         if self.robot.problems:
             raise ModelError(self.robot.problems)

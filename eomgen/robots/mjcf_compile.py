@@ -69,7 +69,7 @@ def _why(answer: dict[str, Any]) -> tuple[str, str]:
     if "memory" in answer:
         return f"MuJoCo needs more memory for it than the {MEMORY / 1e9:g} GB it may have", _SMALLER
     if code is None or code in (-getattr(signal, name, 0) for name in ("SIGXCPU", "SIGKILL")):
-        return f"MuJoCo needs more time for it than the {SECONDS} s it may have", _SMALLER
+        return f"MuJoCo needs more time for it than the {SECONDS} s ({WAIT} s beside other work) it may have", _SMALLER
     if code < 0:
         return f"MuJoCo crashes on it ({signal.Signals(-code).name})", "leave out parts until it loads, to find the one"
     return f"MuJoCo ends without a model (exit {code})", "leave out parts until it loads, to find the one"

@@ -187,7 +187,7 @@ NOTED = {
     "actuator_dampingpoly": ("DAMPER", "the parts of dampers of actuators that are not linear"),
     "actuator_delay": ("ACTUATION", "the delays of actuators"),
 }
-#: Field that is read -> what it holds, which must be finite; ranges may be infinite.
+#: Field that is read -> what it holds, which must be no larger than LARGEST; ranges may be infinite.
 FINITE = {
     "gravity": "the components of gravity",
     "body_mass": "masses",

@@ -65,6 +65,8 @@ class Text:
             if 0 < int(number) <= len(self.places):
                 place = place or self.places[int(number) - 1]
         text = _LINE.sub(lambda found: self._back(int(found[1]), root.file), said)
+        for path, made in self.names.items():
+            text = text.replace(f"'{made}'", f"'{os.path.basename(path)}'")
         problem = root.problem("mujoco", f"MuJoCo refuses it: {text}")
         return ModelError([problem._replace(file=place[0], line=place[1]) if place else problem])
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import MissingDependencyError, ModelError, Problem
-from ..limits.files import ATTRIBUTES, DEPTH, ELEMENTS, LONGEST, SIZE
+from ..limits.files import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 
 
 @dataclass
@@ -77,6 +77,10 @@ def parse_xml(data: bytes, file: str) -> Element:
     from xml.sax import SAXException, SAXParseException
     from xml.sax.xmlreader import InputSource
 
+    longest = max(map(len, data.split(b">")))
+    if longest > PIECE:  # expat would read it again and again
+        message = f"has a tag, a comment or a text of {longest:,} bytes"
+        raise ModelError([Problem("file", message, f"at most {PIECE:,} from one '>' to the next", file, 1)])
     parser = DefusedExpatParser(forbid_dtd=True, forbid_entities=True, forbid_external=True)
     handler = _handler(parser, file)
     parser.setContentHandler(handler)
@@ -109,7 +113,7 @@ def _handler(parser: Any, file: str) -> Any:
             super().__init__()
             self.root: Element | None = None
             self.open: list[Element] = []
-            self.count = self.given = 0
+            self.count = 0
 
         def stop(self, message: str, remedy: str) -> ModelError:
             return ModelError([Problem("file", message, remedy, file, parser.getLineNumber() or 1)])
@@ -121,9 +125,6 @@ def _handler(parser: Any, file: str) -> Any:
             if len(self.open) >= DEPTH:
                 raise self.stop("is nested too deeply", f"at most {DEPTH} levels")
             given = dict(attributes.items())
-            self.given += len(given)
-            if self.given > ATTRIBUTES:
-                raise self.stop("has too many attributes", f"at most {ATTRIBUTES:,}")
             if any(len(value) > LONGEST for value in given.values()):
                 raise self.stop("has an attribute that is too long", f"at most {LONGEST:,} characters")
             element = Element(tag, given, file, parser.getLineNumber() or 1)
