@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from html import escape
 
 #: Characters of the generated lines that hold a comment or a literal.
 WIDTH = 114
@@ -120,6 +119,8 @@ def markdown_code(text: str) -> str:
 
 def html_text(text: str) -> str:
     """The inside of an element or of an attribute in quotes, of HTML, XML and SVG."""
+    from html import escape  # slow to import
+
     return escape(visible(text), quote=True)
 
 
