@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from .equations import TreeEquations
 from .equations.reduction import reduce_to_independent
@@ -16,6 +17,7 @@ from .kinematics.mobility import Mobility
 from .kinematics.report import MechanismReport, report
 from .kinematics.state import acceleration_name
 from .records import dataclass
+from .texts import html_text
 
 if TYPE_CHECKING:
     from .program.choice import Choice
@@ -53,6 +55,17 @@ class Equations:
     tree: TreeEquations = field(repr=False)
     seconds: dict[str, float] = field(default_factory=dict, repr=False)
     choice: Choice | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        vars(self)["_derived"] = deepcopy((self.kinematics, self.mobility, self.tree))
+
+    def fresh(self) -> tuple[Kinematics, Mobility, TreeEquations]:
+        """A copy of what was derived, in a graph of its own, as it was before anyone read or compiled anything.
+
+        Whatever is made of expressions adds nodes to their graph, whose numbers decide on the order of sums, factors
+        and statements.  What is built from such a copy depends on the model alone.
+        """
+        return deepcopy(cast("tuple[Kinematics, Mobility, TreeEquations]", vars(self)["_derived"]))
 
     @property
     def name(self) -> str:
@@ -208,9 +221,7 @@ class Equations:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
+        return f"<pre>{html_text(str(self))}</pre>"
 
     def _repr_latex_(self) -> str | None:
         from .graph.sympy_raise import inlined_size

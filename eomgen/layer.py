@@ -25,6 +25,7 @@ LAYER = {
     "_lanes.pxi": ("cython/_lanes.pxi",),
     "_steppers.pxi": ("cython/_steppers.pxi",),
     "_journeys.pxi": ("cython/_journeys.pxi",),
+    "_frozen.pxi": ("cython/_frozen.pxi",),
     "_integrators.pxi": ("cython/_integrators.pxi",),
     "_ensembles.pxi": ("cython/_ensembles.pxi",),
     "eomgen_steppers.h": ("c/steppers/eomgen_steppers.h",),

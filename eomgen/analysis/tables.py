@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 from ..limits.descriptions import SHOWN_COMPLEX
+from ..texts import html_table
 
 
 def number(value: complex, digits: int = 6) -> str:
@@ -24,8 +24,4 @@ def as_text(title: str, facts: Sequence[tuple[str, str]]) -> str:
 
 def as_html(title: str, facts: Sequence[tuple[str, str]]) -> str:
     """A small table."""
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(label)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
-        for label, value in facts
-    )
-    return f"<b>{escape(title)}</b><table>{rows}</table>"
+    return html_table(title, facts)

@@ -9,7 +9,7 @@ import click
 
 from .failures import reports_failures
 from .options import json_option
-from .screen import print_json, print_table, readable_size
+from .screen import print_json, print_table, readable_size, say
 
 if TYPE_CHECKING:
     from ..compilation import Cache
@@ -55,7 +55,7 @@ def show(as_json: bool) -> None:
         ]
         print_json({"directory": str(kept.root), "size": size, "entries": listed})
         return
-    click.echo(f"{kept.root}: {len(entries)} entries, {readable_size(size)}")
+    say(f"{kept.root}: {len(entries)} entries, {readable_size(size)}")
     if entries:
         rows = [[e.name, e.kind, readable_size(e.size), _ago(e.used), e.key[:12]] for e in entries]
         print_table(["model", "kind", "size", "used", "key"], rows, right=[2, 3])
@@ -79,7 +79,7 @@ def prune(older_than: float | None, max_size: float | None, as_json: bool) -> No
     if as_json:
         print_json({"directory": str(kept.root), "removed": [entry.key for entry in removed], "freed": freed})
         return
-    click.echo(f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}")
+    say(f"{kept.root}: removed {len(removed)} entries, {readable_size(freed)}")
 
 
 @cache.command()
@@ -92,7 +92,7 @@ def clear(as_json: bool) -> None:
     if as_json:
         print_json({"directory": str(kept.root), "removed": removed})
         return
-    click.echo(f"{kept.root}: removed {removed} entries")
+    say(f"{kept.root}: removed {removed} entries")
 
 
 def _ago(moment: float) -> str:

@@ -9,7 +9,7 @@ import click
 
 from .failures import reports_failures
 from .options import json_option, load_model, model_argument, native_option, robot_options
-from .screen import print_json
+from .screen import print_json, say
 
 
 def _print_schema(context: click.Context) -> None:
@@ -52,6 +52,6 @@ def check(model: Path, allow_native: bool, as_json: bool, graph: Path | None, ro
     if as_json:
         print_json(report.to_dict())
     else:
-        click.echo(str(report))
+        say(str(report))
         if graph is not None:
-            click.echo(f"wrote {graph}")
+            say(f"wrote {graph}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from importlib import import_module
 
 import click
 
+from ..texts import visible
 from .failures import USAGE
 
 #: verb -> what it does; the file of the same name in this folder holds the command of the same name.
@@ -82,13 +84,29 @@ def eomgen() -> None:
     """Equations of motion of mechanisms: derived, compiled, simulated."""
 
 
+def _check_words(words: Sequence[str]) -> None:
+    """Refuse what cannot be part of a file's name; no file system takes it."""
+    for word in words:
+        try:
+            bad = b"\0" in os.fsencode(word)
+        except UnicodeEncodeError:
+            bad = True
+        if bad:
+            raise click.UsageError(f"{word!a:.80} holds a character that no command line can; write it without")
+
+
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Parse and run a command line; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):  # where the terminal has no such characters, their numbers are shown
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
+        _check_words(words)
         code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read
+        vars(error)["message"] = visible(error.message)
         error.show()
         return USAGE
     except (click.Abort, KeyboardInterrupt):

@@ -10,7 +10,7 @@ import click
 from ..files.writing import write_whole
 from .failures import reports_failures
 from .options import json_option, load_model, model_argument, require_folder, robot_options
-from .screen import print_json
+from .screen import print_json, say
 
 
 @click.command()
@@ -34,6 +34,6 @@ def convert(model: Path, out: Path | None, as_json: bool, robot: dict[str, Any])
         notes, renamed = list(described.notes), described.renamed
         print_json({"name": described.name, "file": str(out) if out else None, "notes": notes, "renamed": renamed})
     elif out is not None:
-        click.echo(str(out))
+        say(str(out))
     else:
         click.echo(text, nl=False)

@@ -19,7 +19,7 @@ from .options import (
     native_option,
     robot_options,
 )
-from .screen import print_heading, print_json, print_table, stage
+from .screen import print_heading, print_json, print_table, say, stage
 
 if TYPE_CHECKING:
     from ..derivation import Equations
@@ -57,7 +57,7 @@ def derive(
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))
         return
-    click.echo(str(derived.report))
+    say(str(derived.report))
     print_operations(derived)
     if equations:
         print_equations(written(derived))
@@ -84,10 +84,10 @@ def print_operations(derived: Equations) -> None:
         for name, c in derived.operations.items()
     ]
     if derived.choice:
-        click.echo(str(derived.choice))
+        say(str(derived.choice))
     if derived.system_size:
         unknowns, entries = derived.system_size
-        click.echo(f"a linear system of {unknowns} unknowns with {entries} entries that do not vanish")
+        say(f"a linear system of {unknowns} unknowns with {entries} entries that do not vanish")
     header = ["", "multiply", "add", "divide", "total", "functions"]
     print_table(header, rows, right=range(1, len(header)))
 
@@ -106,9 +106,9 @@ def print_equations(text: dict[str, Any]) -> None:
     """Equations as :func:`written` gives them, one entry a line."""
     print_heading(f"mass_matrix * [{', '.join(text['accelerations'])}] = force")
     for name, expression in text["intermediates"].items():
-        click.echo(f"  {name} = {expression}")
+        say(f"  {name} = {expression}")
     for i, row in enumerate(text["mass_matrix"]):
         for j, entry in enumerate(row[: i + 1]):
-            click.echo(f"  mass_matrix[{i}, {j}] = {entry}")
+            say(f"  mass_matrix[{i}, {j}] = {entry}")
     for i, entry in enumerate(text["force"]):
-        click.echo(f"  force[{i}] = {entry}")
+        say(f"  force[{i}] = {entry}")

@@ -15,9 +15,10 @@ import click
 
 from ..errors import EomgenError
 from ..limits.constraints import UNMOVED
+from ..texts import visible
 from .failures import TOOLCHAIN, reports_failures
 from .options import json_option
-from .screen import print_json, readable_size
+from .screen import print_json, readable_size, say
 
 CORE = ("sympy", "numpy", "scipy", "cython", "jinja2", "click", "rich", "ruamel.yaml", "platformdirs", "defusedxml")
 #: extra -> (what it is for, its packages besides those that are always needed)
@@ -56,10 +57,10 @@ def doctor(as_json: bool) -> None:
         width = max(len(f.name) for f in findings) + 2
         for f in findings:
             mark = click.style("ok", fg="green") if f.ok else click.style("!!" if f.needed else "--", fg="yellow")
-            click.echo(f"{mark}  {f.name:<{width}}{f.detail}")
+            click.echo(f"{mark}  " + visible(f"{f.name:<{width}}{f.detail}"))
             if not f.ok:
-                click.echo("\n".join(" " * (width + 4) + line for line in f.remedy.splitlines()))
-        click.echo("all that is needed works" if well else "something that is needed does not work")
+                say("\n".join(" " * (width + 4) + line for line in f.remedy.splitlines()))
+        say("all that is needed works" if well else "something that is needed does not work")
     if not well:
         sys.exit(TOOLCHAIN)
 

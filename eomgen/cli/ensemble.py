@@ -14,7 +14,7 @@ from ..files.writing import save_figure, write_whole
 from ..runtime.names import require
 from .analysis import Prepared, analysis_options
 from .options import require_folder
-from .screen import finite, print_heading, print_json, print_table, stage
+from .screen import finite, print_heading, print_json, print_table, say, stage
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -104,11 +104,11 @@ def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], 
     lines = [[name, *(f"{x:.6g}" for x in row.values())] for name, row in table.items()]
     print_table(["at the end", "mean", "deviation", "least", "greatest"], lines, right=range(1, 5))
     for failure in failures[:SHOWN]:
-        click.echo(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
+        say(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
     if len(failures) > SHOWN:
-        click.echo(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+        say(f"... and {len(failures) - SHOWN} more of {found.count} failed")
     for file in files:
-        click.echo(f"wrote {file}")
+        say(f"wrote {file}")
 
 
 def _even(end: float, count: int) -> list[float]:

@@ -6,7 +6,7 @@ import click
 
 from .analysis import Prepared, analysis_options, pairs, time_option
 from .options import parse_settings
-from .screen import print_json
+from .screen import print_json, say
 
 
 @click.command()
@@ -29,4 +29,4 @@ def equilibrium(work: Prepared, t: float, hold: tuple[str, ...], unknown: tuple[
             | {"eigenvalues": pairs(found.eigenvalues), "stability": found.stability}
         )
         return
-    click.echo(repr(found))
+    say(repr(found))

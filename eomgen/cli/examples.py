@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..files.writing import write_whole
 from .failures import reports_failures
 from .options import json_option
-from .screen import print_json, print_table
+from .screen import print_json, print_table, say
 
 
 def example_files() -> dict[str, Traversable]:
@@ -60,14 +60,14 @@ def examples(name: str | None, force: bool, as_json: bool) -> None:
             print_json({"examples": [{"name": key, "file": file, "doc": doc} for key, file, doc in rows]})
             return
         print_table(["example", "what it is"], [[key, doc] for key, _, doc in rows])
-        click.echo("copy one here:  eomgen examples NAME")
+        say("copy one here:  eomgen examples NAME")
         return
     target = _copy(name, found, force)
     if as_json:
         print_json({"file": str(target)})
         return
-    click.echo(str(target))
-    click.echo(f"next:  {'python' if target.suffix == '.py' else 'eomgen run'} {target}", err=True)
+    say(str(target))
+    say(f"next:  {'python' if target.suffix == '.py' else 'eomgen run'} {target}", err=True)
 
 
 def _copy(name: str, found: dict[str, Traversable], force: bool) -> Path:

@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-import click
-
 from ..errors import (
     EomgenError,
     EvaluationError,
@@ -101,12 +99,12 @@ def reports_failures(verb: Verb) -> Verb:
         except BrokenPipeError:
             raise
         except (EomgenError, OSError) as error:
-            if kwargs.get("as_json"):
-                from .screen import print_json
+            from . import screen
 
-                print_json(to_dict(error))
+            if kwargs.get("as_json"):
+                screen.print_json(to_dict(error))
             for line in lines_of(error, str(kwargs.get("model") or "")):
-                click.echo(line, err=True)
+                screen.say(line, err=True)
             sys.exit(exit_code(error))
 
     return wrapped  # type: ignore[return-value]

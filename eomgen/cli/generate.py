@@ -20,7 +20,7 @@ from .options import (
     robot_options,
     target_option,
 )
-from .screen import print_json, stage
+from .screen import print_json, say, stage
 
 
 @click.command()
@@ -57,6 +57,6 @@ def generate(
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})
         return
-    click.echo(str(folder))
+    say(str(folder))
     for name in files:
-        click.echo(f"  {name}")
+        say(f"  {name}")

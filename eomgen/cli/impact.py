@@ -7,7 +7,7 @@ import click
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options, time_option
 from .options import parse_settings
-from .screen import print_heading, print_json, print_rows, without_noise
+from .screen import print_heading, print_json, print_rows, say, without_noise
 
 
 @click.command()
@@ -34,7 +34,7 @@ def impact(work: Prepared, t: float, gap: tuple[str, ...], stop: tuple[str, ...]
             | {"constraints": module.constraint_labels, "constraint_impulses": found.constraint_impulses}
         )
         return
-    click.echo(repr(found))
+    say(repr(found))
     print_heading("velocities after it")
     units = [module.layout.unit(name) for name in module.v_names]
     before = found.before[module.n_q :].tolist()

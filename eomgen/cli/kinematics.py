@@ -24,7 +24,7 @@ from .options import (
     target_option,
 )
 from .run import TABLES, complete_parameters, final_names, sort_settings
-from .screen import finite, print_heading, print_json, print_rows, print_table, stage, without_noise
+from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
 from .workspace import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def kinematics(
         report |= {"motion": None if motion is None else to_dict(motion), "limits": [_limits(r) for r in found]}
         print_json(report if space is None else report | {"workspace": workspace_to_dict(space)})
         return
-    click.echo(str(equations.report))
+    say(str(equations.report))
     if motion is not None:
         print_motion(motion)
     for one in found:
@@ -144,7 +144,7 @@ def kinematics(
         print_heading(space.title)
         print_rows(space.facts)
     for file in files:
-        click.echo(f"wrote {file}")
+        say(f"wrote {file}")
 
 
 def read_range(words: str) -> tuple[str, float, float, int | None]:

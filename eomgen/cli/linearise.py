@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from .analysis import Prepared, analysis_options, pairs, time_option
-from .screen import print_heading, print_json, print_table, without_noise
+from .screen import print_heading, print_json, print_table, say, without_noise
 
 
 @click.command()
@@ -36,7 +36,7 @@ def linearise(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool
             | {"eigenvalues": pairs(found.eigenvalues), "stability": found.stability}
         )
         return
-    click.echo(repr(found))
+    say(repr(found))
     for label, matrix, columns, rows in (
         ("A", found.A, found.states, found.states),
         ("B", found.B, found.inputs, found.states),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from .analysis import Prepared, analysis_options, time_option
-from .screen import print_json
+from .screen import print_json, say
 
 
 @click.command()
@@ -34,5 +34,5 @@ def modes(work: Prepared, t: float, as_json: bool) -> None:
             | {"shapes": found.shapes, "rigid": found.rigid, "diverging": found.diverging, "damped": damped}
         )
         return
-    click.echo(repr(rest))
-    click.echo(repr(found))
+    say(repr(rest))
+    say(repr(found))

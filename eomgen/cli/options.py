@@ -229,8 +229,10 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     if allow_native:
         options["allow_native"] = True
     model = load(path, **options)
+    from .screen import say
+
     for note in model.notes:
-        click.echo(f"note: {note}", err=True)
+        say(f"note: {note}", err=True)
     return model
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..files.writing import save_figure
+from ..texts import visible
 from .plot import BELOW, BESIDE
 
 if TYPE_CHECKING:
@@ -48,8 +49,8 @@ def plot_motion(motion: KinematicAnalysis, paths: list[tuple[str, str]], file: P
         axes.grid(alpha=0.3)
         axes.legend(**BESIDE)
     if axes is not None:
-        unit = motion.units.get(over, "rad")
-        axes.set_xlabel(f"{over} ({unit})")
+        unit = visible(motion.units.get(over, "rad"), lines=False)
+        axes.set_xlabel(f"{over} ({unit})", parse_math=False)
     if paths:
         plane = figure.add_subplot(grid[:, 1])
         for first, second in paths:

@@ -13,7 +13,7 @@ from ..files.writing import whole_file
 from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
 from .options import require_folder
-from .screen import print_heading, print_json, print_table, stage
+from .screen import print_heading, print_json, print_table, say, stage
 
 COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
@@ -75,6 +75,6 @@ def reactions(work: Prepared, t: float, end: float | None, out: Path | None, as_
     ]
     print_table(["joint", *COMPONENTS], lines, right=range(1, 7))
     if marks.any():
-        click.echo("* not determined by rigid bodies: the constraints are redundant")
+        say("* not determined by rigid bodies: the constraints are redundant")
     if out is not None:
-        click.echo(f"wrote {out}")
+        say(f"wrote {out}")

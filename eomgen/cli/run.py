@@ -27,7 +27,7 @@ from .options import (
     solver_options,
     target_option,
 )
-from .screen import finite, print_heading, print_json, print_rows, stage, without_noise
+from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 
 if TYPE_CHECKING:
     from ..derivation import Equations
@@ -122,11 +122,11 @@ def run(
     if as_json:
         print_json(result)
         return
-    click.echo(str(equations.report))
+    say(str(equations.report))
     print_operations(equations)
     print_trajectory(trajectory, energy, uncounted_functions(equations) if energy and energy.work is None else ())
     for file in files:
-        click.echo(f"wrote {file}")
+        say(f"wrote {file}")
 
 
 def complete_parameters(model: Model, settings: dict[str, float]) -> None:

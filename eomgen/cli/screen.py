@@ -15,8 +15,14 @@ from typing import Any
 import click
 
 from ..limits.descriptions import SHOWN
+from ..texts import visible
 
 WIDTH = 120  #: of tables that do not go to a terminal
+
+
+def say(text: str, err: bool = False) -> None:
+    """Lines on stdout or stderr; what does not print is shown as its number, so that no text drives the terminal."""
+    click.echo(visible(text), err=err)
 
 
 def print_json(value: Any) -> None:
@@ -31,14 +37,14 @@ def _plain(value: Any) -> Any:
 
 def print_heading(text: str) -> None:
     """A heading on stdout."""
-    click.echo("\n" + click.style(text, bold=True))
+    click.echo("\n" + click.style(visible(text), bold=True))
 
 
 def print_rows(rows: Sequence[tuple[str, str]]) -> None:
     """Label and value pairs on stdout, aligned."""
     width = max((len(label) for label, _ in rows), default=0) + 2
     for label, value in rows:
-        click.echo(f"  {label:<{width}}{value}")
+        say(f"  {label:<{width}}{value}")
 
 
 def without_noise(
@@ -76,13 +82,13 @@ def print_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Seq
         ]
         return f" {'  '.join(placed)}".rstrip()
 
-    click.echo("\n" + click.style(line(header), bold=True))
-    click.echo(" " + "─" * (sum(widths) + 2 * last))
+    click.echo("\n" + click.style(visible(line(header)), bold=True))
+    say(" " + "─" * (sum(widths) + 2 * last))
     for row in rows:
         folded = textwrap.wrap(row[last], widths[last]) or [""]
-        click.echo(line([*row[:last], folded[0]]))
+        say(line([*row[:last], folded[0]]))
         for more in folded[1:]:
-            click.echo(line([*[""] * last, more]))
+            say(line([*[""] * last, more]))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import click
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options
 from .options import require_folder
-from .screen import finite, print_heading, print_json, print_table, stage
+from .screen import finite, print_heading, print_json, print_table, say, stage
 
 
 @click.command()
@@ -50,6 +50,6 @@ def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Pat
         print_heading("times of events, by")
         shown = [[f"{e.name}, t = {e.t:.6g} s", *(f"{x:.6g}" for x in e.dt)] for e in found.events]
         print_table(["", *found.names], shown, right=range(1, len(found.names) + 1))
-    click.echo(f"held at the start: {', '.join(found.held)}")
+    say(f"held at the start: {', '.join(found.held)}")
     if out is not None:
-        click.echo(f"wrote {out}")
+        say(f"wrote {out}")

@@ -8,7 +8,7 @@ import click
 
 from .analysis import Prepared, analysis_options
 from .failures import BREACH
-from .screen import print_json, stage
+from .screen import print_json, say, stage
 
 
 @click.command()
@@ -32,5 +32,5 @@ def verify(work: Prepared, states: int, seed: int, seconds: float, as_json: bool
         heading = {"name": work.equations.name, "method": work.equations.method}
         print_json(heading | found.as_dict() | {"seconds": round(found.seconds, 3)})
     else:
-        click.echo(str(found))
+        say(str(found))
     sys.exit(0 if found.ok else BREACH)

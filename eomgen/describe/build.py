@@ -11,6 +11,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.operations import FOLD
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
@@ -34,7 +35,7 @@ from .names import fault_of_model_name, nearest
 from .physical import check_bodies
 from .reading import Reader
 from .scope import Namespace
-from .sympy_face import name_of
+from .sympy_face import in_order, name_of
 
 
 def build(description: Description) -> Mechanism:
@@ -246,16 +247,15 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
     if not isinstance(given, Mapping):
         reader.wrong(section, given, "table")
         return {}
-    known = dict.fromkeys(reader.names.of(*kinds))
+    known = list(dict.fromkeys(reader.names.of(*kinds)))
     result: dict[str, Expr] = {}
-    for key, value in given.items():
-        name = name_of(key)
+    for name, value in in_order(given, known):
         path = f"{section}.{name}"
         if name in known:
             result[name] = reader.expression(path, value)
         else:
-            remedy = nearest(str(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
-            reader.faults.add(path, f"no {' or '.join(kinds)} {name!r}", remedy)
+            remedy = nearest(shown(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
+            reader.faults.add(path, f"no {' or '.join(kinds)} {quoted(name)}", remedy)
     return result
 
 
@@ -274,7 +274,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known:
-            reader.faults.add(f"independent[{k}]", f"no coordinate {name!r}", nearest(str(name), known, "coordinates"))
+            reader.faults.add(
+                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
+            )
         elif name in result:
             reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
         else:

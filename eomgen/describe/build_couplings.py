@@ -27,7 +27,7 @@ def coupling(e: Element) -> Linear | Equation | None:
         e.reader.wrong(path, given, "factors")
         return None
     terms: list[tuple[Found, Expr]] = []
-    for key, value in given.items():
+    for key, value in sorted(given.items(), key=lambda pair: str(pair[0])):  # in one order, however given
         found = e.find(f"{path}.{key}", key)
         factor = e.reader.expression(f"{path}.{key}", value)
         if found is not None:
@@ -143,7 +143,7 @@ def _wheels(e: Element, key: str) -> dict[str, Expr] | None:
     for wheel in given:
         if wheel not in WHEELS:
             e.faults.add(f"{path}.{wheel}", "unknown key", nearest(str(wheel), WHEELS, "allowed"))
-    sizes = {wheel: e.size(f"{path}.{wheel}", value) for wheel, value in given.items() if wheel in WHEELS}
+    sizes = {wheel: e.size(f"{path}.{wheel}", given[wheel]) for wheel in WHEELS if wheel in given}
     numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
     if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
         message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graph.core import Expr
+from ..graph.shown import shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import Entry
@@ -14,7 +15,7 @@ from .mechanism import Event
 from .names import QUANTITIES, nearest
 from .reading import Reader, is_number
 from .scope import quantity_of
-from .sympy_face import name_of
+from .sympy_face import in_order
 
 _LATE = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
 _ACCELERATIONS = (2, 9, 10)  #: levels of QUANTITIES
@@ -80,11 +81,10 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
         return ()
     known = list(reader.names.of("coordinate", "velocity"))
     result = []
-    for key, value in given.items():
-        name = name_of(key)
+    for name, value in in_order(given, known):
         if name in known:
             result.append((str(name), _instant(reader, f"{path}.{name}", value)))
         else:
-            remedy = nearest(str(name), known, "coordinates and velocities")
+            remedy = nearest(shown(name), known, "coordinates and velocities")
             reader.faults.add(f"{path}.{name}", f"no coordinate or velocity {name!r}", remedy)
     return tuple(result)

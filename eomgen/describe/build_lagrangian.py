@@ -7,6 +7,7 @@ from typing import Any
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
@@ -14,7 +15,7 @@ from .fields import LAGRANGIAN, MOTION
 from .mechanism import Lagrangian
 from .names import nearest
 from .reading import Reader
-from .sympy_face import name_of
+from .sympy_face import in_order, name_of
 
 
 def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str, Any] | None:
@@ -81,10 +82,11 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     """One generalized force for each coordinate; those not given are 0."""
     result = dict.fromkeys(names, reader.graph.zero)
     if isinstance(given, Mapping):
-        for key, value in given.items():
-            name = name_of(key)
+        for name, value in in_order(given, names):
             if name not in result:
-                reader.faults.add(f"{path}.{name}", f"no coordinate {name!r}", nearest(str(name), names, "coordinates"))
+                reader.faults.add(
+                    f"{path}.{name}", f"no coordinate {quoted(name)}", nearest(shown(name), names, "coordinates")
+                )
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result.values())

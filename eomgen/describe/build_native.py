@@ -7,7 +7,6 @@ Nothing is read before permission: an entry of a model file is refused unless th
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -122,10 +121,10 @@ def _listed(reader: Reader, path: str, given: Any, length: int) -> list[Any]:
 
 def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str] | None:
     """Name and text of a file."""
-    if not isinstance(given, str | os.PathLike):
-        reader.wrong(path, given, "text")
+    name = reader.file(path, given)
+    if name is None:
         return None
-    file = Path(folder) / given
+    file = Path(folder) / name
     try:
         with open(file, "rb") as stream:
             data = stream.read(SIZE + 1)

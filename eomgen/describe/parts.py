@@ -116,12 +116,11 @@ def _shape(reader: Reader, path: str, kind: str, values: Mapping[str, Any]) -> M
 
 def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | None) -> MassProperties | None:
     """The same of the solid that a mesh bounds."""
-    file = values.get("file")
-    if file is None:
+    if values.get("file") is None:
         return None
     place = f"{path}.file"
-    if not isinstance(file, str | os.PathLike):
-        reader.wrong(place, file, "file")
+    file = reader.file(place, values["file"])
+    if file is None:
         return None
     graph = reader.graph
     size = None if scale is None else reader.known(scale)
@@ -130,7 +129,7 @@ def _mesh(reader: Reader, path: str, values: Mapping[str, Any], scale: Expr | No
         reader.faults.add(f"{path}.scale", f"{size:g} {why}", "give a scale greater than 0; mirror the file itself")
         return None
     try:
-        found = measure_mesh(_locate(reader, os.fspath(file)))
+        found = measure_mesh(_locate(reader, file))
     except UsageError as error:
         reader.faults.add(place, str(error), "a mesh is a closed surface of triangles that face outwards")
         return None
@@ -152,7 +151,10 @@ def _locate(reader: Reader, file: str) -> str:
     if not model:
         return file
     folder = os.path.realpath(os.path.dirname(os.path.abspath(model)))
-    path = os.path.realpath(os.path.join(folder, file))
+    try:
+        path = os.path.realpath(os.path.join(folder, file))
+    except ValueError as error:  # NUL, or half a surrogate pair
+        raise UsageError(f"{file!r} is not the name of a file: {error}") from None
     if os.path.isabs(file) or os.path.commonpath((folder, path)) != folder:
         raise UsageError(f"{file} lies outside the folder of the model file, which a model file cannot reach")
     return path

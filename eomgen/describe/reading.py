@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,9 +17,11 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.inertia import word_of_check
+from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
@@ -69,8 +72,7 @@ class Reader:
         if value is None:
             self.faults.add(path, "has no value", f"give {KINDS[kind]}")
         else:
-            shown = repr(value)
-            self.faults.add(path, f"{shown if len(shown) < 80 else shown[:77] + '...'} is not {KINDS[kind]}")
+            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}")
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -98,7 +100,7 @@ class Reader:
                 self.faults.add(path, error.place(), error.remedy)
             return self.stand_in
         except OverflowError:
-            self.faults.add(path, f"{value!r} is not a finite number")
+            self.faults.add(path, f"{quoted(value)} is not a finite number")
             return self.stand_in
         self.wrong(path, value, "expression")
         return self.stand_in
@@ -109,18 +111,40 @@ class Reader:
         result = value
         if isinstance(value, str) or is_sympy(value):
             result = self.expression(path, value, NUMBER).value
-        if not is_number(result) or not math.isfinite(result) or (positive and result <= 0):
+        try:
+            finite = is_number(result) and math.isfinite(result)
+        except OverflowError:  # a whole number of hundreds of digits
+            finite = False
+        if not finite or (positive and result <= 0):
             if not self.faults.under(path):
                 self.wrong(path, value, kind)
             return None
         return float(result)
 
     def text(self, path: str, value: Any) -> str:
-        """A text."""
+        """A text, pairs of surrogates as the characters that they mean."""
         if not isinstance(value, str):
             self.wrong(path, value, "text")
             return ""
-        return value
+        half = lone_surrogate(value)
+        if half:
+            self.faults.add(path, f"holds {half}, half of a pair and no character", WHOLE)
+            return ""
+        return join_surrogates(value)
+
+    def file(self, path: str, value: Any) -> str | None:
+        """The name of a file; None where no file can have it."""
+        if not isinstance(value, str | os.PathLike):
+            self.wrong(path, value, "file")
+            return None
+        name = str(os.fspath(value))
+        try:
+            usable = b"\0" not in os.fsencode(name)
+        except UnicodeEncodeError:
+            usable = False
+        if not usable:
+            self.faults.add(path, f"{name!r} holds a character that no file name can", "rename the file")
+        return name if usable else None
 
     def flag(self, path: str, value: Any) -> bool:
         """True or false; True when it is neither."""
@@ -142,7 +166,7 @@ class Reader:
             return value
         shown = list(field.choices)
         remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
-        self.faults.add(path, f"{value!r} is not known", remedy)
+        self.faults.add(path, f"{quoted(value)} is not known", remedy)
         return str(field.default)
 
     # -- vectors and matrices -------------------------------------------------------------------------------------
@@ -162,7 +186,7 @@ class Reader:
             for key in value:
                 if key not in INERTIA:
                     self.faults.add(f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"))
-            given = {k: self.expression(f"{path}.{k}", v) for k, v in value.items() if k in INERTIA}
+            given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
             xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
             return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
         parts = items(value)
@@ -221,7 +245,7 @@ class Reader:
             return None
         body = value["body"]
         if not isinstance(body, str) or body not in self.bodies:
-            self.faults.add(f"{path}.body", f"no body {body!r}", nearest(str(body), self.bodies, "bodies"))
+            self.faults.add(f"{path}.body", f"no body {quoted(body)}", nearest(shown(body), self.bodies, "bodies"))
             return None
         return Marker(self.bodies[body], self.frame(path, value), label_of(value))
 
@@ -246,11 +270,11 @@ class Reader:
         if isinstance(value, str):
             if value in TURNS:
                 return TURNS[value]
-            self.faults.add(path, f"{value!r} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
             return TURNS["z"]
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.faults.add(path, f"{value!r} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
             return TURNS["z"]
         x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
         if x is None or y is None or z is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import numbers
 import os
 import re
@@ -10,7 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import UsageError
-from .description import SECTIONS, Description, items
+from ..texts import comment_text, yaml_quoted
+from .description import SECTIONS, Description, is_zero, items
 from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
 from .write_equations import with_intermediates
@@ -41,7 +41,7 @@ def yaml_text(description: Description) -> str:
         An expression or value has no form in a model file.
     """
     description = with_named_markers(description)
-    lines = [f"# {' '.join(note.split())}" for note in description.notes]
+    lines = [f"# {comment_text(note)}" for note in description.notes]
     functions = frozenset(entry.name for entry in description.sections["functions"])
     for key in MODEL:
         if key in SECTIONS:
@@ -51,7 +51,7 @@ def yaml_text(description: Description) -> str:
             if key == "equations" and isinstance(value, Mapping):
                 value = with_intermediates(value)
             if key in ("lagrangian", "equations") and value is not None:
-                lines += [f"{key}:", *(f"  {k}: {_value(v, functions)}" for k, v in value.items())]
+                lines += [f"{key}:", *(f"  {_key(k)}: {_value(v, functions)}" for k, v in value.items())]
             elif not _is_default(key, value):
                 lines.append(f"{key}: {_value(value, functions)}")
     return "\n".join(lines) + "\n"
@@ -67,7 +67,7 @@ def _section(section: str, description: Description) -> list[str]:
     for entry in entries:
         values = {key: value for key, value in entry.values.items() if not _is_default(key, value)}
         only = short is not None and list(values) == [short]
-        lines.append(f"  {entry.name}: {_value(values[short] if only and short else values, functions)}")
+        lines.append(f"  {_key(entry.name)}: {_value(values[short] if only and short else values, functions)}")
     return lines
 
 
@@ -76,8 +76,7 @@ def _is_default(key: str, value: Any) -> bool:
     if value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0):
         return True
     if key in ("com", "inertia", "gravity", "rpy"):
-        listed = items(value)
-        return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
+        return is_zero(value)
     return key == "axis" and isinstance(value, str) and value == "z"
 
 
@@ -94,7 +93,7 @@ def _value(value: Any, functions: Names) -> str:
             return _value(listed, functions)
         if is_sympy(value):
             return _sympy(value, functions)
-        from ..graph.sympy_lower import shortened
+        from ..graph.shown import shortened
 
         raise UsageError(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):
@@ -104,10 +103,16 @@ def _value(value: Any, functions: Names) -> str:
     if isinstance(value, numbers.Real):
         return str(int(value)) if isinstance(value, numbers.Integral) else repr(float(value))
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name_of(k)}: {_value(v, functions)}" for k, v in value.items()) + "}"
+        return "{" + ", ".join(f"{_key(k)}: {_value(v, functions)}" for k, v in value.items()) + "}"
     if value and all(isinstance(x, tuple) and len(x) == 2 and isinstance(x[1], dict) for x in value):
         return _value(dict(value), functions)  # named markers
     return "[" + ", ".join(_value(x, functions) for x in value) + "]"
+
+
+def _key(key: Any) -> str:
+    """A name as a key, whatever it holds: names are checked when the model is."""
+    name = name_of(key)
+    return _text(name) if isinstance(name, str) else _value(name, frozenset())
 
 
 def _sympy(value: Any, functions: Names) -> str:
@@ -122,11 +127,4 @@ def _text(text: str) -> str:
     plain = _PLAIN.match(text) and isinstance(scalar(text), str) and not text.endswith(" ") and ": " not in text
     if plain and not text.startswith(("- ", "---", "...", "*")) and text not in ("-", "=", "<<", "*"):
         return text
-    return "".join(_escaped(c) for c in json.dumps(text, ensure_ascii=False))
-
-
-def _escaped(c: str) -> str:
-    """A character inside double quotes; what does not print is written as its number."""
-    if c.isprintable() and c != "\ufeff":
-        return c
-    return f"\\u{ord(c):04x}" if ord(c) <= 0xFFFF else f"\\U{ord(c):08x}"
+    return yaml_quoted(text)

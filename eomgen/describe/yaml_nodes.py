@@ -10,6 +10,7 @@ import re
 from typing import Any
 
 from ..errors import ModelError, Problem
+from ..texts import WHOLE, join_surrogates, lone_surrogate, visible
 
 SIZE = 1_000_000  #: bytes of a file
 DEPTH = 12  #: nesting
@@ -118,11 +119,20 @@ class Document:
         if event.ctag is not None:
             self._note(path or "file", line, f"the tag {event.ctag}", "leave it out; tags are not read")
         if kind == "ScalarEvent":
+            text = self._whole(path, line, event.value)
             plain = event.style is None or event.style == ""
-            return scalar(event.value) if plain else event.value
+            return scalar(text) if plain else text
         if kind == "SequenceStartEvent":
             return self._sequence(path, depth)
         return self._mapping(path, depth)
+
+    def _whole(self, path: str, line: int, text: str) -> str:
+        """The text with its pairs of surrogates, as JSON escapes them, as characters; half a pair is a fault."""
+        half = lone_surrogate(text)
+        if half:
+            self._note(path or "file", line, f"holds {half}, half of a pair and no character", WHOLE)
+            return visible(text)
+        return join_surrogates(text)
 
     def _sequence(self, path: str, depth: int) -> list[Any]:
         result: list[Any] = []
@@ -145,7 +155,7 @@ class Document:
                 self._value(event, path, depth + 1)
                 self._value(next(self._events), f"{path}.?", depth + 1)
                 continue
-            key = str(event.value)
+            key = self._whole(path, line, str(event.value))
             inner = f"{path}.{key}" if path else key
             if event.anchor is not None or event.ctag is not None:
                 self._note(inner, line, "a key with an anchor or a tag", "keys are plain names")

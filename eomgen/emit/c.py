@@ -87,7 +87,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     return {
         "name": program.name,
         "prefix": program.name.upper(),
-        "guard": f"EOMGEN_{program.name.upper()}_H",
+        "guard": f"EOMGEN_MODEL_{program.name.upper()}_H",
         "metadata": program.metadata,
         "sizes": sizes,
         "numbers": [(key.upper(), value) for key, value in numbers.items()],
@@ -126,7 +126,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "series": program.metadata["series"],
         "printed": dict(zip((b.name for b in program.blocks if b.name not in twins), printed[1:], strict=True)),
         "layouts": describe_layouts(program),
-        "metadata_lines": _literal_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
+        "metadata_lines": _number_lines(json.dumps(program.metadata, separators=(",", ":"), allow_nan=False)),
     }
 
 
@@ -140,7 +140,7 @@ def closed_at(program: Program, areas: list[tuple[str, int, int]]) -> int:
     return next(start for name, start, _ in areas if name == "X") if closes else 0
 
 
-def _literal_lines(text: str, width: int = 100) -> list[str]:
-    """A text as the insides of adjacent C string literals; ``?`` is escaped, so that no trigraph appears."""
-    escape = {"\\": "\\\\", '"': '\\"', "?": "\\?"}
-    return ["".join(escape.get(ch, ch) for ch in text[k : k + width]) for k in range(0, len(text), width)]
+def _number_lines(text: str, width: int = 30) -> list[str]:
+    """A text of ASCII characters as the inside of a C initialiser, some numbers a line."""
+    numbers = text.encode("ascii")
+    return [",".join(map(str, numbers[k : k + width])) for k in range(0, len(numbers), width)]

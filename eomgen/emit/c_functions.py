@@ -45,7 +45,7 @@ def _each(program: str, function: Function, orders: Sequence[int]) -> str:
     """Its definition."""
     arity = range(function.arity)
     lanes = ", ".join(f"EOMGEN_LANE(x{k}, k)" for k in arity)
-    head = f"static inline real {each_name(function.name, orders)}({', '.join(f'real x{k}' for k in arity)})"
+    head = f"EOMGEN_SHARED inline real {each_name(function.name, orders)}({', '.join(f'real x{k}' for k in arity)})"
     call = f"{c_name(program, function.name, orders)}({lanes})"
     loop = f"for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {call}; }}"
     return f"{head}\n{{\n    real y = same(0.0);\n    {loop}\n    return y;\n}}\n"
@@ -144,7 +144,7 @@ def _native(program: Program, group: Sequence[tuple[Function, list[Orders]]]) ->
         "name": program.name,
         "functions": ", ".join(f.name for f, _ in group),
         "first": first,
-        "file": re.sub(r"[^\w.\-]", "_", code.file),
+        "file": re.sub(r"[^\w.\-]", "_", code.file, flags=re.ASCII),
         "source": code.text if code.text.endswith("\n") else code.text + "\n",
         "renamed": [(name, f"{program.name}_native_{first}_{name}") for name in sorted(renamed)],
         "wrappers": list(wrappers.values()),

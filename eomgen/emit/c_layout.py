@@ -209,5 +209,5 @@ def work_areas(program: Program, blocks: int) -> tuple[list[tuple[str, int, int]
     areas, start = [], max(blocks, 1)  # never where w itself points: blocks get w and an area
     for name, length in lengths:
         areas.append((name, start, length))
-        start += length
+        start += length or 1  # two areas never share a place
     return areas, start

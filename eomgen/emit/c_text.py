@@ -47,10 +47,10 @@ ARITHMETIC = frozenset({"add", "sub", "mul", "div", "lt", "le", "eq"})
 
 #: operation -> definition it needs; NaN wins in smaller and larger, as in numpy.minimum.
 HELPERS: dict[str, str] = {
-    "sign": "static inline real sign_of(real a)\n{\n"
+    "sign": "EOMGEN_SHARED inline real sign_of(real a)\n{\n"
     "    return choose(a > 0.0, same(1.0), choose(a < 0.0, same(-1.0), choose(a == 0.0, same(0.0), a)));\n}\n",
-    "min": "static inline real smaller(real a, real b)\n{\n    return choose((a <= b) | (a != a), a, b);\n}\n",
-    "max": "static inline real larger(real a, real b)\n{\n    return choose((a >= b) | (a != a), a, b);\n}\n",
+    "min": "EOMGEN_SHARED inline real smaller(real a, real b)\n{\n    return choose((a <= b) | (a != a), a, b);\n}\n",
+    "max": "EOMGEN_SHARED inline real larger(real a, real b)\n{\n    return choose((a >= b) | (a != a), a, b);\n}\n",
     **{
         name: f"EOMGEN_EACH{'_PAIR' if name in ('pow', 'atan2') else ''}(each_{name}, {name})\n"
         for name, text in PATTERNS.items()

@@ -43,5 +43,5 @@ def _entries(
             line += f" ({units[name]})"
         if docs.get(name):
             line += f": {docs[name]}"
-        lines.append(" ".join(line.replace("*/", "* /").split()))
+        lines.append(" ".join(line.split()))
     return lines

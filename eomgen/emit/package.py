@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import UsageError
 from ..layer import read_layer
 from ..program import Program
+from ..texts import summary_text
 from .c import emit_c
 from .calls import describe_calls
 from .layouts import describe_layouts
@@ -105,9 +106,9 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, the folders limits to ensembles, and parts of verification, as in eomgen itself."""
+    """errors.py, texts.py, and limits/ to ensembles/ and parts of verification/, as in eomgen itself."""
     root = files("eomgen")
-    found = {"errors.py": (root / "errors.py").read_text(encoding="utf-8")}
+    found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "texts.py")}
     for folder in ("limits", "files", "numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py"):
@@ -125,7 +126,7 @@ def _context(program: Program) -> dict[str, Any]:
         "name": program.name,
         "prefix": program.name.upper(),
         "doc": doc,
-        "description": doc.splitlines()[0] if doc else f"Equations of motion of {program.name}",
+        "description": summary_text(doc.splitlines()[0] if doc else f"Equations of motion of {program.name}"),
         "target": metadata["target"],
         "compiled": metadata["target"] == "cython",
         "metadata": metadata,

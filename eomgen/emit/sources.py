@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from .. import texts
 from ..files.kept import Kept
 from ..program import Program
 
@@ -46,9 +47,14 @@ def environment() -> Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    made.filters["comment"] = lambda text: str(text).replace("*/", "* /")
-    made.filters["docstring"] = lambda text: str(text).replace("\\", "\\\\").replace('"', '\\"')
-    made.filters["toml"] = lambda text: json.dumps(str(text), ensure_ascii=False)
+    made.filters |= {
+        "comment": texts.comment_text,
+        "comment_lines": texts.comment_lines,
+        "docstring": texts.docstring_text,
+        "toml": texts.toml_text,
+        "markdown": texts.markdown_text,
+        "code": texts.markdown_code,
+    }
     return made
 
 

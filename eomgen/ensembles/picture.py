@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..runtime.names import require
+from ..texts import visible
 
 if TYPE_CHECKING:
     from .ensemble import Ensemble
@@ -18,7 +19,7 @@ def draw(ensemble: Ensemble, name: str, ax: Any, limit: int) -> Any:
     if ax is None:
         plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
         ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]
-    unit = ensemble.unit(name)
+    unit = visible(ensemble.unit(name), lines=False)
     label = f"{name} ({unit})" if unit else name
     if "mean" in ensemble.reduced:
         row = ensemble.names.index(name)
@@ -33,7 +34,9 @@ def draw(ensemble: Ensemble, name: str, ax: Any, limit: int) -> Any:
         ax.plot(ensemble.t, values[:, chosen], color="C0", lw=0.8, alpha=max(0.08, min(1.0, 10 / len(chosen))))
     else:
         ax.hist(values[np.isfinite(values)], bins="auto")
-        ax.set(xlabel=f"{label} at t = {ensemble.t[0]:.6g} s", ylabel="runs")
+        ax.set_xlabel(f"{label} at t = {ensemble.t[0]:.6g} s", parse_math=False)
+        ax.set_ylabel("runs")
         return ax
-    ax.set(xlabel="t (s)", ylabel=label)
+    ax.set_xlabel("t (s)")
+    ax.set_ylabel(label, parse_math=False)
     return ax

@@ -11,6 +11,7 @@ operations and minimum parameters of the dynamic models of tree structure robots
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from ..frames import GROUND
 from ..graph import vectors as vec
@@ -49,14 +50,8 @@ def derive(kinematics: Kinematics) -> TreeEquations:
             chosen, inertias, (mass, bias) = common, turned_inertias, other
             inverse = _sweep(kinematics, chosen, inertias, a)
     own_axes, blocks = turn_links(kinematics)
-
-    def turned() -> tuple[Rows, tuple[Expr, ...]]:
-        resolved = chosen.with_columns(own_axes.links)
-        matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
-        for k, drive in drive_inertias(kinematics).items():
-            matrix[k][k] = matrix[k][k] + drive
-        return tuple(map(tuple, matrix)), _sweep(kinematics, resolved, inertias, rest, blocks)
-
+    resolved = chosen.with_columns(own_axes.links)
+    turned = partial(_turned_system, kinematics, resolved, inertias, rest, blocks)
     return TreeEquations(
         method="embedding",
         mass_matrix=mass,
@@ -66,6 +61,20 @@ def derive(kinematics: Kinematics) -> TreeEquations:
         potential_energy=potential_energy(kinematics),
         turned=Turned(turned, blocks) if blocks else None,
     )
+
+
+def _turned_system(
+    kinematics: Kinematics,
+    resolved: Resolved,
+    inertias: list[SpatialInertia],
+    rest: tuple[Expr, ...],
+    blocks: Sequence[Block],
+) -> tuple[Rows, tuple[Expr, ...]]:
+    """M and h in turned velocities."""
+    matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
+    for k, drive in drive_inertias(kinematics).items():
+        matrix[k][k] = matrix[k][k] + drive
+    return tuple(map(tuple, matrix)), _sweep(kinematics, resolved, inertias, rest, blocks)
 
 
 def _cost(mass: Rows, bias: Sequence[Expr]) -> int:

@@ -8,6 +8,7 @@ freedom is released one column of its motion subspace at a time, which eliminate
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from ..frames import GROUND
 from ..graph import vectors as vec
@@ -114,7 +115,7 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     accelerations, pivots = _articulated(*turn_links(kinematics), inertias, products, loads) if tree else (None, ())
     return TreeEquations(
         method="recursive",
-        mass_matrix=lambda: _mass_matrix(kinematics, inverse),
+        mass_matrix=partial(_mass_matrix, kinematics, inverse),
         bias=_newton_euler(kinematics, inertias, products, loads, rest),
         inverse_dynamics=inverse,
         kinetic_energy=kinetic_energy(kinematics),

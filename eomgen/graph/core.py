@@ -12,7 +12,7 @@ y)`` is x where c is true (non-zero) and y elsewhere.  Comparisons give 1.0 or 0
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, Union, cast
 
 from .nodes import Node, Nodes
 
@@ -41,6 +41,14 @@ class Graph(Nodes):
         self.functions: dict[str, Function] = {}
         self.zero = self.constant(0.0)
         self.one = self.constant(1.0)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Graph:
+        """A graph of the same nodes by the same ids, which grows by itself; functions never change and are shared."""
+        twin = memo[id(self)] = Graph.__new__(Graph)
+        twin.nodes, twin._ids = list(self.nodes), dict(self._ids)
+        twin.calls, twin.functions = dict(self.calls), dict(self.functions)
+        twin.zero, twin.one = Expr(twin, self.zero.id), Expr(twin, self.one.id)
+        return twin
 
     # -- leaves ---------------------------------------------------------------------------------------------------
     def constant(self, value: float) -> Expr:
@@ -89,6 +97,10 @@ class Expr:
     def __init__(self, graph: Graph, node_id: int) -> None:
         self.graph = graph
         self.id = node_id
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Expr:
+        graph = memo.get(id(self.graph)) or self.graph.__deepcopy__(memo)
+        return Expr(cast("Graph", graph), self.id)
 
     @property
     def node(self) -> Node:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -16,12 +17,17 @@ from ..forces.routes import Cylinder
 from ..frames import Marker
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
-from ..graph.substitute import symbols_of
+from ..graph.rounding import vanishing
+from ..graph.substitute import substitute, symbols_of
 from .motion import Motion
 
 if TYPE_CHECKING:
     from .kinematics import Kinematics
+    from .loops import Constraints
     from .mobility import Array, ConstraintFunctions
+
+
+IDLE = "holds nothing"  #: what is said of rows without slopes
 
 
 def find_flaws(mechanism: Mechanism, motion: Motion) -> list[Problem]:
@@ -97,26 +103,63 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     raise AssemblyError(f"{what}; give another one in initial or guess", bad)
 
 
-def refuse_idle_rows(kinematics: Kinematics) -> None:
-    """Refuse constraints of which no slope is there: identities that nothing proves, and factors that cancel.
+def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
+    """Refuse constraints in which only time, inputs and parameters stand: no coordinate can hold them.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
+    free = [*constraints.values, *constraints.velocity[len(constraints.values) :]]
+    for label, row, left in zip(constraints.labels, constraints.jacobian, free, strict=True):
+        moving = sorted(symbols_of([left]) & clock)
+        if moving and all(x.is_zero for x in row):
+            what = f"{label} depends on {', '.join(moving)} and on no coordinate, so nothing can hold it"
+            remedy = "let a coordinate follow it, or take it away"
+            problems.append(mechanism.problem(_place(mechanism, label), what, remedy))
+    if problems:
+        raise ModelError(problems)
+
+
+def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
+    """Refuse constraints of which no slope is found at any position, where they are all there is.
+
+    Such are a relation whose factors cancel, one that nothing proves to be an identity, and one that is a square.  Rows
+    of joints whose slopes vanish identically with the given parameters are no fault: a body may be held twice.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    numbers : mapping of str to float
+        Values of the parameters.
 
     Raises
     ------
     ModelError
         Names the constraints and the parameters whose values cancel.
     """
-    c, parameters = kinematics.constraints, set(kinematics.parameter_names)
+    c, graph = kinematics.constraints, kinematics.graph
+    known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
     problems = []
-    for label, row in zip(c.labels, c.jacobian, strict=True):
+    for label, row, written in zip(c.labels, c.jacobian, c.written, strict=True):
         slopes = [x for x in row if not x.is_zero]
-        if slopes:
-            name, used = label.partition(".")[0], sorted(symbols_of(slopes) & parameters)
-            what = f"{label} holds nothing at all positions that were tried: its slopes are 0"
+        if (written and slopes) or not all(vanishing(substitute(slopes, known))):
+            used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
+            what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
             remedy = "take it away"
             if used:
-                what = f"{label} holds nothing with the declared {', '.join(used)}: its factors are 0 or cancel"
+                what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
                 remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
-            path = f"constraints.{name}" if label in kinematics.coupled else f"joints.{name}"
-            problems.append(kinematics.mechanism.problem(path, what, remedy))
+            problems.append(kinematics.mechanism.problem(_place(kinematics.mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)
+
+
+def _place(mechanism: Mechanism, label: str) -> str:
+    """The path of the element that a constraint row belongs to."""
+    if mechanism.lagrangian or mechanism.given:
+        return "lagrangian.constraints" if mechanism.lagrangian else "equations.constraints"
+    name = label.partition(".")[0]
+    return f"joints.{name}" if any(spec.name == name for spec in mechanism.joints) else f"constraints.{name}"

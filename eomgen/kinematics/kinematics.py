@@ -17,7 +17,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from ..records import dataclass
 from .couplings import couple
-from .flaws import find_flaws
+from .flaws import find_flaws, refuse_rows_of_time
 from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
@@ -181,6 +181,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     coupled = couple(mechanism, motion)
     length = length_scale(mechanism)
     constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
+    refuse_rows_of_time(mechanism, constraints)
     _refuse_undefined_angles(mechanism, motion, wrapping)
     return Kinematics(
         mechanism=mechanism,

@@ -13,6 +13,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.substitute import symbols_of
 from ..records import dataclass
+from ..texts import html_text
 from .kinematics import Kinematics
 from .mobility import Mobility
 from .notes import find_notes
@@ -153,9 +154,7 @@ class MechanismReport:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
+        return f"<pre>{html_text(str(self))}</pre>"
 
 
 def _list(names: list[str], limit: int = 12) -> str:

@@ -19,9 +19,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..errors import ProjectionError
-from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV
+from ..errors import NonFiniteError, ProjectionError
+from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
 from ..limits.rounding import SUMMED
+from . import algebra
 from .space import Array
 
 PASSES = 50  #: at most
@@ -30,26 +31,31 @@ PASSES = 50  #: at most
 def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
     """``(J J^T + relative max(diag) I)^-1`` as a function of e (m,) or (m, k).
 
+    Rows that are all zero to rounding, as where parameters alone decide whether a loop closes, ask for no step: the
+    term is then 1.
+
     Raises
     ------
-    ProjectionError
-        J is zero.
+    NonFiniteError
+        J, or a square of its entries, is not finite.
     """
     G = J @ J.T
-    size = G.diagonal().max()
-    G.flat[:: len(G) + 1] += relative * size
+    size = G.diagonal().max(initial=0.0)
+    G.flat[:: len(G) + 1] += relative * size if size > UNMOVED * UNMOVED else 1.0
+    if not np.isfinite(G).all():
+        raise NonFiniteError("the constraint Jacobian is not finite")
     try:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
-        raise ProjectionError("the constraint Jacobian vanishes, so no correction is defined") from None
-    return lambda e: np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
+        raise ProjectionError("rounding leaves J J^T of the constraints indefinite") from None
+    return lambda e: np.asarray(algebra.solve(L.T, algebra.solve(L, e)))
 
 
 def weakness(J: Array, z: Array) -> float:
     """The square of the singular value of J along z (m,) or (m, k), relative to the largest row of J."""
     d = J.T @ z
     size = float((J * J).sum(axis=1).max() * (z * z).sum())
-    return float((d * d).sum()) / size if size else 1.0
+    return float((d * d).sum()) / size if size > 0.0 else 1.0
 
 
 def smaller(weak: float) -> float:

@@ -7,6 +7,7 @@ negative and none above the sum of the other two (Wensing, Kim, Slotine, IEEE Ro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
 from ..limits.rounding import ROUNDED
+from . import algebra
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
@@ -38,6 +40,7 @@ def word_of_check(value: object) -> str | None:
     return value if isinstance(value, str) and value in CHECKS else None
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
     """The longest distance between two points of one body, wherever the frames of bodies lie.
 
@@ -54,13 +57,15 @@ def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
     longest = 0.0
     for points in bodies:
         places = np.asarray(points, dtype=float).reshape(-1, 3)
-        rounding = ROUNDED * float(np.abs(places).max(initial=0.0))
+        size = float(np.abs(places).max(initial=0.0))
+        places = places / (size or 1.0)  # squares of what is large overflow
         for k, place in enumerate(places):
             apart = float(np.linalg.norm(places[k + 1 :] - place, axis=1).max(initial=0.0))
-            longest = max(longest, apart if apart > rounding else 0.0)
+            longest = max(longest, apart * size if apart > ROUNDED else 0.0)
     return longest
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length: float) -> list[float]:
     """m l^2 of each body, which what rounding leaves of its inertia is judged by.
 
@@ -83,7 +88,7 @@ def inertia_scales(masses: Sequence[float], tensors: Sequence[ArrayLike], length
     if heaviest == 0.0:
         return [max((float(np.abs(tensor).max()) for tensor in tensors), default=0.0)] * len(masses)
     sizes = [abs(m) or heaviest for m in masses]
-    square = length**2 or max(abs(float(np.trace(tensor))) / m for m, tensor in zip(sizes, tensors, strict=True))
+    square = length * length or max(abs(float(np.trace(tensor))) / m for m, tensor in zip(sizes, tensors, strict=True))
     return [m * square for m in sizes]
 
 
@@ -108,17 +113,22 @@ def fault_of_inertia(
         that moves in a plane.
     """
     full = np.asarray(tensor, dtype=float).reshape(3, 3)
-    computed = COMPUTED * scale
+    largest = float(np.abs(full).max())
+    if not math.isfinite(largest):
+        return "has an entry that is not finite", "give finite numbers, whose products are finite too"
+    unit = 2.0 ** (math.frexp(largest)[1] - 1)  # a power of two: exact, and no sum of entries overflows
+    full, computed = full / unit, COMPUTED * (scale / unit)
     if plane is not None:
         n = np.asarray(plane, dtype=float)
         moment, size = float(n @ full @ n), float(np.abs(full).max())
         if moment < -max(DIGITS * size, computed):
-            return f"the moment about the centre of mass is {moment:.6g}", SHIFTED
+            return f"the moment about the centre of mass is {moment * unit:.6g}", SHIFTED
         return None
-    a, b, c = np.linalg.eigvalsh(full)
+    a, b, c = algebra.eigvalsh(full).tolist()
     size = max(abs(a), abs(c))
     if a < -max(DIGITS * size, computed):
-        return f"has a negative principal moment {a:.6g}", NEGATIVE
+        return f"has a negative principal moment {a * unit:.6g}", NEGATIVE
     if b > max(MOMENT * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
-        return f"principal moments {a:.6g}, {b:.6g}, {c:.6g}: one exceeds the sum of the others", EXCESS
+        shown = ", ".join(f"{moment * unit:.6g}" for moment in (a, b, c))
+        return f"principal moments {shown}: one exceeds the sum of the others", EXCESS
     return None

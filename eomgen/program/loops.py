@@ -13,7 +13,7 @@ from functools import cached_property
 
 from ..graph.core import Expr
 from ..graph.substitute import substitute
-from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, VANISHED
+from ..limits.constraints import GENTLE, LEFT, LOST, TIKHONOV, UNMOVED, VANISHED
 from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
@@ -110,9 +110,12 @@ class LoopBlocks:
         """The factor of J J^T + relative max(diag) I, and what was added."""
         G = gram(rows)
         size = largest([row.get(i, self.terms.graph.zero) for i, row in enumerate(G)])
+        graph, term = self.terms.graph, size * relative
+        if self.terms.n_dof == self.terms.n_v:  # rows that are zero at the declared parameters ask for no step
+            term = graph.apply("select", graph.apply("lt", graph.constant(UNMOVED * UNMOVED), size), term, graph.one)
         for i, row in enumerate(G):
-            row[i] = row.get(i, self.terms.graph.zero) + size * relative
-        return factorize(G), size * relative
+            row[i] = row.get(i, graph.zero) + term
+        return factorize(G), term
 
     # -- position -------------------------------------------------------------------------------------------------
     def closing(self) -> list[Expr]:
@@ -237,9 +240,11 @@ class LoopBlocks:
             *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
         ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
-        if blocks is None or any(len(b.rows) > 2 for b in blocks):
+        first: list[Expr] = []
+        found: list[list[Expr]] = [[] for _ in terms.preferred]
+        if dependent and (blocks is None or any(len(b.rows) > 2 for b in blocks)):
             first, *found = self._least_squares(left, right, conditions)
-        else:
+        elif blocks is not None:  # else rows that hold nothing: parameters alone decide whether they are closed
             first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
         x = [graph.zero] * terms.n_v
         for i, value in zip(dependent, first, strict=True):

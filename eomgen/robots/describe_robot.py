@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ..describe.description import GROUND_NAME, Description, Values
 from ..describe.placement import TURNS
+from ..errors import ModelError, Problem
 from ..joints import JOINTS
+from ..limits.files import FREEDOMS, LAWS, TIES
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .names import Names, clean_model_name
 from .placement import Inertia, Placement, numbers
@@ -52,6 +55,7 @@ class _Writer:
 
     def describe(self) -> Description:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
+        self._bound(sum(len(self._suffixes(body.joint.type)) for body in moving if body.joint is not None))
         for body in moving:
             assert body.joint is not None
             rates = ("_wx", "_wy", "_wz") if self._in_parameters(body.joint.type) else ()
@@ -68,6 +72,21 @@ class _Writer:
             self.out.notes.append(f"renamed {section}: " + ", ".join(f"{old!r} is {new}" for old, new in names.items()))
         self.out.renamed = self.names.renamed
         return self.out
+
+    def _bound(self, freedoms: int) -> None:
+        """Refuse robots that no derivation comes to an end of."""
+        robot, remedy = self.robot, "lock joints (lock=[...]), or leave parts out"
+        for count, most, what in (
+            (freedoms, FREEDOMS, "coordinates of joints"),
+            (len(robot.loops), TIES, "joints that close loops"),
+            (len(robot.ties), TIES, "couplings"),
+            (len(robot.drives), TIES, "drives"),
+        ):
+            if count > most:
+                message = f"has {count:,} {what}"
+                robot.problem("robot", message, f"at most {most:,}; {remedy}", (robot.file, 1))
+        if robot.problems:
+            raise ModelError(robot.problems)
 
     def _add(self, section: str, name: str, values: Values, place: tuple[str, int]) -> None:
         entry = self.out.add(section, name, values)
@@ -229,12 +248,18 @@ class _Writer:
         for drive, (_, law) in zip(self.robot.drives, laws, strict=True):
             if drive.total and law:
                 totals[drive.tendon] = f"{totals[drive.tendon]} + {law}" if drive.tendon in totals else law
+        size = 0  # of all laws
         cut: dict[str, list[str]] = {}  # pushes along joints whose sum is cut
         for drive, (name, law) in zip(self.robot.drives, laws, strict=True):
             if drive.total and law:
                 law = _scaled(law, totals[drive.tendon], drive.total)
             if drive.force and law:
                 law = _cut(law, drive.force)
+            size += len(law) * len(drive.parts)
+            if size > LAWS:
+                message = "the laws of the drives are too long"
+                problem = Problem(f"actuator.{name}", message, f"at most {LAWS:,} characters in all", *drive.place)
+                raise ModelError([problem])
             for joint, c in drive.parts if law else ():
                 q = self.joints.get(joint)
                 if q is None or not c:
@@ -286,7 +311,8 @@ class _Writer:
 def _cut(law: str, bounds: Range) -> str:
     """A force or control cut to a range."""
     low, high = bounds
-    return f"min(max({law}, {low!r}), {high!r})"
+    law = f"max({law}, {low!r})" if low > -math.inf else law
+    return f"min({law}, {high!r})" if high < math.inf else law
 
 
 def _scaled(law: str, total: str, bounds: Range) -> str:

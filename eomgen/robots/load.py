@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, UsageError
+from ..limits.files import LARGEST
 from ..numeric.inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
 from .robot import Options
@@ -75,8 +77,8 @@ def make_options(given: dict[str, Any]) -> Options:
         if key not in known:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
-        if key in given and given[key] not in allowed:
-            hint = "; stops do not act yet, limits are data" if given[key] == "stop" else ""
+        if key in given and not (isinstance(given[key], str) and given[key] in allowed):
+            hint = "; stops do not act yet, limits are data" if str(given[key]) == "stop" else ""
             raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}{hint}")
     if "check_inertia" in given:
         word = word_of_check(given["check_inertia"])
@@ -86,8 +88,37 @@ def make_options(given: dict[str, Any]) -> Options:
     friction = given.get("friction", False)
     if not isinstance(friction, bool | int | float) or not 0 <= friction < float("inf"):
         raise UsageError(f"friction={friction!r}: True, or the velocity (rad/s or m/s) below which it is smoothed")
-    if isinstance(given.get("lock"), Mapping):
-        for name, value in given["lock"].items():
-            if not isinstance(value, int | float | np.integer | np.floating) or not np.isfinite(value):
-                raise UsageError(f"lock={{{name!r}: {value!r}}}: a joint is held at a finite number (rad or m)")
+    for key in ("floating", "merge", "symbolic"):
+        if not isinstance(given.get(key, False), bool | np.bool_):
+            raise UsageError(f"{key}={given[key]!r}: allowed: True, False")
+    given = {key: _names(key, value) if key in ("actuate", "lock") else value for key, value in given.items()}
+    if not _is_number(given.get("snap", 0.0)) or given.get("snap", 0.0) < 0.0:
+        raise UsageError(f"snap={given['snap']!r}: an angle (rad), 0 or positive")
+    if not isinstance(given.get("assets"), str | os.PathLike | None):
+        raise UsageError(f"assets={given['assets']!r}: the path of a folder")
     return Options(**given)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a finite number that the reader's products stay finite with."""
+    size: Any = abs(value) if isinstance(value, int | float | np.integer | np.floating) else math.inf
+    return bool(size <= LARGEST)
+
+
+def _names(key: str, given: Any) -> Any:
+    """Names of joints as a tuple; what else an option takes as it is."""
+    if isinstance(given, str):
+        return (given,)
+    if key == "actuate" and isinstance(given, bool | np.bool_):
+        return bool(given)
+    if key == "lock" and isinstance(given, Mapping):
+        for name, value in given.items():
+            if not _is_number(value):
+                message = f"a joint is held at a finite number (rad or m), at most {LARGEST:g}"
+                raise UsageError(f"lock={{{name!r}: {value!r}}}: {message}")
+        return given
+    names = tuple(given) if isinstance(given, Iterable) and not isinstance(given, Mapping) else (None,)
+    if not all(isinstance(name, str) for name in names):
+        also = "True" if key == "actuate" else "a mapping of names to values"
+        raise UsageError(f"{key}={given!r}: names of joints, or {also}")
+    return names

@@ -7,25 +7,26 @@ inertias of drives, equality constraints, and actuators on joints.
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..errors import MissingDependencyError, ModelError, UsageError
+from ..errors import ModelError, UsageError
+from ..limits.files import LARGEST
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
+from .mjcf_compile import compile_mjcf
 from .mjcf_constructs import find_mjcf
 from .mjcf_equalities import read_equalities
-from .mjcf_fields import NOTED
-from .mjcf_files import Lines, scan_files
+from .mjcf_fields import FINITE, NOTED
+from .mjcf_files import Lines, Scan
+from .mjcf_text import Text
 from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
 from .robot import Joint, Link, Options, Place, Robot
 from .xml_text import Element
 
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
-_LINE = re.compile(r"line (\d+)")
 
 
 def read_mjcf(root: Element, options: Options) -> Robot:
@@ -40,26 +41,11 @@ def read_mjcf(root: Element, options: Options) -> Robot:
     """
     if options.floating:
         raise UsageError(f"{root.file}: an MJCF file says itself which bodies float; leave floating out")
-    lines, met = scan_files(root, options.assets)
-    try:
-        import mujoco
-    except ImportError:
-        raise MissingDependencyError("MJCF files need mujoco: pip install 'eomgen[robots]'") from None
-    warnings: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(warnings.append)  # else MuJoCo writes a file MUJOCO_LOG.TXT into the current folder
-    try:
-        compiled = mujoco.MjModel.from_xml_path(root.file)
-    except ValueError as error:
-        text = " ".join(str(error).split())
-        found = _LINE.findall(text)
-        place = root.problem("mujoco", f"MuJoCo refuses it: {text}")
-        raise ModelError([place._replace(line=int(found[-1]) if found else root.line)]) from None
-    finally:
-        mujoco.set_mju_user_warning(before)
-    robot = _Reader(compiled, root, lines).read()
-    robot.notes += notes_of(find_mjcf, met)
-    robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in warnings]
+    scan = Scan(root, options.assets)
+    compiled = compile_mjcf(Text(scan.trees, scan.folder, scan.problems), root)
+    robot = _Reader(compiled, root, scan.lines).read()
+    robot.notes += notes_of(find_mjcf, scan.met)
+    robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in compiled.warnings]
     return robot
 
 
@@ -69,18 +55,26 @@ class _Reader:
     def __init__(self, m: Any, root: Element, lines: Lines) -> None:
         self.m, self.root, self.lines = m, root, lines
         self.robot = Robot(root.attributes.get("model") or "robot", root.file)
-        self.names = {kind: self._names(kind, count) for kind, count in (("body", m.nbody), ("joint", m.njnt))}
+        self.names = {kind: [self.name(kind, k) for k in range(len(m.names[kind]))] for kind in ("body", "joint")}
 
-    def _names(self, kind: str, count: int) -> list[str]:
-        access = getattr(self.m, kind)
-        return [access(k).name or f"{kind}{k}" for k in range(count)]
+    def name(self, kind: str, k: int) -> str:
+        """The name of an element; one made from its kind and number if it has none."""
+        return self.m.names[kind][k] or f"{'equality' if kind == 'eq' else kind}{k}"
 
     def off(self, *flags: str) -> bool:
         """Whether the file disables one of these parts of the physics, by the words of mjtDisableBit."""
-        import mujoco
+        return any(self.m.opt.disableflags & self.m.flags.get(flag, 0) for flag in flags)
 
-        bits = [int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0)) for flag in flags]
-        return any(self.m.opt.disableflags & bit for bit in bits)
+    def _check(self) -> None:
+        """Refuse numbers that are not finite or far too large, which MuJoCo takes."""
+        for key, what in FINITE.items():
+            values = getattr(self.m.opt if key == "gravity" else self.m, key, 0.0)
+            if not (np.abs(values) <= LARGEST).all():
+                remedy = f"at most {LARGEST:g}, so that products stay finite"
+                problem = self.root.problem("mujoco", f"{what} ({key}) come out too large or not finite", remedy)
+                self.robot.problems.append(problem)
+        if self.robot.problems:
+            raise ModelError(self.robot.problems)
 
     def place(self, name: str, *tags: str) -> Place:
         """Where an element of a name is; the model's first line if it has none."""
@@ -90,6 +84,7 @@ class _Reader:
         return self.root.file, self.root.line
 
     def read(self) -> Robot:
+        self._check()
         m, robot = self.m, self.robot
         gravity = np.zeros(3) if self.off("GRAVITY") else m.opt.gravity
         robot.gravity = tuple(numbers(gravity))  # type: ignore[assignment]

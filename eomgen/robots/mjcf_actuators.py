@@ -27,7 +27,7 @@ def read_actuators(reader: _Reader) -> None:
     m, robot = reader.m, reader.robot
     left, idle, nothing = [], [], [0.0] * m.nu
     for k in range(getattr(m, "nactuator", m.nu)):  # of several controls or forces each, since MuJoCo 4
-        name = m.actuator(k).name or f"actuator{k}"
+        name = reader.name("actuator", k)
         parts = _actuated(reader, k)
         place = reader.place(name, "motor", "position", "velocity", "general", "damper", "intvelocity")
         damping, armature = (float(getattr(m, f"actuator_{key}", nothing)[k]) for key in ("damping", "armature"))
@@ -115,7 +115,7 @@ def _tendons(reader: _Reader) -> None:
     m, robot = reader.m, reader.robot
     left = []
     for k in range(m.ntendon):
-        name = m.tendon(k).name or f"tendon{k}"
+        name = reader.name("tendon", k)
         parts = fixed_tendon(reader, k)
         place = reader.place(name, "fixed", "spatial")
         _resist(reader, f"tendon {name}", parts, place, float(m.tendon_damping[k]), float(m.tendon_armature[k]))

@@ -25,7 +25,7 @@ def read_equalities(reader: _Reader) -> None:
     """Take in the equality constraints that are active."""
     m, robot = reader.m, reader.robot
     for k in range(m.neq):
-        name = m.eq(k).name or f"equality{k}"
+        name = reader.name("eq", k)
         place = reader.place(name, "connect", "weld", "joint", "tendon")
         kind = m.eq_type[k]
         if not m.eq_active0[k] or reader.off("EQUALITY", "CONSTRAINT"):

@@ -1,31 +1,31 @@
-"""Robots, MJCF: what a file would make MuJoCo read -> checked before MuJoCo sees it, with the lines of its elements.
+"""Robots, MJCF: what a model would make MuJoCo read and make -> checked before MuJoCo sees it, with the lines.
 
-MuJoCo's compiler opens files named by a model (includes, meshes, textures, height fields, attached models).  Here every
-one of them is looked up first: it must lie inside one folder, and those in XML pass the same strict parser.
+Every file that a model names must lie inside one folder; those in XML pass the strict parser; copies are counted.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from pathlib import Path
 
 from ..errors import ModelError, Problem
+from ..limits.files import COPIES, ENTRIES, PIXELS
 from .constructs import Met, count_all, is_whole
+from .contained import Folder
 from .mjcf_constructs import find_mjcf, path_of
-from .xml_text import Element, read_xml
-
-FILES = 200  #: XML files that a model may be made of
-COPIES = 10_000  #: bodies that <replicate>, <composite> and <flexcomp> may make, themselves counted, over all files
-PIXELS = 16_384  #: width or height of a texture, rows or columns of a height field
+from .mjcf_include import Trees
+from .xml_text import Element
 
 _COUNTED = ("replicate", "composite", "flexcomp")
 _SIZES = ("width", "height", "nrow", "ncol")
+_DIGITS = re.compile(r"\s*[-+]?([0-9]{1,18})")
 Lines = dict[tuple[str, str], tuple[str, int]]
 
 
-def scan_files(root: Element, folder: str | None) -> tuple[Lines, Met]:
-    """Check every file that a model names.
+class Scan:
+    """A model with the files it includes and attaches, every element looked at once.
 
     Parameters
     ----------
@@ -34,106 +34,88 @@ def scan_files(root: Element, folder: str | None) -> tuple[Lines, Met]:
     folder : str, optional
         Where all files must lie; the folder of the model's file by default.
 
-    Returns
-    -------
+    Attributes
+    ----------
+    trees : Trees
     lines : dict
         (tag, name) -> file and line of the named elements of all its XML files.
     met : Counter
         Elements and attributes of all of them, by their paths in the table of constructs.
+    made : int
+        Bodies that copying makes.
 
     Raises
     ------
     ModelError
-        A file lies outside, cannot be read, or the model would become absurdly large.
+        The model does not lie in the folder, has too many files or elements, or one of its files is no XML.
     """
-    scan = _Scan(root, folder)
-    scan.elements(root)
-    scan.attachments()
-    scan.assets()
-    if scan.problems:
-        raise ModelError(scan.problems)
-    return scan.lines, scan.met
-
-
-class _Scan:
-    """Walks a model and the files it includes."""
 
     def __init__(self, root: Element, folder: str | None) -> None:
-        self.main = Path(root.file).resolve().parent
-        self.allowed = self.main if folder is None else Path(folder).resolve()
-        self.seen: set[Path] = {Path(root.file).resolve()}
-        self.lines: Lines = {}
-        self.met: Met = Counter()
-        self.problems: list[Problem] = []
-        self.named: list[Element] = []  # elements that name a file
-        self.made = self.bodies = 0  # bodies by copying; all bodies
-        self.attached: list[tuple[Element, int]] = []
-        self.models: dict[str, int] = {}  # model to attach -> its bodies
-        self.folders: dict[str, set[str]] = {"mesh": set(), "texture": set()}
-        if not self._inside(self.main):
+        main = os.path.dirname(os.path.realpath(root.file))
+        self.folder = Folder(main if folder is None else folder)
+        if not self.folder.holds(main):
             message = f"{root.file} lies outside the folder {folder} of its assets"
             raise ModelError([root.problem("assets", message, "name a folder that holds the model")])
+        self.trees = Trees(root, self.folder)
+        self.problems: list[Problem] = list(self.trees.problems)
+        self.lines: Lines = {}
+        self.met: Met = Counter()
+        self.made = self.bodies = 0  # bodies by copying; all bodies
+        self.held: dict[str, int] = {}  # file of a model that is attached -> its bodies
+        for path, tree in self.trees.models.items():  # those that others are made of come first
+            before = self.bodies
+            self._elements(tree)
+            self.held[path] = self.bodies - before
+        self._elements(self.trees.main)
 
-    def _inside(self, path: Path) -> bool:
-        return path == self.allowed or self.allowed in path.parents
-
-    def elements(self, root: Element, copies: int = 1, inside: str | None = None) -> None:
-        """Take in the elements of one XML file, of which MuJoCo makes this many copies.
-
-        ``inside`` is the tag of the element in which an included file stands.
-        """
-        waiting: list[tuple[Element, int, str | None]] = [(root, copies, "")]
+    def _elements(self, root: Element) -> None:
+        """Take in the elements of one tree."""
+        models: dict[str, int] = {}  # name -> bodies
+        for element in root.walk():
+            path = element.attributes.get("file", "")
+            if element.tag == "model" and path in self.held:
+                held, tree = self.held[path], self.trees.models[path]
+                for name in (element.attributes.get("name"), tree.attributes.get("model"), Path(path).stem):
+                    models[name or ""] = max(held, models.get(name or "", 0))
+        waiting: list[tuple[Element, int, str | None]] = [(root, 1, "")]
         while waiting:
-            element, above, parent = waiting.pop()
-            here = element.tag
-            if element is root and inside is not None:
-                here = inside  # what is in it stands where the include stands
-            elif parent is not None:
+            element, copies, parent = waiting.pop()
+            below = None
+            if parent is not None:
                 path = path_of(parent, element.tag)
                 self.met.update(count_all([(path, element.attributes)]))
                 row = find_mjcf(path)
-                if row is None or is_whole(row):
-                    here = ""
-            made = self._element(element, above, parent)
-            below = here if parent is not None and here else None
-            waiting += [(child, made, below) for child in reversed(element.children)]
+                below = element.tag if row is not None and not is_whole(row) else None
+            copies = self._element(element, copies, models)
+            waiting += [(child, copies, below) for child in reversed(element.children)]
 
-    def _element(self, element: Element, copies: int, parent: str | None) -> int:
-        """Take in one element; returns the number of copies of what it holds."""
+    def _element(self, element: Element, copies: int, models: dict[str, int]) -> int:
+        """Take in one element, copied so often; returns how often what it holds is copied."""
         given = element.attributes
         if "name" in given:
             self.lines.setdefault((element.tag, given["name"]), (element.file, element.line))
-        if element.tag == "compiler":
-            for key, kinds in (("assetdir", ("mesh", "texture")), ("meshdir", ("mesh",)), ("texturedir", ("texture",))):
-                for kind in kinds if key in given else ():
-                    self.folders[kind].add(given[key])
         counted = element.tag in _COUNTED
         if counted:
-            copies *= self._count(element)
+            for part in given.get("count", "1").split():
+                copies *= max(1, whole(part))
         if element.tag == "attach":
-            self.attached.append((element, copies))
+            held = copies * max(1, models.get(given.get("model", ""), 1))
+            self.bodies += held
+            self._make(element, held)
         elif counted or element.tag == "body":
             self.bodies += copies
             if counted or copies > 1:
                 self._make(element, copies)
-        for key in _SIZES:
-            if key in given and _whole(given[key]) > PIXELS:
-                message = f"{given[key][:20]} is too large"
-                self.problems.append(element.problem(f"{element.tag}.{key}", message, f"at most {PIXELS:,}"))
-        if element.tag == "include" or (element.tag == "model" and "file" in given):
-            before = self.bodies
-            self._include(element, copies, parent)
-            if element.tag == "model":
-                self.models[given.get("name", Path(given["file"]).stem)] = self.bodies - before
-        elif any(key.startswith("file") for key in given):
-            self.named.append(element)
+        for key, text in given.items():
+            if key in _SIZES and whole(text) > PIXELS:
+                self._too_large(element, key, f"at most {PIXELS:,}")
+            elif element.tag == "size" and key != "memory" and any(whole(part) > ENTRIES for part in text.split()):
+                self._too_large(element, key, f"at most {ENTRIES:,}; it is no part of the motion and may be left out")
         return copies
 
-    def attachments(self) -> None:
-        """Count the bodies of models that copies attach."""
-        for element, copies in self.attached:
-            if copies > 1:
-                self._make(element, copies * max(1, self.models.get(element.attributes.get("model", ""), 1)))
+    def _too_large(self, element: Element, key: str, remedy: str) -> None:
+        message = f"{element.attributes[key][:20]} is too large"
+        self.problems.append(element.problem(f"{element.tag}.{key}", message, remedy))
 
     def _make(self, element: Element, bodies: int) -> None:
         """Count bodies that copying makes, of siblings and of all files; one problem tells of too many."""
@@ -141,53 +123,12 @@ class _Scan:
             self.problems.append(element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,} in all"))
         self.made += bodies
 
-    def _count(self, element: Element) -> int:
-        total = 1
-        for part in element.attributes.get("count", "1").split():
-            total *= max(1, _whole(part))
-        return total
 
-    def _include(self, element: Element, copies: int, parent: str | None) -> None:
-        name = element.attributes.get("file", "")
-        places = [(self.main / name), (Path(element.file).resolve().parent / name)]
-        path = next((p.resolve() for p in places if p.is_file()), places[0].resolve())
-        if not self._check(element, name, path):
-            return
-        if path in self.seen:
-            return
-        self.seen.add(path)
-        if len(self.seen) > FILES:
-            raise ModelError([element.problem("include", "too many files", f"at most {FILES}")])
-        try:
-            included = element.tag == "include"
-            self.elements(read_xml(os.fspath(path)), copies if included else 1, parent if included else None)
-        except OSError as error:
-            message = f"{name!r} cannot be read: {error.strerror}"
-            self.problems.append(element.problem(element.tag, message, "the path starts at the model's folder"))
-
-    def assets(self) -> None:
-        """Check where meshes, textures and the like are."""
-        for element in self.named:
-            kind = "texture" if element.tag == "texture" else "mesh"
-            for key, name in element.attributes.items():
-                if not key.startswith("file"):
-                    continue
-                for folder in self.folders[kind] or {""}:
-                    if not self._check(element, name, (self.main / folder / name).resolve()):
-                        break
-
-    def _check(self, element: Element, name: str, path: Path) -> bool:
-        """Whether a file lies inside; a fault is noted if not."""
-        if self._inside(path):
-            return True
-        message = f"{name!r} is outside the folder {self.allowed}; it is not read"
-        remedy = "name a folder that holds all files of the model: assets=..., or --assets"
-        self.problems.append(element.problem(f"{element.tag}.file", message, remedy))
-        return False
-
-
-def _whole(text: str) -> int:
+def whole(text: str) -> int:
+    """At least the whole number that MuJoCo may take a text for; 0 where it takes none."""
     try:
-        return int(text)
+        value = float(text)
     except ValueError:
-        return 1
+        found = _DIGITS.match(text)
+        return int(found[1]) if found else 0
+    return int(min(max(value, 0.0), 1e18)) if value == value else 0

@@ -125,8 +125,11 @@ def _lock(robot: Robot, options: Options) -> None:
                 f"lock.{name}", f"is a {joint.type} joint", "only joints of one degree are locked", joint.place
             )
             continue
-        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-        motion = moved(value * axis) if joint.type == "prismatic" else Placement(about(axis, value), np.zeros(3))
+        axis = np.array(joint.axis) / max(map(abs, joint.axis))  # first, as squares of small numbers vanish
+        axis /= np.linalg.norm(axis)
+        motion = (
+            moved(value * axis) if joint.type == "prismatic" else Placement(about(axis.tolist(), value), np.zeros(3))
+        )
         if joint.type != "weld":
             robot.joints[name] = replace(joint, type="weld", outer=joint.outer @ motion)  # what it mimics is held too
 

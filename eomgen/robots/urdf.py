@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..limits.files import LARGEST
 from ..numeric.inertia import SWITCH
 from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
 from .robot import Joint, Link, Mimic, Options, Robot
@@ -69,18 +70,23 @@ class _Reader:
     def fault(self, element: Element, path: str, message: str, remedy: str = "") -> None:
         self.robot.problems.append(element.problem(path, message, remedy))
 
-    def number(self, element: Element, key: str, path: str, default: float | None = None) -> float:
-        """A finite number in an attribute."""
+    def number(
+        self, element: Element, key: str, path: str, default: float | None = None, most: float = LARGEST
+    ) -> float:
+        """A finite number in an attribute, at most so large."""
         text = element.attributes.get(key)
         where = f"{path}.{key}"
         if text is None:
             if default is None:
                 self.fault(element, where, "is missing", f'give {key}="..." in <{element.tag}>')
             return default or 0.0
-        return self._finite(element, where, text)
+        return self._finite(element, where, text, most)
 
-    def _finite(self, element: Element, path: str, text: str) -> float:
+    def _finite(self, element: Element, path: str, text: str, most: float = LARGEST) -> float:
         value = float(text) if _NUMBER.match(text.strip()) else math.nan
+        if most < abs(value) < math.inf:
+            self.fault(element, path, f"{value:g} is too large", f"at most {most:g}, so that products stay finite")
+            return 0.0
         if not math.isfinite(value):
             shown = text if len(text) <= 40 else text[:37] + "..."
             what = "not finite" if text.strip().lower() in _SPECIAL else "not a number"
@@ -235,7 +241,7 @@ class _Reader:
                 continue  # no limit
             if key in ("lower", "upper") and kind == "continuous":
                 continue  # they mean nothing there
-            result[key] = self.number(limit, key, f"{path}.limit")  # type: ignore[arg-type]
+            result[key] = self.number(limit, key, f"{path}.limit", most=math.inf)  # type: ignore[arg-type]
         if kind in ("revolute", "prismatic") and limit is not None:
             for key in ("lower", "upper"):
                 if key not in limit.attributes and any(k in limit.attributes for k in ("lower", "upper")):

@@ -13,11 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import MissingDependencyError, ModelError, Problem
-
-SIZE = 20_000_000  #: bytes of a file
-ELEMENTS = 200_000
-DEPTH = 200  #: nesting
-LONGEST = 200_000  #: characters of one attribute
+from ..limits.files import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 
 
 @dataclass
@@ -81,6 +77,10 @@ def parse_xml(data: bytes, file: str) -> Element:
     from xml.sax import SAXException, SAXParseException
     from xml.sax.xmlreader import InputSource
 
+    longest = max(map(len, data.split(b">")))
+    if longest > PIECE:  # expat would read it again and again
+        message = f"has a tag, a comment or a text of {longest:,} bytes"
+        raise ModelError([Problem("file", message, f"at most {PIECE:,} from one '>' to the next", file, 1)])
     parser = DefusedExpatParser(forbid_dtd=True, forbid_entities=True, forbid_external=True)
     handler = _handler(parser, file)
     parser.setContentHandler(handler)

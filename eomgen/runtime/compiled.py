@@ -20,6 +20,7 @@ from .signals import Forcing
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
+    from .checkpoint import Checkpoint
     from .module import Module
     from .pace import Pace
     from .progress import Progress
@@ -105,6 +106,7 @@ def integrate_compiled(
     watch: Progress | None,
     pace: Pace | None = None,
     events: Events | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
     """Integrate from the first of the `nodes` to the last, not stepping over the others (corners of the inputs).
 
@@ -123,15 +125,25 @@ def integrate_compiled(
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
         "trail": KEPT if module.layout.rank else 0,
         "watch": None if watch is None else watch.look, "pace": None if pace is None else pace.look,
+        "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)
     journey = core.journey(
         method, module.kernels.context, start, x0, end, signals=forcing.encode(), plan=plan, **settings
     )
-    status = journey.travel()
+    status = 0
+    if checkpoint is not None and checkpoint.kept is not None:
+        try:
+            status = journey.resume(checkpoint.kept)
+        except (KeyError, TypeError, ValueError) as error:
+            raise checkpoint.damaged(error) from None
+    if status == 0:
+        status = journey.travel()
     while status == WAITING and events is not None:
         after = events.reset(module, forcing, journey.t, journey.state(), journey.fired())
         status = journey.jump(after) or journey.travel()
+    if checkpoint is not None and journey.raised is None and status in (ENDED, TERMINAL):
+        checkpoint.save(journey.frozen(status))
     times, states, notes = journey.results()
     if events is not None and journey.raised is None:
         warn_of_unknown([events.names[i] for i in journey.unknown()], 3)

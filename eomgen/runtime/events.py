@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
-from ..limits.runs import INSTANT
+from ..limits.runs import CROWD, INSTANT
 from ..numeric.scales import Array
 from .layout import Layout
 from .names import check_names, require_time_and_state, unknown
@@ -151,6 +151,7 @@ class Events:
             "direction": [event.direction for event in every],
             "most": [int(event.terminal) for event in every],
             "action": [event.action for event in every],
+            "crowd": crowd_of([event.action for event in every]),
             "resets": self.layout.metadata.get("resets", []) if self.model else [],
         }
 
@@ -195,6 +196,11 @@ class Events:
             "(Zeno), or a reset leads nowhere: end the run there (terminal: a number of times), let what comes to rest "
             "stay in contact by a contact force, or reset otherwise"
         )
+
+
+def crowd_of(actions: Sequence[int]) -> int:
+    """How many resets in a row, each right after the one before, count as endless: those of one instant take turns."""
+    return max(CROWD, 2 * sum(action in (RESET, WAIT) for action in actions))
 
 
 def _listed(given: Any) -> list[tuple[str | None, Any]]:

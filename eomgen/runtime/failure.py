@@ -96,7 +96,7 @@ class Fail:
         elif status == 4 and not len(self.layout.independent):
             what = "the constraints are singular here, and the mechanism has no freedom"
             remedy = "start a little away from this position, or change the dimensions"
-        elif self.culprit is not None and names:
+        elif self.culprit is not None and (names or not self.layout.n_x):
             if status == 5 and (found := self.culprit(1, t, x, p, u)):
                 status, (what, remedy) = 1, WORDS[1]  # a solver cannot tell a law that is no number from rounding
             else:

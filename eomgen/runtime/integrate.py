@@ -1,6 +1,7 @@
 """Stage runtime: right-hand side, solver, corners of the inputs -> times, states and events, through SciPy.
 
-Runs ``solve_ivp`` once between two corners of tabulated inputs, so that no corner is stepped over, and joins the parts.
+Steps one of SciPy's solvers from corner to corner of tabulated inputs, so that none is stepped over, and from reset to
+reset; what happens after a step is what the compiled loop does (steppers/loop.c).
 """
 
 from __future__ import annotations
@@ -10,13 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import UsageError
-from ..limits.runs import INSTANT
+from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from .events import GO_ON, Event
+from .crossings import Crossings, Step
+from .events import Event
 from .names import require, unknown
-from .pace import Pace, watch_steps
-from .resets import Resets
+from .pace import Pace
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -52,21 +52,24 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Joined:
-    """Dense output of several parts of a run."""
+    """Dense output of a run: that of each step, up to where the next one goes on."""
 
-    def __init__(self, parts: Sequence[Callable[[Array], Array]], ends: Sequence[float]) -> None:
-        self.parts = parts
-        self.ends = np.array(ends)  # of all parts but the last
-        self.forward = len(ends) < 2 or ends[-1] > ends[0]
+    def __init__(self, pieces: Sequence[tuple[float, Callable[[Array], Array]]], forward: bool) -> None:
+        self.ends = np.array([end for end, _ in pieces])
+        self.parts = [part for _, part in pieces]
+        self.sign = 1.0 if forward else -1.0
 
     def __call__(self, t: Array) -> Array:
         """States (n_x, k) at times (k,)."""
-        which = np.searchsorted(self.ends if self.forward else -self.ends, t if self.forward else -t)
-        columns = [self.parts[k](t[which == k]) for k in np.unique(which)]
-        result = np.empty((columns[0].shape[0], len(t)))
-        for k, block in zip(np.unique(which), columns, strict=True):
-            result[:, which == k] = block
-        return result
+        at = np.asarray(t, dtype=float)
+        which = np.minimum(np.searchsorted(self.sign * self.ends, self.sign * at), len(self.parts) - 1)
+        order = np.argsort(which, kind="stable")
+        result: Array | None = None
+        for places in np.split(order, np.flatnonzero(np.diff(which[order])) + 1):
+            block = np.asarray(self.parts[int(which[places[0]])](at[places]))
+            result = np.empty((block.shape[0], len(at))) if result is None else result
+            result[:, places] = block
+        return np.empty((0, 0)) if result is None else result
 
 
 def choose_solver(method: Any) -> Any:
@@ -138,171 +141,156 @@ def integrate(
     Interrupted
         Ctrl-C.
     """
-    scipy = require("scipy.integrate", "scipy", "simulate")
-    times: list[Array] = []
-    states: list[Array] = []
-    t_events: list[list[Array]] = [[] for _ in events]
-    x_events: list[list[Array]] = [[] for _ in events]
-    pieces: list[Any] = []
-    walked: list[tuple[float, Array]] = []
-    counts = {"nfev": 0, "njev": 0, "nlu": 0}
-    x, k, start, jumped = x0, 0, nodes[0], True
-    resets = Resets(events, rhs, nodes[0], nodes[-1])
-    while True:
-        span, last = (start, nodes[k + 1]), k == len(nodes) - 2
-        if enter is not None:
-            enter(nodes[k], nodes[k + 1])
-        asked = None if t_eval is None else _between(t_eval, span, last)
-        if asked is not None and resets.count and asked.size and asked[0] == start:  # stored before the reset
-            asked = asked[1:]
-        first = (
-            {} if "first_step" not in options else {"first_step": min(options["first_step"], abs(span[1] - span[0]))}
-        )
-        counted = [event.terminal for event in events]
-        for event in events:
-            event.terminal = event.terminal if event.action == GO_ON else 1
-        trail: list[tuple[float, Array]] = [(start, x)]
-        try:
-            part = scipy.solve_ivp(
-                rhs, span, x, method=watch_steps(solver, pace, trail), t_eval=asked, events=list(events) or None,
-                dense_output=dense, **options | first,
-            )  # fmt: skip
-        except KeyboardInterrupt as interrupt:
-            raise Interrupted(_cut_short(times, states, trail, t_events, x_events, nodes[0], counts)) from interrupt
-        for key in counts:
-            counts[key] += int(getattr(part, key, 0) or 0)
-        if part.status == 1:
-            _complete(part, events, trail)
-        t, y = np.asarray(part.t), np.asarray(part.y).reshape(len(x0), len(part.t))
-        fired: list[int] = []
-        over = False
-        for e, event in enumerate(events):
-            t_events[e].append(np.asarray(part.t_events[e]))
-            x_events[e].append(np.asarray(part.y_events[e]).reshape(len(part.t_events[e]), len(x0)).T)
-            event.terminal, happened = counted[e], len(part.t_events[e])
-            if event.action != GO_ON and part.status == 1 and happened:
-                fired.append(e)
-            if event.terminal:
-                over = over or happened >= event.terminal
-                event.terminal = max(event.terminal - happened, 1)
-        fired = [] if over else fired
-        if dense and part.sol is not None:
-            pieces.append(part.sol)
-        ended = float(part.t_events[fired[0]][-1]) if fired else float(span[1])
-        if t_eval is not None:
-            walked += trail[0 if jumped else 1 :]
-            if part.status == 1:  # an event, beyond which the last step went
-                walked[-1] = _stopped(part, nodes[-1] >= nodes[0])
-        done = (last and not fired) or part.status == -1 or (part.status == 1 and not fired)
-        if t_eval is None:
-            skip = 0 if jumped else 1  # a part starts where the last one ended
-            times.append(t[skip:])
-            states.append(y[:, skip:])
+    journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, pace)
+    try:
+        journey.travel(reset, enter)
+    except KeyboardInterrupt as interrupt:
+        journey.status, journey.message = -1, MESSAGES[-1]
+        raise Interrupted(journey.solution()) from interrupt
+    return journey.solution()
+
+
+MESSAGES = {
+    0: "The solver successfully reached the end of the integration interval.",
+    1: "A termination event occurred.",
+    -1: "The run was interrupted.",
+}
+
+
+class _Journey:
+    """One run on its way."""
+
+    def __init__(
+        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None, events: Sequence[Event],
+        dense: bool, options: dict[str, Any], pace: Pace,
+    ) -> None:  # fmt: skip
+        self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
+        self.options, self.pace = options, pace
+        self.t, self.x, self.forward = nodes[0], np.array(x0), nodes[-1] >= nodes[0]
+        self.crossings = Crossings(events, rhs, nodes[0], nodes[-1]) if events else None
+        self.pieces: list[tuple[float, Any]] | None = [] if dense else None
+        self.walked: list[tuple[float, Array]] = []
+        self.asked: list[Array] = []
+        self.status, self.message = 0, MESSAGES[0]
+        self.counts = {"nfev": 0, "njev": 0, "nlu": 0}
+        self.kept = True
+
+    def travel(
+        self, reset: Callable[[float, Array, list[int]], Array] | None, enter: Callable[[float, float], None] | None
+    ) -> None:
+        """Go on to the end, a terminal event or a failure."""
+        self._keep()
+        if self.t_eval is not None and self.t_eval.size and self.t_eval[0] == self.t:
+            self.asked.append(self.x)
+        k, armed = 0, False
+        while k < len(self.nodes) - 1:
+            if enter is not None:
+                enter(self.nodes[k], self.nodes[k + 1])
+            if self.t == self.nodes[k + 1]:
+                k += 1
+                continue
+            solver = self._start(self.nodes[k + 1])
+            if self.crossings is not None and not armed:
+                self.crossings.arm(self.t, self.x, self._length(solver))
+                armed = True
+            stop: tuple[float, bool] | None = None
+            try:
+                while stop is None and solver.status == "running":
+                    message = solver.step()
+                    if solver.status == "failed":
+                        self.status, self.message = -1, str(message)
+                        return
+                    stop = self._settle(solver)
+                    if stop is None and solver.status == "running":
+                        self.pace.look(self.t, self.x)
+            finally:
+                self._count(solver)
+            if stop is None and self.t != self.nodes[k + 1]:
+                return  # the solver ended by itself: require_end tells
+            if stop is not None and stop[1]:
+                self.status, self.message = 1, MESSAGES[1]
+                return
+            if stop is not None and self.crossings is not None:
+                fired = list(self.crossings.fired)
+                self.crossings.arrive(self.t, self.x, float(solver.t - solver.t_old))
+                if reset is not None:
+                    self.x = np.array(reset(self.t, self.x, fired), dtype=float)
+                self._keep()
+                self.crossings.depart(self.t, self.x)
+
+    def _start(self, end: float) -> Any:
+        options = dict(self.options)
+        if options.get("first_step") is not None:
+            options["first_step"] = min(options["first_step"], abs(end - self.t))
+        return self.solver(self.rhs, self.t, self.x, end, **options)
+
+    def _length(self, solver: Any) -> float:
+        size = getattr(solver, "h_abs", None)
+        return (1.0 if self.forward else -1.0) * float(size) if size else 0.0
+
+    def _count(self, solver: Any) -> None:
+        for key in self.counts:
+            self.counts[key] += int(getattr(solver, key, 0) or 0)
+
+    def _settle(self, solver: Any) -> tuple[float, bool] | None:
+        """What a step brought: events, output."""
+        t_old, t, x = float(solver.t_old), float(solver.t), np.array(solver.y)
+        cache: list[Any] = []
+
+        def between(at: Any) -> Array:
+            if not cache:
+                cache.append(solver.dense_output())
+            return np.asarray(cache[0](at))
+
+        stop = None if self.crossings is None else self.crossings.find(Step(t_old, t, x, between, t - t_old))
+        end = t if stop is None else stop[0]
+        if self.t_eval is not None:
+            sign = 1.0 if self.forward else -1.0
+            first = len(self.asked)
+            last = first + int(np.searchsorted(sign * self.t_eval[first:], sign * end, side="right"))
+            for at in self.t_eval[first:last].tolist():
+                self.asked.append(x if at == t and stop is None else between(at))
+        if self.pieces is not None:
+            between(t)
+            self.pieces.append((end, cache[0]))
+        self.t, self.x = end, x if stop is None else between(end)
+        self._keep()
+        return stop
+
+    def _keep(self) -> None:
+        """Store a step, or a state after a reset; not more than KEPT numbers besides what is asked for."""
+        if self.t_eval is None or (self.kept and (len(self.walked) + 1) * (1 + len(self.x)) <= KEPT):
+            self.walked.append((self.t, self.x))
         else:
-            keep = len(t) if done or fired or last else len(t) - 1  # the corner was asked for only to go on from
-            times.append(t[:keep])
-            states.append(y[:, :keep])
-        if done:
-            break
-        jumped = bool(fired)
-        if fired and reset is not None:
-            before = x_events[fired[0]][-1][:, -1]
-            x = reset(ended, before, fired)
-            resets.note(ended, before, x, fired)
-            start = ended
-            if start == nodes[-1]:
-                part.status = 0
-                break
-        else:
-            x, k, start = y[:, -1], k + 1, nodes[k + 1]
-    joined = (
-        pieces[0] if len(pieces) == 1 else Joined(pieces, [float(p.ts[-1]) for p in pieces[:-1]]) if pieces else None
-    )
-    all_times = np.concatenate(times)
-    ends = (nodes[0], nodes[0])
-    if pieces:
-        ends = (float(pieces[0].ts[0]), float(pieces[-1].ts[-1]))
-    elif all_times.size:
-        ends = (float(all_times[0]), float(all_times[-1]))
-    return Solution(
-        all_times,
-        np.concatenate(states, axis=1),
-        [np.concatenate(found) for found in t_events],
-        [np.concatenate(found, axis=1) for found in x_events],
-        joined,
-        int(part.status),
-        str(part.message),
-        counts,
-        ends,
-        _columns(walked, len(x0)) if t_eval is not None else None,
-    )
+            self.kept = False
+            self.walked.clear()
+
+    def solution(self) -> Solution:
+        """All of it so far."""
+        n, n_asked = len(self.x), len(self.asked)
+        steps = _columns(self.walked, n)
+        t, x = steps if self.t_eval is None else (self.t_eval[:n_asked], np.array(self.asked).reshape(n_asked, n).T)
+        found = ([], []) if self.crossings is None else self.crossings.results(n)
+        return Solution(
+            t, x, *found, Joined(self.pieces, self.forward) if self.pieces else None, self.status, self.message,
+            self.counts, (self.nodes[0], self.t), None if self.t_eval is None else steps,
+        )  # fmt: skip
 
 
-def _complete(part: Any, events: Sequence[Event], trail: Sequence[tuple[float, Array]]) -> None:
-    """Add the events of the same instant to that at which SciPy stopped: it tells of one alone.
+def require_end(solution: Solution, end: float) -> None:
+    """Refuse a run that tells of its end without having come there; no run may end early in silence.
 
-    An event whose value has changed sign since the beginning of the step, and that was not found before, is at that
-    instant, but for rounding; so is one that is to change it within the rounding of the time.
+    Raises
+    ------
+    SimulationError
     """
-    sign = 1.0 if trail[-1][0] >= trail[0][0] else -1.0
-    found = [(sign * times[-1], k) for k, times in enumerate(part.t_events) if len(times)]
-    latest, first = max(found)
-    t, x = sign * latest, np.array(part.y_events[first][-1])
-    began, state = next((point for point in reversed(trail) if sign * point[0] < latest), (t, x))
-    step, instant = abs(t - began), INSTANT * max(abs(t), 1e-3)
-    for e, event in enumerate(events):
-        if len(part.t_events[e]) and sign * part.t_events[e][-1] > sign * began:
-            continue
-        a, b = event(began, state), event(t, x)
-        crossed = a * b <= 0.0 or abs(b) * step <= instant * abs(a - b)
-        if crossed and ((a < 0.0 and event.direction >= 0) or (a > 0.0 and event.direction <= 0)):
-            part.t_events[e] = np.append(part.t_events[e], t)
-            part.y_events[e] = np.vstack([np.asarray(part.y_events[e]).reshape(-1, len(x)), x])
+    if solution.status == 0 and solution.ends[1] != end:
+        raise SimulationError(
+            f"the integrator says that it is at the end, t = {end:.6g} s, and is at t = {solution.ends[1]:.6g} s: "
+            "a fault of the integrator (of eomgen, unless the method is your own); run in parts, or take another method"
+        )
 
 
 def _columns(walked: Sequence[tuple[float, Array]], n: int) -> tuple[Array, Array]:
-    """Times (k,) and states (n, k) of steps; none where they are more than KEPT."""
-    kept = walked if len(walked) * (1 + n) <= KEPT else []
-    return np.array([t for t, _ in kept]), np.array([x for _, x in kept]).reshape(len(kept), n).T
-
-
-def _stopped(part: Any, forward: bool) -> tuple[float, Array]:
-    """Time and state of the event that ended a part, which is the last of all."""
-    found = [(float(t[-1]), x[-1]) for t, x in zip(part.t_events, part.y_events, strict=True) if len(t)]
-    return max(found, key=lambda pair: pair[0] if forward else -pair[0])
-
-
-def _cut_short(
-    times: Sequence[Array],
-    states: Sequence[Array],
-    trail: Sequence[tuple[float, Array]],
-    t_events: Sequence[Sequence[Array]],
-    x_events: Sequence[Sequence[Array]],
-    start: float,
-    counts: dict[str, int],
-) -> Solution:
-    """What was stored of the parts before, and the steps of the one that was interrupted."""
-    n = len(trail[0][1])
-    skip = 1 if times and times[-1].size and times[-1][-1] == trail[0][0] and len(trail) > 1 else 0
-    t, x = np.array([t for t, _ in trail[skip:]]), np.array([x for _, x in trail[skip:]]).T.reshape(n, -1)
-    return Solution(
-        np.concatenate([*times, t]),
-        np.concatenate([*states, x], axis=1),
-        [np.concatenate([np.empty(0), *found]) for found in t_events],
-        [np.concatenate([np.empty((n, 0)), *found], axis=1) for found in x_events],
-        None,
-        -1,
-        "The run was interrupted.",
-        counts,
-        (start, trail[-1][0]),
-    )
-
-
-def _between(t_eval: Array, span: tuple[float, float], last: bool) -> Array:
-    start, end = span
-    forward = end >= start
-    after = t_eval >= start if forward else t_eval <= start
-    before = t_eval < end if forward else t_eval > end
-    if last:
-        return np.asarray(t_eval[after & (before | (t_eval == end))])
-    return np.append(t_eval[after & before], end)
+    """Times (k,) and states (n, k) of steps."""
+    return np.array([t for t, _ in walked]), np.array([x for _, x in walked]).reshape(len(walked), n).T

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.inertia import SINGULAR
+from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
@@ -69,7 +70,7 @@ class Kernels:
         if name not in self.core.names:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
-            if layout.rank == 0 and name == "project":
+            if layout.n_c == 0 and name == "project":
                 return Identity(layout.n_x, [i for i, _ in layout.balls])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
@@ -101,7 +102,7 @@ class Kernels:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(M).all():
                 return ""
-            values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
             if layout.metadata.get("indefinite"):
                 return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
             if values[0] > SINGULAR:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..texts import visible
 from .names import require
 
 if TYPE_CHECKING:
@@ -29,13 +30,14 @@ def plot(trajectory: Trajectory, names: Sequence[str], ax: Any = None) -> Any:
         for name in group:
             panel.plot(trajectory.t, rows[name], label=name if len(group) > 1 or ax is not None else None)
         if ax is None:
-            panel.set_ylabel(_label(group[0] if len(group) == 1 else "", unit))
+            panel.set_ylabel(_label(group[0] if len(group) == 1 else "", unit), parse_math=False)
             panel.grid(alpha=0.3)
             if len(group) > 1:
                 panel.legend()
     if ax is not None:
         labels = [_label(name, trajectory.units.get(name, "")) for name in names]
-        ax.set_ylabel(labels[0] if len(labels) == 1 else ", ".join(dict.fromkeys(unit for unit in by_unit if unit)))
+        units = ", ".join(dict.fromkeys(visible(unit, lines=False) for unit in by_unit if unit))
+        ax.set_ylabel(labels[0] if len(labels) == 1 else units, parse_math=False)
         if len(names) > 1:
             ax.legend()
     axes[-1].set_xlabel("t (s)")
@@ -43,4 +45,5 @@ def plot(trajectory: Trajectory, names: Sequence[str], ax: Any = None) -> Any:
 
 
 def _label(name: str, unit: str) -> str:
+    unit = visible(unit, lines=False)
     return f"{name} ({unit})" if name and unit else name or unit

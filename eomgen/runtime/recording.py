@@ -234,8 +234,8 @@ def project(module: Module, t: Array, raw: Array, forcing: Forcing | None = None
         raw_velocity=largest(velocity(raw, t=t, u=u)),
         position=largest(position(x[:n], t=t, u=here)),
         velocity=largest(velocity(x, t=t, u=here)),
-        correction_position=float(correction[:n].max()),
-        correction_velocity=float(correction[n:].max()),
+        correction_position=largest(correction[:n]),
+        correction_velocity=largest(correction[n:]),
     ), x
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..texts import html_table, visible
+
 if TYPE_CHECKING:
     from .module import Module
 
@@ -61,17 +63,10 @@ def text(module: Module) -> str:
     """Several lines of plain text."""
     lines = facts(module)
     width = max(len(label) for label, _ in lines)
-    head = module.name + (f": {module.doc}" if module.doc else "")
+    head = module.name + (f": {visible(module.doc)}" if module.doc else "")
     return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
 
 
 def html(module: Module) -> str:
     """A small table for notebooks."""
-    from html import escape
-
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(label)}</th><td style='text-align:left'>{escape(value)}</td></tr>"
-        for label, value in facts(module)
-    )
-    doc = f"<p>{escape(module.doc)}</p>" if module.doc else ""
-    return f"<b>{escape(module.name)}</b>{doc}<table>{rows}</table>"
+    return html_table(module.name, facts(module), module.doc)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import ZenoError
-from ..limits.runs import AHEAD, CROWD, CROWDED, TOUCHING
+from ..limits.runs import AHEAD, CROWDED, TOUCHING
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, WAIT, Event, Events
+from .events import GO_ON, RESET, WAIT, Event, Events, crowd_of
 
 
 class Resets:
@@ -27,7 +27,7 @@ class Resets:
     def __init__(self, events: Sequence[Event], rhs: Callable[[float, Array], Array], start: float, end: float) -> None:
         self.events, self.rhs, self.span = events, rhs, end - start
         self.count, self.crowded, self.last = 0, 0, np.inf
-        self.most = max(CROWD, 2 * len(events))
+        self.most = crowd_of([event.action for event in events])
 
     def note(self, t: float, before: Array, after: Array, fired: Sequence[int]) -> None:
         """Take note of events that happened at time t and led from one state to another.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from math import isfinite
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,15 +14,17 @@ from numpy.typing import ArrayLike
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
-from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, takes_jacobian
+from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .layout import number
 from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
+from .room import read_times, require_room, require_steps
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -30,12 +33,13 @@ if TYPE_CHECKING:
     from .module import Module
     from .trajectory import Trajectory
 
-#: Steps of one size in one run; storing them takes gigabytes.
-MOST_STEPS = 10**8
 #: Assemblies in turn, by secant steps, with inputs that depend on the state.
 ROUNDS = 50
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
-OPTIONS = ("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step")
+OPTIONS = (
+    *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
+    *("checkpoint", "checkpoint_every", "resume"),
+)
 
 
 def simulate(
@@ -55,6 +59,9 @@ def simulate(
     first_step: float | None = None,
     progress: bool | None = None,
     step: float | None = None,
+    checkpoint: str | FilePath | None = None,
+    checkpoint_every: float = 60.0,
+    resume: bool | None = None,
     **options: Any,
 ) -> Trajectory:
     """Integrate the equations of motion.
@@ -95,6 +102,12 @@ def simulate(
         Size of the steps of RK4 (s), and only of it.
     progress : bool, optional
         Show progress on stderr; by default for runs of more than two seconds on a terminal.
+    checkpoint : str or Path, optional
+        File that keeps the run: the same call again goes on from there, to the last bit, or returns the finished run.
+    checkpoint_every : float
+        Seconds between two writings of that file.
+    resume : bool, optional
+        True: the file must be there; False: begin anew; by default go on if it is there.
     **options
         Passed on to the solver; unknown ones are an error for SciPy's methods.
 
@@ -116,14 +129,23 @@ def simulate(
     EvaluationError
         The right-hand side cannot be evaluated at the initial state.
     UsageError
-        Unknown names, wrong shapes.
+        Unknown names, wrong shapes; a checkpoint of another run, or a damaged one.
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
+    kept = None
+    if checkpoint is not None:
+        from .checkpoint import Checkpoint, identify
+
+        kept = Checkpoint(checkpoint, checkpoint_every, resume)
+    elif resume is not None:
+        raise UsageError("resume needs checkpoint=, the file to go on from")
     if method == "kinematic" or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
         if is_driven(module) and not _led_by_inputs(module, inputs, method):
+            if kept is not None:
+                raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
             steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
@@ -145,7 +167,7 @@ def simulate(
         check_options(solver, options, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
     if step is not None:
-        check_count(step, start, end)
+        require_steps("step", step, start, end)
         max_step, first_step = step, min(step, abs(end - start)) or None
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
@@ -167,15 +189,22 @@ def simulate(
     options = {**tolerances, **steps, **options}
     if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
         options = check_tolerances(module.n_x, abs(end - start), options)
+        require_steps("max_step", float(options.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    stored = None if t_eval is None else ordered_times(t_eval, start, end)
-    pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
+    longest = float(options.get("max_step", np.inf))
+    numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
+    many = abs(end - start) / longest
+    require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
+    if kept is not None:
+        kept.open(identify(bound, forcing, watched, nodes, x0, method, stored, dense_output, options))
+    pace = Pace(start, end, x0, module.n_q, longest, run.troubled, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched, kept
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -260,6 +289,7 @@ def _check(run: Run, solution: Solution, start: float, end: float, method: str) 
         reached = float(solution.t[-1]) if solution.t.size else start
         last = solution.x[:, -1] if solution.t.size else None
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
+    require_end(solution, end)
 
 
 def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
@@ -292,18 +322,9 @@ def check_method(method: Any, step: Any) -> float | None:
     return None if step is None else check_step("step", step)
 
 
-def check_count(step: float, start: float, end: float) -> None:
-    """Refuse steps of one size that are too many for a run, or too small for its times."""
-    if abs(end - start) > MOST_STEPS * step or abs(end) + step == abs(end):
-        raise UsageError(f"step = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end")
-
-
-def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
-    """The times wanted, in order and within the span, or a UsageError."""
-    try:
-        times = np.array(t_eval, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"t_eval must be a list of times in seconds, not {t_eval!r}") from None
+def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
+    """The times wanted, in order and within the span, or a UsageError; n numbers are kept for each."""
+    times = read_times("t_eval", t_eval, 1 + n)
     first, last = (0, -1) if end >= start else (-1, 0)
     if (
         times.ndim != 1
@@ -347,7 +368,7 @@ def find_state(
             if before is not None:  # Broyden's update: the slope that explains the last step
                 move, change = before
                 secant += np.outer(gap - change - secant @ move, move) / (move @ move)
-            move = np.linalg.lstsq(secant, -gap, rcond=None)[0]
+            move = algebra.lstsq(secant, -gap, rcond=None)
             if not np.isfinite(move).all() or not move.any():
                 break
             before, u = (move, gap), found.copy()

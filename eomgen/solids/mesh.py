@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
+from stat import S_ISREG
 
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.files import MESH
 from ..records import dataclass
-
-SIZE = 200_000_000  #: bytes of a file
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,19 @@ def measure_mesh(path: str) -> MeshProperties:
         stat = os.stat(path)
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from None
+    except ValueError as error:  # NUL, or half a surrogate pair
+        raise UsageError(f"{path!r} is not the name of a file: {error}") from None
+    if not S_ISREG(stat.st_mode):
+        raise UsageError(f"{path} is no plain file")
     if not path.lower().endswith(".stl"):
         raise UsageError(f"{path}: only STL files (.stl) can be read")
-    if stat.st_size > SIZE:
-        raise UsageError(f"{path} has {stat.st_size} bytes; at most {SIZE}")
+    if stat.st_size > MESH:
+        raise UsageError(f"{path} has {stat.st_size:,} bytes; at most {MESH:,}: leave out triangles")
     return _measure(os.path.abspath(path), stat.st_mtime_ns, stat.st_size)
 
 
 @lru_cache(maxsize=256)
+@np.errstate(all="ignore")
 def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
     try:
         import trimesh
@@ -69,6 +74,8 @@ def _measure(path: str, _changed: int, _size: int) -> MeshProperties:
         raise UsageError(f"{path} does not bound a solid: neighbouring triangles are wound in opposite senses")
     measured = mesh.mass_properties
     volume = float(measured["volume"])
+    if not np.isfinite(volume + np.sum(measured["inertia"]) + np.sum(measured["center_mass"])):
+        raise UsageError(f"{path} is so large or so small that its volume or its inertia is not finite")
     if not volume > 0.0:
         raise UsageError(f"{path} is inside out: its triangles face inwards, so the volume is {volume:.3g}")
     centre = np.asarray(measured["center_mass"], dtype=float)

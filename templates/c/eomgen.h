@@ -8,8 +8,10 @@ extern "C" {
 
 #define EOMGEN_ABI 3
 
-/* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed). */
+/* Status of every function: 0 is success, positive codes are recoverable (a smaller step may succeed), negative ones are
+   not. */
 enum {
+    EOMGEN_BAD_ARGUMENT = -1,        /* outside what is allowed; nothing was written */
     EOMGEN_SUCCESS = 0,
     EOMGEN_NON_FINITE = 1,           /* a result is NaN or infinite */
     EOMGEN_SINGULAR_MASS_MATRIX = 2, /* a motion has no inertia behind it */
@@ -37,7 +39,7 @@ typedef int (*eomgen_lane_function)(const double *t, const double *x, const doub
     double *w, int *status);
 
 /* Taylor coefficients of the motion through x at t: row m of out, n_x doubles, is the derivative of order m over m!, for
-   m = 0 .. order. Returns a status, as above. */
+   m = 0 .. order. Returns a status, as above; EOMGEN_BAD_ARGUMENT for an order below 0 or above `most`. */
 typedef struct {
     int most;   /* the highest order */
     int n_work; /* length of w, all of it finite: zero at first, and after a failure or an overflow */

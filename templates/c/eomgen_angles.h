@@ -22,12 +22,24 @@ static inline bits sincos_wide(pack a, int n, double *restrict sines, double *re
 }
 
 #if EOMGEN_PACK == 4
-#define sincos_one(a, sines, cosines) sincos_wide((pack){ a, a, a, a }, 1, sines, cosines)
-#define sincos_two(a, b, sines, cosines) sincos_wide((pack){ a, b, a, b }, 2, sines, cosines)
-#define sincos_four(a, b, c, d, sines, cosines) sincos_wide((pack){ a, b, c, d }, 4, sines, cosines)
+static inline pack pack_of(double a, double b, double c, double d)
+{
+    const pack result = { a, b, c, d };
+    return result;
+}
+
+#define sincos_one(a, sines, cosines) sincos_wide(pack_of(a, a, a, a), 1, sines, cosines)
+#define sincos_two(a, b, sines, cosines) sincos_wide(pack_of(a, b, a, b), 2, sines, cosines)
+#define sincos_four(a, b, c, d, sines, cosines) sincos_wide(pack_of(a, b, c, d), 4, sines, cosines)
 #else
-#define sincos_one(a, sines, cosines) sincos_wide((pack){ a, a }, 1, sines, cosines)
-#define sincos_two(a, b, sines, cosines) sincos_wide((pack){ a, b }, 2, sines, cosines)
+static inline pack pack_of(double a, double b)
+{
+    const pack result = { a, b };
+    return result;
+}
+
+#define sincos_one(a, sines, cosines) sincos_wide(pack_of(a, a), 1, sines, cosines)
+#define sincos_two(a, b, sines, cosines) sincos_wide(pack_of(a, b), 2, sines, cosines)
 #endif
 #endif
 

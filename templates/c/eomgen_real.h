@@ -7,6 +7,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#if defined(__cplusplus) && !defined(restrict)
+#define restrict __restrict /* C++ has no such word */
+#endif
+
 /* EOMGEN_PORTABLE: do without the vector types of GCC and Clang. */
 #if defined(__GNUC__) && !defined(EOMGEN_PORTABLE)
 #define EOMGEN_VECTORS
@@ -21,10 +25,12 @@ typedef uint64_t numeral __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 #define EOMGEN_BEGIN flag failed = { 0 };
 #define EOMGEN_REJECT(lost) failed |= (lost);
 #define EOMGEN_RETURN return failed;
+#define EOMGEN_REFUSE return ~(flag){ 0 };
 
 static inline real same(double a)
 {
-    return a - (real){ 0.0 };
+    const real zero = { 0.0 };
+    return a - zero;
 }
 
 static inline real choose(flag condition, real a, real b)
@@ -52,21 +58,22 @@ typedef int flag;
 #define EOMGEN_BEGIN
 #define EOMGEN_REJECT(lost) if (lost) { return 2; }
 #define EOMGEN_RETURN return 0;
+#define EOMGEN_REFUSE return -1; /* EOMGEN_BAD_ARGUMENT */
 #define same(a) (a)
 #define choose(condition, a, b) ((condition) ? (a) : (b))
 #define abs_of(a) fabs(a)
 #endif
 
-/* NAME(a), NAME(a, b): a function of doubles in every lane. */
+/* NAME(a), NAME(a, b): a function of doubles in every lane; of files that include eomgen.h. */
 #define EOMGEN_EACH(NAME, FUNCTION) \
-    static inline real NAME(real a) \
+    EOMGEN_SHARED inline real NAME(real a) \
     { \
         real y = same(0.0); \
         for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k)); } \
         return y; \
     }
 #define EOMGEN_EACH_PAIR(NAME, FUNCTION) \
-    static inline real NAME(real a, real b) \
+    EOMGEN_SHARED inline real NAME(real a, real b) \
     { \
         real y = same(0.0); \
         for (int k = 0; k < EOMGEN_WIDTH; k++) { EOMGEN_LANE(y, k) = FUNCTION(EOMGEN_LANE(a, k), EOMGEN_LANE(b, k)); } \

@@ -60,7 +60,8 @@ static inline bits sincos_pack(pack x, pack *restrict sine, pack *restrict cosin
     const bits odd = -(quarter & 1), apart = ((bits)s ^ (bits)c) & odd;
     *sine = (pack)((bits)s ^ apart ^ ((quarter & 2) << 62) ^ sign);
     *cosine = (pack)((bits)c ^ apart ^ (((quarter + 1) & 2) << 62));
-    return (bits)(a <= EOMGEN_NEAR) ^ ~(bits){ 0 };
+    const bits none = { 0 };
+    return (bits)(a <= EOMGEN_NEAR) ^ ~none;
 }
 #endif
 

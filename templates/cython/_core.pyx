@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True, embedsignature=True
-# cython: auto_pickle=False, emit_code_comments=False
+# cython: auto_pickle=False, emit_code_comments=False, freethreading_compatible=True
 # distutils: define_macros=NPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION
 """Cython layer: the C table of one model (eomgen_model_table) -> Python callables on NumPy arrays.
 
@@ -7,9 +7,12 @@ The text is the same for every model. It is compiled once and linked with a mode
 the model it reads from the table and from the model's JSON metadata.
 
 Threads: contexts never change, and each call has its work array to itself, on the stack when small and on the heap
-otherwise. So any number of threads may call one object at once. Only ``failure`` is shared: it holds the last failure
-of any thread. Batches and long kernels run without the GIL.
+otherwise. So any number of threads may call one kernel at once, in free-threaded Pythons too; only ``failure`` is
+shared: it holds the last failure of any thread. Batches and long kernels run without the GIL. What late lanes change
+is published by atomic operations (_lanes.pxi). Steppers and journeys are of one thread each; their solutions
+(interpolants, dense) may be read by many.
 """
+cimport cython
 cimport numpy as cnp
 from cpython.object cimport PyObject
 from cpython.pycapsule cimport PyCapsule_New
@@ -35,7 +38,7 @@ cdef extern from "eomgen.h" nogil:
     ctypedef int (*eomgen_lane_function)(const double *, const double *, const double *, const double *, double *,
                                          double *, int *) noexcept nogil
     ctypedef struct eomgen_series:
-        int n_work
+        int n_work, most
     ctypedef struct eomgen_lanes:
         int width
         int (*usable)() noexcept nogil
@@ -184,7 +187,7 @@ cdef class Kernel:
     cdef cnp.npy_intp[MAX_DIMENSIONS + 1] dims
     cdef object fail, error
     cdef readonly object name, shape, nan, context
-    cdef public object failure
+    cdef object last_failure
 
     def __cinit__(self, str name not None, Context context not None, shape, fail, nan=False, error=ValueError):
         enable_quick_calls(self)
@@ -203,6 +206,16 @@ cdef class Kernel:
             self.dims[i] = self.shape[i]
         counts = _FACTS.get("operations", {}).get(name, {}).values()
         self.long = sum([count for count in counts if isinstance(count, (int, float))]) > _LONG
+
+    @property
+    def failure(self):
+        with cython.critical_section(self):
+            return self.last_failure
+
+    @failure.setter
+    def failure(self, value):
+        with cython.critical_section(self):
+            self.last_failure = value
 
     def __repr__(self):
         return f"<{type(self).__name__} kernel {self.name} of {MODEL.name.decode()}: ({self.n_in},) -> {self.shape}>"
@@ -255,7 +268,8 @@ cdef class Kernel:
         if not self.tolerant or status < 0:
             self.fail(self.name, status, t, x, *given)
             raise RuntimeError(f"kernel {self.name!r} failed with status {status} at t = {t}")
-        self.failure = (status, t, x)
+        with cython.critical_section(self):
+            self.last_failure = (status, t, x)
 
     cdef object general(self, object t, list values, object p, object u, object out):
         """Any arrays: values are (label, length, array_like) in the order the kernel wants them, at most three."""
@@ -284,11 +298,13 @@ cdef class Kernel:
         cdef cnp.ndarray result = self.target(out, held, columns)
         cdef cnp.npy_intp length_of_all = MODEL.n_work + self.n_in + self.n_out + MODEL.n_u
         cdef cnp.npy_intp plain = length_of_all
-        if columns >= 0 and LATE is not None:
+        cdef const eomgen_lanes *lanes
+        if columns >= 0 and has_offer(OFFERED):
             self.wait_for_lanes(columns)
-        if columns >= 0 and LANES != NULL and LANES.kernels[self.index] != NULL:
-            batch.lanes = LANES.kernels[self.index]
-            length_of_all += WIDEST + LANES.width * (plain + 1 + MODEL.n_const)
+        lanes = seen_lanes(LANES)
+        if columns >= 0 and lanes != NULL and lanes.kernels[self.index] != NULL:
+            batch.lanes, batch.width = lanes.kernels[self.index], lanes.width
+            length_of_all += WIDEST + lanes.width * (plain + 1 + MODEL.n_const)
         cdef cnp.ndarray heap = cnp.PyArray_EMPTY(1, &length_of_all, cnp.NPY_DOUBLE, 0)
         batch.w = <double *>cnp.PyArray_DATA(heap)
         batch.columns = 1 if columns < 0 else columns
@@ -311,11 +327,8 @@ cdef class Kernel:
 
     cdef int wait_for_lanes(self, cnp.npy_intp columns) except -1:
         """Count columns that lanes could take, and have the lanes made when there were many."""
-        global BATCHED
-        if self.name in IN_LANES:
-            BATCHED += columns
-            if BATCHED >= MANY:
-                take_lanes(self.name)
+        if self.name in IN_LANES and count_columns(BATCHED, columns) >= MANY:
+            take_lanes(self.name)
         return 0
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):

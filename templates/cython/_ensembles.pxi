@@ -103,7 +103,9 @@ cdef class Ensemble:
                   int64_t max_steps, t_eval=None, signals=(), events=None, ptrdiff_t keep=0):
         cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in
         cdef eomgen_ensemble *all = &self.all
+        cdef const eomgen_lanes *lanes
         take_lanes()
+        lanes = seen_lanes(LANES)
         self.signals, self.watched, self.context = tuple(signals), events, Context()
         x0, p, u = (np.ascontiguousarray(value, dtype=float) for value in (x0, p, u))
         count = len(x0)
@@ -114,12 +116,12 @@ cdef class Ensemble:
         asked = np.ascontiguousarray(() if t_eval is None else t_eval, dtype=float)
         self.held = [x0, p, u, nodes, atol, asked]
         all.method, all.model = eomgen_suited(find_method(method), n), MODEL
-        all.series = SERIES
+        all.series = seen_series(SERIES)
         all.rhs, all.n, all.count = MODEL.kernels[index].call, n, count
         if all.method.squares > 0:
             all.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        if LANES != NULL:
-            all.lane_rhs, all.lane_series, all.lane_width = LANES.contracted, LANES.expand, LANES.width
+        if lanes != NULL:
+            all.lane_rhs, all.lane_series, all.lane_width = lanes.contracted, lanes.expand, lanes.width
         all.x0, all.p, all.u = reading(x0), reading(p), reading(u)
         all.p_stride, all.u_stride = MODEL.n_p * (p.ndim - 1), MODEL.n_u * (u.ndim - 1)
         all.nodes, all.n_nodes = reading(nodes), len(nodes)

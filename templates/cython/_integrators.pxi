@@ -18,12 +18,12 @@ cdef class Integrator(Journey):
     cdef eomgen_function project
     cdef double *end
     cdef double first, begun
-    cdef bint busy
+    cdef object turn
     cdef public object pacer
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
-        self.end, self.first, self.busy = <double *>self.journey.nodes, first_step, False
+        self.end, self.first, self.turn = <double *>self.journey.nodes, first_step, allocate_lock()
         if _FACTS.get("n_c", 0) or _FACTS.get("balls"):
             self.project = MODEL.kernels[find("project", ValueError)].call
 
@@ -41,9 +41,8 @@ cdef class Integrator(Journey):
         if p is not None:
             constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
         result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
-        if self.busy:
+        if not self.turn.acquire(False):
             raise ValueError("it is at work in another thread; make one for each")
-        self.busy = True
         try:
             memcpy(run.y, cnp.PyArray_DATA(state), n * sizeof(double))
             memcpy(run.u, cnp.PyArray_DATA(inputs), MODEL.n_u * sizeof(double))
@@ -67,7 +66,8 @@ cdef class Integrator(Journey):
             memcpy(cnp.PyArray_DATA(result), run.y, n * sizeof(double))
             return result, None
         finally:
-            run.c, self.busy = <const double *>cnp.PyArray_DATA(self.context.c), False
+            run.c = <const double *>cnp.PyArray_DATA(self.context.c)
+            self.turn.release()
 
     cdef bint correct(self):
         """Bring the state onto the constraints, if there are any; whether that could be done."""

@@ -1,7 +1,7 @@
 # Journeys: whole trajectories by eomgen_loop.h, with a look at Python every few milliseconds.
 
 from cpython.exc cimport PyErr_CheckSignals
-from libc.math cimport isnan
+from libc.math cimport INFINITY, isnan
 
 from time import perf_counter
 
@@ -32,7 +32,11 @@ cdef extern from "eomgen_loop.h" nogil:
         double *bracket
         int *whose
         int *fired
+        int *touch
+        int crowd
         double *latest
+        double last_reset
+        int crowded
     ctypedef struct eomgen_journey:
         const double *nodes
         long n_nodes
@@ -50,7 +54,7 @@ cdef extern from "eomgen_loop.h" nogil:
         long trail_room
         double *trail
         long node, done, stored, n_pieces, n_notes, n_trail, resets
-        int begun
+        int begun, pause
     enum: EOMGEN_FULL, EOMGEN_RESET_FAILED
     int eomgen_travel(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
@@ -85,11 +89,12 @@ cdef class Dense:
         cdef int n = self.run.n
         cdef cnp.ndarray result = rows(k, n)
         cdef double *piece
+        cdef eomgen_run run = self.run  # of this call: threads may share the object
         for i in range(k):
             piece = <double *>cnp.PyArray_DATA(self.pieces) + (<cnp.npy_intp *>cnp.PyArray_DATA(chosen))[i] * (
                 3 + n * (1 + self.method.rows_F))
-            self.run.t_old, self.run.step, self.run.y_old, self.run.F = piece[0], piece[1], piece + 3, piece + 3 + n
-            self.method.interpolate(&self.run, (<double *>cnp.PyArray_DATA(at))[i],
+            run.t_old, run.step, run.y_old, run.F = piece[0], piece[1], piece + 3, piece + 3 + n
+            self.method.interpolate(&run, (<double *>cnp.PyArray_DATA(at))[i],
                                     <double *>cnp.PyArray_DATA(result) + i * n)
         return np.ascontiguousarray(result.T)
 
@@ -105,7 +110,8 @@ cdef class Journey(Stepper):
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
         trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
         tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
-        resets: rows (event, state) of the model's kernel.
+        resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many; keep: (seconds, function),
+        called about so often, between two steps, with what freeze gives; or None.
 
     Attributes
     ----------
@@ -115,7 +121,8 @@ cdef class Journey(Stepper):
 
     cdef eomgen_journey journey
     cdef eomgen_events events
-    cdef object watch, pace, outside
+    cdef object watch, pace, outside, keeper
+    cdef double pause_every, pause_due
     cdef long seen
     cdef cnp.ndarray times, states, notes, pieces, walked
     cdef list stored
@@ -127,11 +134,11 @@ cdef class Journey(Stepper):
                   double max_step, double first_step=0.0, signals=(), plan=None):
         cdef eomgen_journey *journey = &self.journey
         self.stored, self.raised, self.stride = [[], [], [], [], []], None, 8
-        nodes = self.keep(plan["nodes"], float)
+        nodes = self.hold(plan["nodes"], float)
         journey.nodes, journey.n_nodes = <const double *>cnp.PyArray_DATA(<cnp.ndarray>nodes), len(nodes)
         journey.span, journey.n_eval = abs(t_bound - t0), -1
         if plan["t_eval"] is not None:
-            asked = self.keep(plan["t_eval"], float)
+            asked = self.hold(plan["t_eval"], float)
             journey.t_eval, journey.n_eval = <const double *>cnp.PyArray_DATA(<cnp.ndarray>asked), len(asked)
         journey.pieces_room = 256 if plan["dense"] else 0
         self.most = plan.get("trail", 0)
@@ -140,9 +147,11 @@ cdef class Journey(Stepper):
             self.expect(**plan["events"])
         self.allocate(512)
         self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
+        self.pause_every, self.keeper = plan.get("keep") or (INFINITY, None)
+        self.pause_due = self.looked + self.pause_every
         self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, self.stride
 
-    cdef keep(self, values, kind):
+    cdef hold(self, values, kind):
         array = np.array(values, dtype=kind)
         self.held.append(array)
         return array
@@ -152,10 +161,10 @@ cdef class Journey(Stepper):
         self.held.append(array)
         return cnp.PyArray_DATA(<cnp.ndarray>array)
 
-    def expect(self, int model, tape, outside, direction, most, action, resets):
+    def expect(self, int model, tape, outside, direction, most, action, resets, int crowd):
         cdef eomgen_events *ev = &self.events
         cdef int n = len(direction), n_resets = len(resets)
-        ev.n, ev.n_model, ev.n_resets = n, model, n_resets
+        ev.n, ev.n_model, ev.n_resets, ev.crowd = n, model, n_resets, crowd
         if model:
             ev.values = MODEL.kernels[find("events", ValueError)].call
         if n_resets:
@@ -170,19 +179,19 @@ cdef class Journey(Stepper):
         if self.outside:
             ev.outside, ev.asker = ask_outside, <void *>self
         pairs = np.array(resets, dtype=np.intc).reshape(-1, 2)
-        ev.direction = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(direction, np.intc))
-        ev.action = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(action, np.intc))
-        ev.most = <const long *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(most, np.dtype("l")))
-        ev.reset_of = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(pairs[:, 0], np.intc))
-        ev.reset_x = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.keep(pairs[:, 1], np.intc))
+        ev.direction = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(direction, np.intc))
+        ev.action = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(action, np.intc))
+        ev.most = <const long *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(most, np.dtype("l")))
+        ev.reset_of = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(pairs[:, 0], np.intc))
+        ev.reset_x = <const int *>cnp.PyArray_DATA(<cnp.ndarray>self.hold(pairs[:, 1], np.intc))
         ev.values_reset = <double *>self.work(n_resets, float)
         cdef double *numbers = <double *>self.work(15 * n + self.run.n, float)
         ev.g, ev.g_new, ev.slope, ev.slope_new = numbers, numbers + n, numbers + 2 * n, numbers + 3 * n
         ev.size, ev.trial, ev.latest = numbers + 4 * n, numbers + 5 * n, numbers + 6 * n
         ev.bracket, ev.y = numbers + 7 * n, numbers + 15 * n
         ev.count = <long *>self.work(n, np.dtype("l"))
-        cdef int *whole = <int *>self.work(4 * n, np.intc)
-        ev.leaving, ev.fired, ev.whose = whole, whole + n, whole + 2 * n
+        cdef int *whole = <int *>self.work(5 * n, np.intc)
+        ev.leaving, ev.fired, ev.touch, ev.whose = whole, whole + n, whole + 2 * n, whole + 3 * n
         self.journey.events = ev
 
     cdef allocate(self, long room):
@@ -241,6 +250,26 @@ cdef class Journey(Stepper):
             room = min(2 * max(self.journey.room, 256), 1 << 16)
             self.take()
             self.allocate(room)
+            if self.journey.pause:
+                self.journey.pause = 0
+                self.keeper(freeze(self, 0))
+                self.pause_due = perf_counter() + self.pause_every
+
+    def frozen(self, long status):
+        """All that a run depends on from here on, by name, where travel has returned a status."""
+        self.take()
+        self.allocate(max(self.journey.room, 256))
+        return freeze(self, status)
+
+    def resume(self, dict kept):
+        """Go on from what was frozen, with its results: the status at which it was, 0 on the way.
+
+        Raises
+        ------
+        ValueError
+            It cannot be of such a journey.
+        """
+        return thaw(self, kept)
 
     def jump(self, x):
         """Go on from another state, at an event that waits; a negative number if resets crowd together."""
@@ -297,6 +326,7 @@ cdef class Journey(Stepper):
         try:
             PyErr_CheckSignals()
             now = perf_counter()
+            self.journey.pause = now >= self.pause_due
             if self.watch is not None:
                 self.watch(t)
             if self.pace is not None and self.run.steps > self.seen:
@@ -325,5 +355,7 @@ cdef class Journey(Stepper):
             return 1
         return 0
 
+
+include "_frozen.pxi"
 
 journey = Journey

@@ -1,6 +1,27 @@
 # Lanes: the columns of a batch -> groups of as many as the processor takes at a time. The kernels' entry points are in
 # LANES.kernels, by the kernel's index (eomgen_lane_function in eomgen.h tells how to call them); NULL: no lanes.
 
+cdef extern from *:
+    """
+    #if defined(__GNUC__)
+    #define EOMGEN_SEEN(at) __atomic_load_n(&(at), __ATOMIC_ACQUIRE)
+    #define EOMGEN_SHOW(at, value) __atomic_store_n(&(at), (value), __ATOMIC_RELEASE)
+    #define EOMGEN_COUNT(at, more) __atomic_add_fetch(&(at), (more), __ATOMIC_RELAXED)
+    #else /* under the GIL */
+    #define EOMGEN_SEEN(at) (at)
+    #define EOMGEN_SHOW(at, value) ((at) = (value))
+    #define EOMGEN_COUNT(at, more) ((at) += (more))
+    #endif
+    """
+    const eomgen_lanes *seen_lanes "EOMGEN_SEEN"(const eomgen_lanes *)
+    void show_lanes "EOMGEN_SHOW"(const eomgen_lanes *, const eomgen_lanes *)
+    const eomgen_series *seen_series "EOMGEN_SEEN"(const eomgen_series *)
+    void show_series "EOMGEN_SHOW"(const eomgen_series *, const eomgen_series *)
+    bint has_offer "EOMGEN_SEEN"(int)
+    void show_offer "EOMGEN_SHOW"(int, int)
+    cnp.npy_intp count_columns "EOMGEN_COUNT"(cnp.npy_intp, cnp.npy_intp)
+
+
 cdef const eomgen_lanes *find_lanes() noexcept:
     """The widest lanes that were compiled and that this processor has; NULL without any."""
     cdef int i = 0
@@ -16,7 +37,8 @@ lane_width = 1 if LANES == NULL else LANES.width  # states that batches take at 
 
 # Lanes that are not in this library yet: `LATE` makes or finds the library that has them and gives the address of their
 # table, or 0. A model whose runs are single ones never pays for them.
-cdef object LATE = None
+cdef object LATE = None  # read and written with LATE_TURN alone
+cdef int OFFERED = 0  # whether there is one
 cdef object LATE_TURN = allocate_lock()
 
 
@@ -39,15 +61,17 @@ cdef bint HAS_SERIES = bool(_FACTS.get("series"))
 def offer_lanes(find):
     """Have ``find()`` called for lanes when they are needed; it gives the address of an eomgen_lanes, or 0."""
     global LATE
-    if (LANES == NULL and IN_LANES) or (SERIES == NULL and HAS_SERIES):
-        LATE = find
+    with LATE_TURN:
+        if (LANES == NULL and IN_LANES) or (SERIES == NULL and HAS_SERIES):
+            LATE = find
+            show_offer(OFFERED, 1)
 
 
 def take_lanes(str name="rhs"):
     """Have the lanes that were offered now, if a kernel has any; other threads that want them wait."""
-    global LANES, LATE, SERIES, lane_width
+    global LATE, lane_width
     cdef const eomgen_lanes *found
-    if LATE is None or name not in IN_LANES:
+    if not has_offer(OFFERED) or name not in IN_LANES:
         return
     with LATE_TURN:
         if LATE is None:
@@ -56,12 +80,15 @@ def take_lanes(str name="rhs"):
             found = <const eomgen_lanes *><uintptr_t>LATE()
         except Exception:
             LATE = None  # not again and again; after an interrupt it is tried again
+            show_offer(OFFERED, 0)
             raise
         if found != NULL and found.usable():
             lane_width = found.width
-            LANES = found
-            SERIES = found.series if SERIES == NULL else SERIES
+            if SERIES == NULL:
+                show_series(SERIES, found.series)
+            show_lanes(LANES, found)
         LATE = None
+        show_offer(OFFERED, 0)
 
 
 cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp last, int width,
@@ -81,7 +108,7 @@ cdef inline void spread(const Piece *piece, cnp.npy_intp first, cnp.npy_intp las
 cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) noexcept nogil:
     """What sweep does, a group of columns at a time."""
     cdef cnp.npy_intp failed = -1, first = 0, last, i, k
-    cdef int width = LANES.width
+    cdef int width = batch.width
     cdef int[WIDEST] codes
     cdef double *t = batch.side
     cdef double *u = t + width

@@ -43,7 +43,7 @@ cdef extern from "eomgen_steppers.h" nogil:
         eomgen_function jacobian
         long differentiations, factorizations
         const eomgen_series *series
-        int stopped
+        int order, side, expanded, stopped
     ctypedef struct eomgen_method:
         const char *name
         int rows_K, rows_F, error_order, squares, expands
@@ -69,9 +69,9 @@ cdef method_pointer find_method(str name) except NULL:
     """The method of a name, with what it needs of the model."""
     for i in range(6):
         if METHODS[i].name.decode() == name and name in methods:
-            if METHODS[i].expands and SERIES == NULL:
+            if METHODS[i].expands and seen_series(SERIES) == NULL:
                 take_lanes()
-                if SERIES == NULL:
+                if seen_series(SERIES) == NULL:
                     raise RuntimeError(
                         f"method Taylor: the series of {MODEL.name.decode()} could not be compiled; "
                         "a warning said why: mend that and start again, or take DOP853"
@@ -137,11 +137,12 @@ cdef class Interpolant:
         cdef cnp.npy_intp k = cnp.PyArray_SIZE(flat), i, n = self.run.n
         cdef int j
         cdef double *at = <double *>cnp.PyArray_DATA(flat)
-        cdef double *y = <double *>cnp.PyArray_DATA(self.memory) + n * (1 + self.method.rows_F)
+        cdef cnp.ndarray state = cnp.PyArray_EMPTY(1, &n, cnp.NPY_DOUBLE, 0)  # of this call: threads may share the object
+        cdef double *y = <double *>cnp.PyArray_DATA(state)
         cdef double *out
         if cnp.PyArray_NDIM(flat) == 0:
             self.method.interpolate(&self.run, at[0], y)
-            return copy(y, n)
+            return state
         result = rows(n, k)
         out = <double *>cnp.PyArray_DATA(result)
         for i in range(k):
@@ -227,8 +228,9 @@ cdef class Stepper:
         cdef cnp.npy_intp length = MODEL.n_work + MODEL.n_u + n * (5 + self.method.rows_K + self.method.rows_F)
         if self.method.squares > 0:
             self.run.jacobian = MODEL.kernels[find("jacobian", ValueError)].call
-        self.run.series = SERIES
-        length += eomgen_further(self.method, n, SERIES)
+        cdef const eomgen_series *series = seen_series(SERIES)
+        self.run.series = series
+        length += eomgen_further(self.method, n, series)
         self.memory = cnp.PyArray_ZEROS(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *free = <double *>cnp.PyArray_DATA(self.memory)
         cdef eomgen_run *run = &self.run
@@ -243,7 +245,7 @@ cdef class Stepper:
         run.next = run.failure_state + n
         run.closed = run.w + MODEL.closed_at if plan is not None and MODEL.closed_at else NULL
         run.K = run.next + n
-        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, SERIES)
+        run.F = run.K + n * self.method.rows_K + eomgen_further(self.method, n, series)
         memcpy(run.y, cnp.PyArray_DATA(start), n * sizeof(double))
         memcpy(run.u, cnp.PyArray_DATA(context.u), MODEL.n_u * sizeof(double))
         run.atol = <const double *>cnp.PyArray_DATA(self.atol)
@@ -268,7 +270,7 @@ cdef class Stepper:
         cdef int n = self.run.n
         eomgen_between(self.method, &self.run, self.run.t, self.run.next)  # forms the coefficients
         result.method, result.run, result.t_old, result.t = self.method, self.run, self.run.t_old, self.run.t
-        cdef cnp.npy_intp length = n * (2 + self.method.rows_F)
+        cdef cnp.npy_intp length = n * (1 + self.method.rows_F)
         result.memory = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
         cdef double *data = <double *>cnp.PyArray_DATA(result.memory)
         memcpy(data, self.run.y_old, n * sizeof(double))

@@ -42,7 +42,7 @@ static void travel(const eomgen_method *method)
     const int direction[EVENTS] = {1, -1, 0, 0, 0}, action[EVENTS] = {0, 0, 0, 0, 0};
     const long most[EVENTS] = {0, 0, 0, 0, 1};
     long count[EVENTS] = {0};
-    int leaving[EVENTS], whose[2 * EVENTS], fired[EVENTS];
+    int leaving[EVENTS], whose[2 * EVENTS], fired[EVENTS], touch[EVENTS];
     eomgen_run run = {.rhs = turn, .n = N, .rtol = 1e-12, .max_step = INFINITY, .t_bound = 12.0, .direction = 1.0,
         .atol = atol, .look_in = -1, .hold = NAN};
     double *place = memory, **const parts[] = {&run.y, &run.y_old, &run.f, &run.failure_state, &run.next, &run.K};
@@ -51,7 +51,8 @@ static void travel(const eomgen_method *method)
     }
     run.F = run.K + N * method->rows_K;
     eomgen_events events = {.n = EVENTS, .n_model = EVENTS, .values = values, .direction = direction, .most = most,
-        .action = action, .count = count, .leaving = leaving, .whose = whose, .fired = fired};
+        .action = action, .count = count, .leaving = leaving, .whose = whose, .fired = fired, .touch = touch,
+        .crowd = 12};
     double **const work[] = {&events.g, &events.g_new, &events.slope, &events.slope_new, &events.size, &events.trial,
         &events.latest, &events.y, &events.bracket};
     for (int k = 0; k < 9; k++) {

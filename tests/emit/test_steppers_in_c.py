@@ -51,7 +51,7 @@ static void *trajectory(void *given)
     long count[1] = {0};
     const long most[1] = {0};
     const int direction[1] = {-1}, action[1] = {EOMGEN_RESET}, zero[1] = {0}, one[1] = {1};
-    int leaving[1], whose[2], fired[1];
+    int leaving[1], whose[2], fired[1], touch[1];
     double reset[1];
     eomgen_run run = {.rhs = fall, .c = c, .u = u, .signals = &signal, .n_u = 1, .w = NULL, .n = 2, .rtol = 1e-10,
         .max_step = INFINITY, .t_bound = task->end, .direction = 1.0, .atol = atol};
@@ -62,7 +62,7 @@ static void *trajectory(void *given)
         .values_reset = reset, .g = numbers,
         .g_new = numbers + 1, .slope = numbers + 2, .slope_new = numbers + 3, .size = numbers + 4, .trial = numbers + 5,
         .latest = numbers + 6, .bracket = numbers + 7, .y = numbers + 15, .count = count, .leaving = leaving,
-        .whose = whose, .fired = fired};
+        .whose = whose, .fired = fired, .touch = touch, .crowd = 12};
     eomgen_journey journey = {.nodes = nodes, .n_nodes = 3, .t_eval = t_eval, .n_eval = 1, .events = &events,
         .span = task->end, .room = 1, .times = T, .states = X, .notes_room = 40, .notes = notes};
     do {

@@ -12,8 +12,9 @@ import pytest
 
 import eomgen as eg
 from eomgen.cli import main
+from eomgen.limits.files import COPIES
 from eomgen.robots import xml_text
-from eomgen.robots.mjcf_files import COPIES, _Scan
+from eomgen.robots.mjcf_files import Scan
 from eomgen.robots.xml_text import read_xml
 
 ARM = """<robot name="arm">
@@ -195,12 +196,10 @@ def test_no_entity_reads_a_file(suffix: str, arm: Any, tmp_path: Path, monkeypat
     ],
 )
 def test_mujoco_reads_nothing_outside(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import mujoco
-
-    def never(path: str) -> None:
+    def never(*_: Any, **__: Any) -> None:
         raise AssertionError("MuJoCo was asked to read the model")
 
-    monkeypatch.setattr(mujoco.MjModel, "from_xml_path", never)
+    monkeypatch.setattr("subprocess.Popen", never)
     (tmp_path / "model").mkdir()
     (tmp_path / "secret").write_text("hidden")
     os.symlink(tmp_path, tmp_path / "model" / "link")
@@ -266,9 +265,7 @@ def test_copies_add_up_over_siblings_and_multiply_by_nesting_also_through_includ
     (tmp_path / "part.xml").write_text(PART)
     path = tmp_path / "model.xml"
     path.write_text(f"<mujoco>\n{line}\n</mujoco>")
-    scan = _Scan(read_xml(path), None)
-    scan.elements(read_xml(path))
-    scan.attachments()
+    scan = Scan(read_xml(path), None)
     assert scan.made == made
     assert [p.message for p in scan.problems] == ["makes too many bodies"] * (made > COPIES)
 

@@ -18,7 +18,7 @@ import eomgen as eg
 from eomgen.errors import ModelError
 from eomgen.robots.constructs import DATA, HARMLESS, INSIDE, LEFT, SEEN, TAKEN, markdown_of
 from eomgen.robots.mjcf_constructs import MJCF, find_mjcf, path_of
-from eomgen.robots.mjcf_files import _Scan
+from eomgen.robots.mjcf_files import Scan
 from eomgen.robots.urdf_constructs import URDF, find_urdf, note_urdf
 from eomgen.robots.xml_text import read_xml
 
@@ -148,8 +148,7 @@ def test_every_construct_of_shipped_mjcf_files_has_its_place() -> None:
             continue
         if root.tag != "mujoco" or root.find("worldbody") is None:
             continue
-        scan = _Scan(root, "/")
-        scan.elements(root)
+        scan = Scan(root, "/")
         unknown = {
             f"{p} {a}" for p, a in scan.met if find_mjcf(p, a) is None and (not a or find_mjcf(p) is not None)
         } - {

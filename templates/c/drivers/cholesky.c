@@ -41,7 +41,7 @@ static void cholesky_solve(int rows, const double *restrict g, double *restrict 
     }
 }
 
-/* G = J J^T + relative max(diag) I of the first rows of J, factored. */
+/* G = J J^T + relative max(diag) I of the first rows of J, factored; rows that are all zero to rounding ask for no step. */
 static int factor_gram(int rows, const double *restrict J, double relative, double *restrict G)
 {
     double largest = 0.0;
@@ -56,7 +56,7 @@ static int factor_gram(int rows, const double *restrict J, double relative, doub
         largest = G[i * M + i] > largest ? G[i * M + i] : largest;
     }
     for (int i = 0; i < rows; i++) {
-        G[i * M + i] += relative * largest;
+        G[i * M + i] += largest > CONSTRAINTS_UNMOVED * CONSTRAINTS_UNMOVED ? relative * largest : 1.0;
     }
     return cholesky(rows, G);
 }

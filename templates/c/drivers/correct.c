@@ -5,7 +5,7 @@ static int correct_linear(int rows, double *restrict G, const double *restrict r
                           int order, double *restrict w)
 {
     const double *const J = w + AT_J;
-    double *const e = w + AT_E, *const z = e + M, relative = CONSTRAINTS_GENTLE, before = INFINITY;
+    double *const e = w + AT_E, *const z = e + M, relative = CONSTRAINTS_GENTLE, before = HUGE_VAL;
     int status = 0;
     for (int pass = 0; pass < 50 && status == 0; pass++) {
         double longest = 0.0, square = 0.0, size;

@@ -39,7 +39,7 @@ static double interpolate(double t, const double *restrict u, const double *rest
             const double at = t + (side ? -reach : reach) * pair * pace;
             const double *const p = around > 0.0 ? next_point(t, u, c, pair, side, reach, pace, w) : NULL;
             if (p == NULL) {
-                return INFINITY;
+                return HUGE_VAL;
             }
             around += pair == 1 && side == 1 ? find_weakest(at, p, u, c, &parts, w) : 0.0;
             for (int k = 0; k < NQ + N; k++) {
@@ -47,7 +47,7 @@ static double interpolate(double t, const double *restrict u, const double *rest
             }
             if ((pair == 1 && side == 1 && !(around >= CROSSINGS_MIDDLE * here)) ||
                 rhs_here(at, state, u, c, x_dot, &weakest, w) != 0) {
-                return INFINITY;
+                return HUGE_VAL;
             }
             for (int n = 0; n < 4; n++) {
                 for (int k = 0; k < VALUES; k++) {
@@ -60,11 +60,11 @@ static double interpolate(double t, const double *restrict u, const double *rest
     (void)position_block(t, q, u, c, w + AT_POSITION, w);
     form_scaled(w + AT_POSITION + MH, s, w + AT_J);
     if (!is_within(CROSSINGS_CLOSED, ROUNDING_ROUNDED, w + AT_POSITION, w + AT_J, q, s)) { /* the branch does not run through */
-        return INFINITY;
+        return HUGE_VAL;
     }
     for (int k = NQ; k < VALUES; k++) {
         const int rate = k - NQ - N - NQ; /* accelerations; velocities, by what they change in unit distance */
-        const double unit = rate >= 0 ? s[rate] : k < NQ + N ? s[k - NQ] / speed : INFINITY;
+        const double unit = rate >= 0 ? s[rate] : k < NQ + N ? s[k - NQ] / speed : HUGE_VAL;
         total += q[k];
         for (int n = 0; n < 3; n++) {
             last[n] = fmax(last[n], fabs(q[k - n * VALUES] - q[k - (n + 1) * VALUES]) / unit);
@@ -73,5 +73,5 @@ static double interpolate(double t, const double *restrict u, const double *rest
     /* differences fall by this factor at least; one alone may be small by chance */
     const double factor = fmin(1.0, fmax(last[0] / last[1], last[1] / last[2]));
     const double error = fmax(last[0] * factor, last[1] * factor * factor);
-    return !isfinite(total) ? INFINITY : last[0] > 0.0 ? error : 0.0;
+    return !isfinite(total) ? HUGE_VAL : last[0] > 0.0 ? error : 0.0;
 }

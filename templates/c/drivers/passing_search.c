@@ -4,7 +4,7 @@ static double interpolate_best(double t, const double *restrict x, const double 
                                double here, double *restrict pace, double *restrict speed, double *restrict w)
 {
     double *const best = w + AT_BEST, *const state = w + AT_STATE;
-    double least = INFINITY, found = 0.0;
+    double least = HUGE_VAL, found = 0.0;
     *pace = *speed = 0.0;
     (void)rate_block(t, x, u, c, w + AT_RATE, w);
     for (int i = 0; i < M; i++) {

@@ -5,7 +5,7 @@ static double mean_residual(const double *restrict C, const double *restrict s)
     for (int i = 0; i < MH; i++) {
         total += fabs(C[i] / s[N + i]);
     }
-    return MH > 0 ? total / MH : 0.0;
+    return MH > 0 ? total / (double)MH : 0.0;
 }
 
 /* What linear theory leaves of the scaled residual after the step -dz. */
@@ -43,5 +43,5 @@ static double weakness(int rows, const double *restrict J, const double *restric
         along += z[i] * z[i];
         *largest = fmax(*largest, size);
     }
-    return along > 0.0 ? across / (along * *largest) : 1.0;
+    return along * *largest > 0.0 ? across / (along * *largest) : 1.0;
 }

@@ -18,7 +18,7 @@ EOMGEN_SHARED double largest_residual(const double *restrict C, const double *re
             largest = size;
         }
         if (!isfinite(size)) {
-            return NAN;
+            return (double)NAN;
         }
     }
     return largest;

@@ -5,7 +5,7 @@ static int solve_system(const double *restrict r, const int *restrict plan, doub
 {
     const double *const K = w + AT_SYSTEM, *const row = w + AT_ROW, *const column = w + AT_COLUMN;
     double *const d = w + AT_DEFECT;
-    double before = INFINITY;
+    double before = HUGE_VAL;
     for (int i = 0; i < NZ; i++) {
         z[i] = 0.0;
     }

@@ -108,7 +108,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
         status = travel(e, run, &journey, k);
     }
     for (ptrdiff_t j = journey.stored * e->n; j < e->n_eval * e->n; j++) {
-        journey.states[j] = NAN;
+        journey.states[j] = (double)NAN;
     }
     memcpy(e->x + k * e->n, run->y, size);
     e->t[k] = run->t;

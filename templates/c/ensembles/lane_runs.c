@@ -44,7 +44,7 @@ static void end_lane(eomgen_ensemble *e, lane_run *run, int l, int status)
 {
     const ptrdiff_t k = run->index[l];
     for (ptrdiff_t j = run->done[l] * run->n; j < e->n_eval * run->n; j++) {
-        e->samples[k * e->n_eval * run->n + j] = NAN;
+        e->samples[k * e->n_eval * run->n + j] = (double)NAN;
     }
     for (int i = 0; i < run->n; i++) {
         e->x[k * run->n + i] = run->y[i][l];

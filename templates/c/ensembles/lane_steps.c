@@ -52,7 +52,7 @@ static EOMGEN_APART void note_failures(lane_run *run, real t, const real *y, rea
         int finite = 1;
         for (int i = 0; i < run->n && bad[l]; i++) {
             finite = finite && isfinite(y[i][l]);
-            k[i][l] = NAN;
+            k[i][l] = (double)NAN;
         }
         if (bad[l] && run->awake[l] && (finite || run->failure[l] == 0)) {
             run->failure[l] = failed[l] ? EOMGEN_SINGULAR_MASS_MATRIX : EOMGEN_NON_FINITE, run->failure_time[l] = t[l];

@@ -56,7 +56,7 @@ static inline real reach_of(real before, real last, int p)
 {
     const real first = log2_of(before) * (-1.0 / (p - 1)), second = log2_of(last) * (-1.0 / p);
     const real reach = exp2_of(choose(first < second, first, second) - TAYLOR_SAFETY / (p - 1));
-    return choose(before + last < 1e300, reach, same(NAN));
+    return choose(before + last < 1e300, reach, same((double)NAN));
 }
 
 /* Coefficients at the states of all lanes, and the sizes of the steps to try; NaN where there is none. */
@@ -82,7 +82,7 @@ static void begin_taylor(const eomgen_ensemble *e, lane_run *run)
     real before, size;
     taylor_sizes(run, run->K, p, &before, &size);
     const real reach = reach_of(before, size, p), first = same(e->first_step);
-    const flag given = (run->steps == 0) & (first > 0.0) & (first < reach);
+    const flag none = { 0 }, given = (run->steps == 0) & (first > 0.0) & (first < reach);
     run->size = choose(begins | moved, choose(given, first, reach), run->size); /* others try again, or have nothing to do */
-    run->begins = (flag){ 0 };
+    run->begins = none;
 }

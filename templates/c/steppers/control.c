@@ -12,7 +12,7 @@ int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
         run->stopped = run->look_in <= 0;
     }
     for (int i = 0; run->stopped && i < run->n; i++) {
-        k[i] = NAN;
+        k[i] = (double)NAN;
     }
     if (run->signals != NULL && !run->stopped) {
         eomgen_force(run, t, y);
@@ -35,7 +35,7 @@ void eomgen_note(eomgen_run *run, int status, double t, const double *y)
 void eomgen_failed(eomgen_run *run, int status, double t, const double *y, double *k)
 {
     for (int i = 0; i < run->n; i++) {
-        k[i] = NAN;
+        k[i] = (double)NAN;
     }
     eomgen_note(run, status, t, y);
 }
@@ -95,7 +95,7 @@ void eomgen_start(const eomgen_method *method, eomgen_run *run)
 /* The least step that SciPy takes. */
 static double least_step(const eomgen_run *run)
 {
-    return 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t);
+    return 10.0 * fabs(nextafter(run->t, run->direction * HUGE_VAL) - run->t);
 }
 
 static int too_small(const eomgen_run *run, double h)

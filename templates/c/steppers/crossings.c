@@ -1,10 +1,11 @@
-/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again. */
+/* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again.
+   Python's loop does the same: runtime/crossings.py. */
 #include <math.h>
 #include <string.h>
 
 #include "eomgen_loop.h"
 
-enum { SAMPLES = 16, HALVINGS = 50 };
+enum { SAMPLES = 16, HALVINGS = 50, RESTING = 1000 };
 
 static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, double fb)
 {
@@ -17,7 +18,8 @@ static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, d
     return n + 1;
 }
 
-/* A reset left the value at zero: it has to be seen on its side before it can come back. */
+/* A reset left the value at zero: it has to be seen on its side before it can come back. Where a step ends on the other
+   side and never shows it there, it came back within the accuracy of the step: resets that die away. */
 static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
 {
     double t = run->t_old, g = 0.0;
@@ -32,16 +34,21 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
         seen = seen || value * ev->leaving[i] > 0.0;
         t = next, g = value;
     }
-    ev->leaving[i] = seen ? 0 : ev->leaving[i];
-    return n;
+    const int side = ev->leaving[i], back = !seen && ev->g_new[i] * side < 0.0;
+    ev->leaving[i] = seen || back ? 0 : side;
+    if (back && ev->direction[i] * side <= 0 && ev->action[i] != EOMGEN_GO_ON) {
+        ev->crowded = ev->crowd;
+    }
+    return back ? add(ev, n, i, run->t_old, run->t_old, side, 0.0) : n;
 }
 
-/* Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again. */
+/* Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again. What is no more
+   than rounding at both ends rests there. */
 static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 {
     const double a = ev->g[i], b = ev->g_new[i], h = fabs(run->step), s = a > 0.0 ? 1.0 : -1.0;
     const double da = run->direction * s * ev->slope[i] * h, db = run->direction * s * ev->slope_new[i] * h;
-    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0) {
+    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= RESTING * RUNS_TOUCHED * ev->size[i]) {
         return 0;
     }
     const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
@@ -52,14 +59,14 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
 {
     const double s = ev->g[i] > 0.0 ? 1.0 : -1.0;
-    double left = run->t_old, right = run->t, best = INFINITY, at = left;
+    double left = run->t_old, right = run->t, best = HUGE_VAL, at = left;
     for (int k = 1; k < SAMPLES; k++) {
-        const double t = run->t_old + k * (run->t - run->t_old) / SAMPLES, value = s * value_at(method, run, ev, i, t);
+        const double t = run->t_old + k * (run->t - run->t_old) / (double)SAMPLES, value = s * value_at(method, run, ev, i, t);
         if (value < best) {
             best = value, at = t;
         }
     }
-    const double h = (run->t - run->t_old) / SAMPLES, ratio = 0.3819660112501051;
+    const double h = (run->t - run->t_old) / (double)SAMPLES, ratio = 0.3819660112501051;
     left = at - h, right = at + h;
     for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > 1e-8 * fabs(run->step); k++) { /* golden section */
         const int low = fabs(at - left) > fabs(right - at);
@@ -71,9 +78,14 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
             *(low ? &left : &right) = t;
         }
     }
-    if (best <= 0.0) {
+    const double rounding = RUNS_TOUCHED * fmax(ev->size[i], fabs(ev->g_new[i]));
+    if (best < -rounding) {
         n = add(ev, n, i, run->t_old, at, ev->g[i], s * best);
-        n = best < 0.0 ? add(ev, n, i, at, run->t, s * best, ev->g_new[i]) : n;
+        return add(ev, n, i, at, run->t, s * best, ev->g_new[i]);
+    }
+    if (best <= rounding) { /* it comes to zero here, from one side and back */
+        ev->touch[i] = s > 0.0 ? 1 : -1;
+        return add(ev, n, i, at, at, ev->g[i], 0.0);
     }
     return n;
 }
@@ -81,9 +93,10 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
 static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_events *ev)
 {
     int n = 0;
-    event_slopes(run, ev, ev->g_new, ev->slope_new);
+    event_slopes(run, ev, ev->g_new, ev->slope_new, 1.0);
     for (int i = 0; i < ev->n; i++) {
         const double a = ev->g[i], b = ev->g_new[i];
+        ev->touch[i] = 0;
         const int noted = a == 0.0 && ev->latest[i] == run->t_old; /* at the end of the step before */
         if (ev->direction[i] > 1 || (noted && ev->leaving[i] == 0)) {
             continue;
@@ -100,19 +113,23 @@ static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_ev
     return n;
 }
 
-/* Zeros of the brackets in place of their first ends, in order. */
+/* Zeros of the brackets in place of their first ends, in order, and in place of the second the way the value goes there. */
 static void sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n)
 {
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
-        const double t = zero_between(method, run, ev, i, ev->bracket + 4 * k);
+        const double *const row = ev->bracket + 4 * k, way = row[3] - row[2], t = zero_between(method, run, ev, i, row);
         int at = k;
         for (; at > 0 && run->direction * (ev->bracket[4 * (at - 1)] - t) > 0.0; at--) {
-            ev->bracket[4 * at] = ev->bracket[4 * (at - 1)], ev->whose[at] = ev->whose[at - 1];
+            memcpy(ev->bracket + 4 * at, ev->bracket + 4 * (at - 1), 2 * sizeof(double));
+            ev->whose[at] = ev->whose[at - 1];
         }
-        ev->bracket[4 * at] = t, ev->whose[at] = i;
+        ev->bracket[4 * at] = t, ev->bracket[4 * at + 1] = way, ev->whose[at] = i;
     }
 }
+
+/* Part of a step, before its end, in which the next step may look for the same zero. */
+static const double AT_THE_END = 1e-4;
 
 int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double *t)
 {
@@ -123,7 +140,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
     sort_zeros(method, run, ev, n);
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
-        const double zero = ev->bracket[4 * k];
+        const double zero = ev->bracket[4 * k], way = ev->bracket[4 * k + 1];
         if (stop && (stop == 2 || fabs(zero - *t) > RUNS_INSTANT * fmax(fabs(*t), j->span))) {
             break;
         }
@@ -132,15 +149,19 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
         eomgen_between(method, run, zero, row + 2);
         ev->count[i]++;
         ev->latest[i] = zero;
+        if (ev->touch[i] != 0 && (ev->action[i] != EOMGEN_GO_ON || fabs(run->t - zero) <= AT_THE_END * fabs(run->step))) {
+            ev->leaving[i] = ev->touch[i]; /* so that it is not found again beside this zero */
+        }
         if (ev->most[i] > 0 && ev->count[i] >= ev->most[i]) {
             stop = 2, *t = zero;
         } else if (ev->action[i] != EOMGEN_GO_ON) {
             *t = stop ? *t : zero;
-            stop = 1, ev->fired[i] = 1;
+            stop = 1, ev->fired[i] = way > 0.0 ? 1 : way < 0.0 ? -1 : 2;
         }
     }
     double *const spare = ev->g, *const other = ev->slope;
     ev->g = ev->g_new, ev->g_new = spare;
     ev->slope = ev->slope_new, ev->slope_new = other;
-    return run->stopped ? -1 : stop;
+    event_slopes(run, ev, ev->g, ev->slope, -1.0);
+    return run->stopped ? -1 : ev->crowded >= ev->crowd ? -2 : stop;
 }

@@ -30,10 +30,12 @@ typedef struct {
     long *count;                   /* n: how often each happened */
     int *leaving;                  /* n: side of zero to which a reset led, until it is seen there; 0: none */
     double *bracket;               /* 2 n rows of 4, work: ends in time, values there */
-    int *whose, *fired;            /* 2 n; n: those at the last stop */
+    int *whose, *fired;            /* 2 n; n: those at the last stop, 1 rising, -1 falling, 2 neither, 0: the others */
+    int *touch;                    /* n: the side from which the value came to zero and back in the last step, or 0 */
     double *latest;                /* n: when each happened last */
     double last_reset;
     int crowded;                   /* resets in a row that followed each other too closely */
+    int crowd;                     /* so many are too many */
 } eomgen_events;
 
 /* One trajectory: what is asked, and what came of it so far. */
@@ -54,6 +56,7 @@ typedef struct {
     double *trail;
     long node, done, stored, n_pieces, n_notes, n_trail, resets; /* start at 0; the caller may take rows and set back their counts */
     int begun, ended;
+    int pause; /* not 0: EOMGEN_FULL before the next step, whose state then is all that the run depends on */
 } eomgen_journey;
 
 enum {
@@ -72,9 +75,11 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
 int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey);
 
 /* Events: values at the start; zeros of the last step in order, noted, up to one at which the run stops, at *t. Returns
-   whether it stops, 2 if it is to end there, -1 if the caller's own events stopped the run. */
+   whether it stops, 2 if it is to end there, -1 if the caller's own events stopped the run, -2 if resets die away. */
 void eomgen_arm(eomgen_run *run, eomgen_events *events);
 int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *journey, double *t);
+/* Right before a reset: how fast values come. */
+void eomgen_arrive(eomgen_run *run, eomgen_events *events);
 /* After a reset: which side of zero it led to. Not 0 if it led nowhere. */
 int eomgen_depart(eomgen_run *run, eomgen_events *events);
 

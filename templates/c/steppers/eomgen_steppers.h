@@ -7,6 +7,10 @@
 
 #include "eomgen.h"
 
+#if defined(__cplusplus) && !defined(restrict)
+#define restrict __restrict /* C++ has no such word */
+#endif
+
 /* Expressions given at run time: instructions in order, each with a result of its own; see tape.c for the operations. */
 typedef struct {
     int n, n_out;          /* instructions, values handed out */

@@ -1,6 +1,7 @@
 /* Events: zeros of functions of time and state within a step, by the dense output. A change of sign is found as SciPy's
    solve_ivp does; a value that comes to zero and back within one step is looked for as well. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "eomgen_loop.h"
@@ -15,7 +16,7 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     }
     if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) != 0) {
         for (int i = 0; i < ev->n_model; i++) {
-            g[i] = NAN; /* no event here */
+            g[i] = (double)NAN; /* no event here */
         }
     }
     if (ev->tape != NULL) {
@@ -27,14 +28,15 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     return run->stopped;
 }
 
-/* Rates of the values along the motion, by a short way along x'. */
-static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, double *slope)
+/* Rates of the values along the motion, by a short way along x', onward (1) or back (-1): at the end of a step by a way
+   beyond it, at the beginning of the next by a way before it, so that a value that turns just there is looked at in both. */
+static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, double *slope, double way)
 {
     double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs;
     if (length == 0.0) { /* at the end of a part, where no step is chosen */
         length = run->t != run->t_old ? run->t - run->t_old : run->direction * 1e-6 * fmax(fabs(run->t), 1.0);
     }
-    const double h = 1e-5 * length;
+    const double h = way * 1e-5 * length;
     for (int i = 0; i < run->n; i++) {
         ev->y[i] = run->y[i] + h * run->f[i];
     }
@@ -47,21 +49,30 @@ static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, do
 void eomgen_arm(eomgen_run *run, eomgen_events *ev)
 {
     event_values(run, ev, run->t, run->y, ev->g);
-    event_slopes(run, ev, ev->g, ev->slope);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
     for (int i = 0; i < ev->n; i++) {
-        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->latest[i] = NAN;
+        ev->size[i] = fabs(ev->g[i]), ev->leaving[i] = 0, ev->fired[i] = 0, ev->touch[i] = 0, ev->latest[i] = (double)NAN;
     }
+}
+
+void eomgen_arrive(eomgen_run *run, eomgen_events *ev)
+{
+    eomgen_evaluate(run, run->t, run->y, run->f);
+    event_values(run, ev, run->t, run->y, ev->g);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
 }
 
 int eomgen_depart(eomgen_run *run, eomgen_events *ev)
 {
     int stuck = 0;
     for (int i = 0; i < ev->n; i++) {
+        const double came = run->direction * ev->slope[i] * (ev->leaving[i] == 0 ? ev->fired[i] : 0);
+        stuck = stuck || (abs(ev->fired[i]) == 1 && came < 0.0); /* it goes the other way: less than the accuracy is left */
         ev->trial[i] = fmax(fabs(ev->slope[i]), fabs(ev->slope_new[i])); /* about how fast it came */
     }
     run->step = 0.0;
     event_values(run, ev, run->t, run->y, ev->g);
-    event_slopes(run, ev, ev->g, ev->slope);
+    event_slopes(run, ev, ev->g, ev->slope, 1.0);
     for (int i = 0; i < ev->n; i++) {
         if (!ev->fired[i] || ev->action[i] == EOMGEN_GO_ON) {
             ev->fired[i] = 0;
@@ -70,6 +81,10 @@ int eomgen_depart(eomgen_run *run, eomgen_events *ev)
         const double rate = run->direction * ev->slope[i];
         const int touching = fabs(ev->g[i]) <= RUNS_TOUCHING * ev->size[i];
         const int through = ev->action[i] == EOMGEN_WAIT && rate < 0.0; /* a gap that goes on closing */
+        if (ev->leaving[i] != 0) { /* it only touched zero */
+            ev->fired[i] = 0;
+            continue;
+        }
         stuck = stuck || (touching && (through || !(fabs(rate) > RUNS_TOUCHING * ev->trial[i])));
         ev->leaving[i] = touching ? (rate > 0.0 ? 1 : -1) : 0;
         ev->fired[i] = 0;

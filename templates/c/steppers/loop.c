@@ -37,7 +37,7 @@ static void begin(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     set_out(run, j);
     eomgen_start(method, run);
     if (j->events != NULL) {
-        j->events->last_reset = NAN;
+        j->events->last_reset = (double)NAN;
         eomgen_arm(run, j->events);
     }
     store_step(run, j);
@@ -66,7 +66,7 @@ int eomgen_jump(const eomgen_method *method, eomgen_run *run, eomgen_journey *j)
     ev->crowded = fabs(run->t - ev->last_reset) < RUNS_CROWDED * j->span ? ev->crowded + 1 : 0;
     ev->last_reset = run->t;
     j->resets++;
-    return eomgen_depart(run, ev) || ev->crowded >= (2 * ev->n > RUNS_CROWD ? 2 * ev->n : RUNS_CROWD) ? EOMGEN_ZENO : 0;
+    return eomgen_depart(run, ev) || ev->crowded >= ev->crowd ? EOMGEN_ZENO : 0;
 }
 
 /* New values of states by the model's own kernel, for each of its events that happened here. */
@@ -104,7 +104,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     double t = run->t;
     const int stop = j->events != NULL ? eomgen_find_events(method, run, j, &t) : 0;
     if (stop < 0) {
-        return EOMGEN_STOPPED;
+        return stop == -1 ? EOMGEN_STOPPED : EOMGEN_ZENO;
     }
     if (j->pieces_room > 0) {
         keep_piece(method, run, j, t);
@@ -122,6 +122,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         eomgen_between(method, run, t, j->events->y);
         memcpy(run->y, j->events->y, (size_t)run->n * sizeof(double));
         run->t = t;
+        eomgen_arrive(run, j->events);
     }
     store_step(run, j);
     if (stop == 2) {
@@ -141,7 +142,7 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
         begin(method, run, j);
     }
     while (run->direction * (run->t - j->nodes[j->n_nodes - 1]) < 0.0) {
-        if ((j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
+        if (j->pause || (j->n_eval < 0 && j->stored + 2 > j->room) || (j->pieces_room > 0 && j->n_pieces == j->pieces_room) ||
             (j->trail_room > 0 && j->n_trail + 2 > j->trail_room) ||
             (j->events != NULL && j->n_notes + 2 * j->events->n > j->notes_room)) {
             return EOMGEN_FULL;
@@ -159,5 +160,8 @@ int eomgen_travel(const eomgen_method *method, eomgen_run *run, eomgen_journey *
             eomgen_start(method, run);
         }
     }
-    return run->stopped ? EOMGEN_STOPPED : EOMGEN_END;
+    if (run->stopped) {
+        return EOMGEN_STOPPED;
+    }
+    return EOMGEN_END;
 }

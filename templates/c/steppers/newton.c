@@ -20,7 +20,8 @@ static newton_area newton_areas(const eomgen_run *run, int rows)
     double *const at = run->K + rows * n;
     double *const state = at + 4 * square;
     int *const order = (int *)(state + NEWTON_STATE);
-    return (newton_area){at, at + square, at + 2 * square, at + 3 * square, state, order, order + n};
+    const newton_area areas = {at, at + square, at + 2 * square, at + 3 * square, state, order, order + n};
+    return areas;
 }
 
 /* Whether the first half of J is [0 1]. */
@@ -83,14 +84,14 @@ static int newton_factor(eomgen_run *run, const newton_area *a, double g, double
     run->factorizations += 2;
     for (int i = 0; i < m; i++) {
         const double *const row = a->J + (halved ? m + i : i) * n;
-        double *const real = a->real + i * m, *const re = a->re + i * m, *const im = a->im + i * m;
+        double *const plain = a->real + i * m, *const re = a->re + i * m, *const im = a->im + i * m;
         for (int k = 0; k < m; k++) {
             const double K = halved ? row[k] : 0.0, D = row[halved ? m + k : k];
-            real[k] = -D - K / g;
+            plain[k] = -D - K / g;
             re[k] = -D - K * (x / square);
             im[k] = K * (y / square);
         }
-        real[i] += g, re[i] += x, im[i] += y;
+        plain[i] += g, re[i] += x, im[i] += y;
     }
     return lu_factor(m, a->real, a->order) || lu_factor_complex(m, a->re, a->im, a->order_complex);
 }

@@ -24,7 +24,6 @@ static inline void measure(const eomgen_run *run, double *scale)
 }
 
 #define METHOD(name_, title, K, F, order) \
-    const eomgen_method eomgen_##name_ = {.name = title, .rows_K = K, .rows_F = F, .error_order = order, \
-        .attempt = name_##_attempt, .error = name_##_error, .prepare = name_##_prepare, \
-        .interpolate = name_##_interpolate};
+    const eomgen_method eomgen_##name_ = {title, K, F, order, name_##_attempt, name_##_error, name_##_prepare, \
+        name_##_interpolate, 0, 0, 0, NULL, NULL};
 #include "eomgen_methods.h"

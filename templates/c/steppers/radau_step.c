@@ -99,7 +99,7 @@ static int radau_step(eomgen_run *run)
 {
     const int n = run->n;
     const newton_area area = newton_areas(run, RADAU_ROWS), *const a = &area;
-    const double least = 10.0 * fabs(nextafter(run->t, run->direction * INFINITY) - run->t), entered = run->h_abs;
+    const double least = 10.0 * fabs(nextafter(run->t, run->direction * HUGE_VAL) - run->t), entered = run->h_abs;
     double h_abs = fmin(fmax(entered, least), run->max_step), rate = -1.0, size;
     double h_old = a->state[RADAU_H_OLD], error_old = a->state[RADAU_ERROR_OLD];
     if (run->most_steps > 0 && run->steps >= run->most_steps) {
@@ -169,6 +169,5 @@ static void radau_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_radau = {.name = "Radau", .rows_K = RADAU_ROWS, .rows_F = 3, .error_order = 3,
-                                    .prepare = radau_prepare, .interpolate = radau_interpolate, .squares = 4,
-                                    .begin = radau_begin, .step = radau_step};
+const eomgen_method eomgen_radau = {"Radau", RADAU_ROWS, 3, 3, NULL, NULL, radau_prepare, radau_interpolate, 0, 4, 0,
+                                    radau_begin, radau_step};

@@ -57,12 +57,10 @@ static void rk4_interpolate(const eomgen_run *run, double t, double *y)
     }
 }
 
-const eomgen_method eomgen_rk4 = {.name = "RK4", .rows_K = 4, .rows_F = 3, .error_order = 4, .attempt = rk4_attempt,
-                                  .error = rk4_error, .prepare = rk4_prepare, .interpolate = rk4_interpolate,
-                                  .fixed = 1};
+const eomgen_method eomgen_rk4 = {"RK4", 4, 3, 4, rk4_attempt, rk4_error, rk4_prepare, rk4_interpolate, 1, 0, 0, NULL, NULL};
 
 int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
     double *out, double *w, double *k)
 {
-    return rk4_step(rhs, n, t, h, x, u, c, out, w, k);
+    return step_by_rk4(rhs, n, t, h, x, u, c, out, w, k);
 }

@@ -56,7 +56,7 @@ void eomgen_play(const eomgen_tape *tape, double t, const double *y, const doubl
         case TAPE_AND: r[k] = a != 0.0 && b != 0.0; break;
         case TAPE_OR: r[k] = a != 0.0 || b != 0.0; break;
         case TAPE_SELECT: r[k] = a != 0.0 ? b : r[at[3]]; break;
-        default: r[k] = NAN;
+        default: r[k] = (double)NAN;
         }
     }
     for (int k = 0; k < tape->n_out; k++) {

@@ -87,6 +87,5 @@ static int taylor_step(eomgen_run *run)
     return 0;
 }
 
-const eomgen_method eomgen_taylor = {.name = "Taylor", .rows_K = 2 * (TAYLOR_MOST + 1), .rows_F = TAYLOR_MOST,
-                                     .prepare = taylor_prepare, .interpolate = taylor_interpolate, .begin = taylor_begin,
-                                     .step = taylor_step, .expands = 1};
+const eomgen_method eomgen_taylor = {"Taylor", 2 * (TAYLOR_MOST + 1), TAYLOR_MOST, 0, NULL, NULL, taylor_prepare,
+                                     taylor_interpolate, 0, 0, 1, taylor_begin, taylor_step};

@@ -47,7 +47,7 @@ static inline double taylor_exp2(double a)
 static inline double taylor_reach(double before, double last, int p)
 {
     if (!(before + last < 1e300)) {
-        return NAN;
+        return (double)NAN;
     }
     const double first = -taylor_log2(before) / (p - 1), second = -taylor_log2(last) / p;
     return taylor_exp2((first < second ? first : second) - TAYLOR_SAFETY / (p - 1));

@@ -1,0 +1,130 @@
+"""Free text of a user -> the languages it is written in; generated packages carry a copy of this file.
+
+Names in generated code are ASCII identifiers, checked where a model is built.  Every other text of a user (doc, unit,
+labels that hold expressions, file names) goes through one of these functions, one for each language, wherever it is
+written: nothing else in eomgen quotes or escapes.  Metadata of a model holds texts as they are, as JSON.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from html import escape
+
+#: Characters of the generated lines that hold a comment or a literal.
+WIDTH = 114
+#: What Python's docstrings and TOML's strings cannot hold as it is.
+_ESCAPED = re.compile(r'[^ !#-\[\]-~]')
+#: What a comment cannot hold: all but printable ASCII, and the backslash, which joins lines.
+_OUTSIDE = re.compile(r"[^ -\[\]-~]")
+#: Beginnings and ends of comments, and of trigraphs.
+_PAIRS = re.compile(r"(?<=\*)(?=/)|(?<=/)(?=\*)|(?<=\?)(?=\?)")
+#: Markup of Markdown, of the formulas that some readers show in it, and of HTML.
+_MARKUP = re.compile(r"[\\`*_{}\[\]<>()#+\-!|~$&@^]|(?<=^[0-9])\.")
+_SURROGATES = re.compile("[\ud800-\udbff][\udc00-\udfff]")
+_LONE = re.compile("[\ud800-\udfff]")
+
+
+def join_surrogates(text: str) -> str:
+    """The text with each pair of surrogates, as JSON writes a character beyond U+FFFF, as that character."""
+    return _SURROGATES.sub(lambda pair: pair[0].encode("utf-16", "surrogatepass").decode("utf-16"), text)
+
+
+def lone_surrogate(text: str) -> str:
+    """``U+D83D`` of the first half of a pair that stands alone, which no file can hold; empty if there is none."""
+    found = _LONE.search(join_surrogates(text))
+    return f"U+{ord(found[0]):04X}" if found else ""
+
+
+#: What to do about one.
+WHOLE = "write the character itself, or both halves of its pair"
+
+
+def _number(c: str) -> str:
+    """A character as Python and TOML both write it where it cannot stand for itself."""
+    if c in '\\"':
+        return f"\\{c}"
+    return f"\\u{ord(c):04x}" if ord(c) <= 0xFFFF else f"\\U{ord(c):08x}"
+
+
+def visible(text: str, lines: bool = True) -> str:
+    r"""The text for terminals and plain files: what does not print is shown as its number, such as ``\x1b``.
+
+    Control characters, escape sequences, separators of lines and marks of direction lose their effect.
+
+    Parameters
+    ----------
+    text : str
+    lines : bool, optional
+        Whether newlines stay; else they are shown too.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or (lines and c == "\n") else repr(c)[1:-1] for c in text)
+
+
+def shortened(text: str, longest: int) -> str:
+    """The beginning of a text that is longer."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def comment_text(text: str) -> str:
+    """One line for the inside of a comment of C, Python, TOML, YAML or make.
+
+    The result is printable ASCII without a backslash and without ``*/``, ``/*`` and ``??``; other characters are shown
+    as ``<U+00B5>``.  So C's trigraphs and joined lines change nothing in it, and no comment ends in it.
+    """
+    shown = _OUTSIDE.sub(lambda c: f"<U+{ord(c[0]):04X}>", " ".join(text.split()))
+    return _PAIRS.sub(" ", shown)
+
+
+def comment_lines(text: str, margin: str) -> str:
+    """A comment as lines after the first begin with a margin; only spaces become newlines."""
+    from textwrap import wrap
+
+    return f"\n{margin}".join(wrap(comment_text(text), WIDTH, break_long_words=False, break_on_hyphens=False))
+
+
+def docstring_text(text: str) -> str:
+    """The inside of a Python text in three double quotes, whose value is the text itself."""
+    return "\n".join(_ESCAPED.sub(lambda c: _number(c[0]), line) for line in text.split("\n"))
+
+
+def toml_text(text: str) -> str:
+    """A TOML string with its quotes, whose value is the text."""
+    return f'"{_ESCAPED.sub(lambda c: _number(c[0]), text)}"'
+
+
+def yaml_quoted(text: str) -> str:
+    """A YAML string in double quotes, whose value is the text; what prints stays as it is."""
+    shown = (c if c.isprintable() and c not in '\\"\ufeff' else _number(c) for c in text)
+    return f'"{"".join(shown)}"'
+
+
+def summary_text(text: str, longest: int = 500) -> str:
+    """One printable line, as the descriptions of packages must be; shortened where it is long."""
+    return shortened(visible(" ".join(text.split()), lines=False), longest)
+
+
+def markdown_text(text: str) -> str:
+    """Paragraphs of Markdown that show the text: no markup of it takes effect, nor HTML."""
+    paragraphs = re.split(r"\n\s*\n", visible(text).strip())
+    words = (" ".join(paragraph.split()) for paragraph in paragraphs)
+    return "\n\n".join(_MARKUP.sub(lambda c: f"&#{ord(c[0])};" if c[0] in "&<>" else f"\\{c[0]}", w) for w in words)
+
+
+def markdown_code(text: str) -> str:
+    """A line of code within Markdown, with its backticks."""
+    return f"`{visible(' '.join(text.split()), lines=False).replace('`', chr(39))}`"
+
+
+def html_text(text: str) -> str:
+    """The inside of an element or of an attribute in quotes, of HTML, XML and SVG."""
+    return escape(visible(text), quote=True)
+
+
+def html_table(title: str, facts: Iterable[tuple[str, str]], doc: str = "") -> str:
+    """A small table of labels and values for notebooks."""
+    left = "style='text-align:left'"
+    rows = "".join(f"<tr><th {left}>{html_text(a)}</th><td {left}>{html_text(b)}</td></tr>" for a, b in facts)
+    return f"<b>{html_text(title)}</b>{f'<p>{html_text(doc)}</p>' if doc else ''}<table>{rows}</table>"

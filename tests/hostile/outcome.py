@@ -1,0 +1,163 @@
+"""One case run under the guard and its limits -> what came out, with a key that is the same for the same fault."""
+
+from __future__ import annotations
+
+import gc
+import os
+import re
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+from eomgen.errors import EomgenError
+
+from .guard import PACKAGE, Escape, Guard
+from .kind import Kind, Wrong
+
+SECONDS = 20.0  #: wall time of one case
+BUILDING = 1.0  #: wall time for making the object that is given
+MEMORY = 2 << 30  #: bytes that a process may hold
+#: Outcomes that are findings; fine, named error and refused are not.
+FINDINGS = ("escape", "traceback", "hang", "memory", "crash", "warning", "wrong")
+
+
+class Hang(BaseException):
+    """The alarm; no Exception, so that no handler takes it for a failure."""
+
+
+class Outcome(NamedTuple):
+    """What came out of a case."""
+
+    kind: str  #: fine, named error, refused, or one of FINDINGS
+    detail: str  #: the word of the kind, or the class of the error
+    key: str = ""  #: the same for the same fault; empty unless it is a finding
+    text: str = ""  #: traceback or message of a finding
+    seconds: float = 0.0
+
+
+class Runner:
+    """Runs cases of any kind in this process, in a folder that is emptied when a case left something behind."""
+
+    def __init__(self, folder: Path, cache: Path) -> None:
+        self.home = folder
+        self.folder = folder / "case"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        os.environ.update(EOMGEN_CACHE_DIR=str(cache), TMPDIR=str(self.folder), HOME=str(self.folder))
+        tempfile.tempdir = str(self.folder)
+        self.guard = Guard(str(self.folder), str(cache))
+        self.warned: list[str] = []
+        self.prepared: set[str] = set()
+        sys.unraisablehook = lambda args: self.warned.append(f"ignored {args.exc_type.__name__}")
+        os.chdir(self.folder)
+        signal.signal(signal.SIGALRM, _alarm)
+
+    def limit(self) -> None:
+        """Memory beyond what is mapped already is limited from here on."""
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        most = pages * resource.getpagesize() + MEMORY
+        resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+
+    def prepare(self, kind: Kind) -> None:
+        """What a kind needs before its first case."""
+        if kind.name not in self.prepared:
+            kind.prepare(self.home)
+            self.prepared.add(kind.name)
+            gc.collect()
+            gc.freeze()
+        # for each kind again: libraries that load late change the filters
+        warnings.resetwarnings()
+        warnings.simplefilter("always")
+        for category in kind.unjudged:
+            warnings.simplefilter("ignore", category)
+        warnings.showwarning = lambda message, category, *_: self.warned.append(f"{category.__name__}: {message}")
+
+    def run(self, kind: Kind, case: Any) -> Outcome:
+        """One case."""
+        guard = self.guard
+        self.warned.clear()
+        guard.escapes.clear()
+        guard.programs = kind.programs
+        start = time.perf_counter()
+        signal.setitimer(signal.ITIMER_REAL, BUILDING, 1.0)
+        try:
+            found = self._given(kind, case)
+        except EomgenError as error:
+            found = Outcome("named error", type(error).__name__)
+        except BaseException as error:
+            found = judge(error, kind.refusals)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        seconds = time.perf_counter() - start
+        if guard.escapes:  # also where a handler swallowed it
+            found = Outcome("escape", guard.escapes[0], f"escape {_plain(guard.escapes[0])}", found.text)
+        elif self.warned and found.kind not in FINDINGS:
+            found = Outcome("warning", self.warned[0], f"warning {_plain(self.warned[0])}", self.warned[0])
+        self.tidy()
+        return found._replace(seconds=seconds)
+
+    def _given(self, kind: Kind, case: Any) -> Outcome:
+        """What the package answers."""
+        try:
+            given = kind.build(case)
+        except (Exception, Hang):
+            return Outcome("refused", "not built")
+        self.warned.clear()
+        signal.setitimer(signal.ITIMER_REAL, SECONDS, 1.0)  # again each second, in case a handler swallows it
+        try:
+            self.guard.armed = True
+            return Outcome("fine", kind.run(given, self.folder))
+        finally:
+            self.guard.armed = False
+
+    def tidy(self) -> None:
+        """Empty the folder of the case."""
+        os.chdir(self.folder)
+        for entry in os.scandir(self.folder):
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                os.unlink(entry.path)
+
+
+def _alarm(number: int, frame: FrameType | None) -> None:
+    raise Hang
+
+
+def judge(error: BaseException, refusals: tuple[type[Exception], ...] = ()) -> Outcome:
+    """The outcome of an exception that is no named error."""
+    if isinstance(error, KeyboardInterrupt) and not isinstance(error, EomgenError):
+        raise error
+    text = "".join(traceback.format_exception(error))[-4000:]
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [f for f in frames if f.filename.startswith(str(PACKAGE))]
+    if isinstance(error, Wrong):
+        return Outcome("wrong", str(error), f"wrong {_plain(str(error))}", text)
+    if isinstance(error, Escape):
+        return Outcome("escape", str(error), f"escape {_plain(str(error))}", text)
+    name = type(error).__name__
+    place = f"{Path(own[-1].filename).relative_to(PACKAGE)}:{own[-1].name}" if own else "outside the package"
+    if isinstance(error, Hang):
+        return Outcome("hang", place, f"hang {place}", text)
+    if isinstance(error, MemoryError):
+        return Outcome("memory", place, f"memory {place}", text)
+    if not own:
+        return Outcome("refused", name)  # by Python, NumPy or SymPy before the package was asked
+    too_large = isinstance(error, OverflowError) and str(error) == "int too large to convert to float"
+    if isinstance(error, refusals) or (refusals and too_large):
+        return Outcome("refused", name)
+    last = frames[-1] if frames else None
+    inner = f" in {Path(last.filename).name}:{last.name}" if last is not None and last not in own else ""
+    return Outcome("traceback", f"{name} {place}", f"{name} {place}{inner}", text)
+
+
+def _plain(text: str) -> str:
+    """A message without what differs from case to case."""
+    return re.sub(r"'[^']*'|\"[^\"]*\"|\d+", "#", text)[:100]

@@ -1,0 +1,52 @@
+"""What a run found, as a line while it goes and as a table at its end."""
+
+from __future__ import annotations
+
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .outcome import FINDINGS
+
+if TYPE_CHECKING:
+    from .campaign import Campaign, Record
+
+RESULTS = Path(__file__).with_name("RESULTS.md")
+CALM = ("fine", "named error", "refused")
+
+
+def progress(campaign: Campaign) -> None:
+    """One line on how far a run is."""
+    found = {word: sum(r.outcomes[word] for r in campaign.records.values()) for word in FINDINGS}
+    shown = ", ".join(f"{n} {word}" for word, n in found.items() if n) or "no findings"
+    per_kind = " ".join(f"{name} {record.cases}" for name, record in campaign.records.items())
+    distinct = f" ({len(campaign.findings)} distinct)" if campaign.findings else ""
+    print(f"{campaign.seconds:6.0f} s  {campaign.cases} cases: {per_kind}; {shown}{distinct}", flush=True)
+
+
+def summary(campaign: Campaign) -> str:
+    """The table, in Markdown; without dates, so that two runs of the same seeds can be compared."""
+    lines = [
+        "# What was attacked, and what came of it",
+        "",
+        f"Written by `make fuzz RESULTS=1`: {campaign.cases:,} cases, seeds from {campaign.first}, Python {platform.python_version()}, "
+        f"{campaign.jobs} process(es), {campaign.seconds:,.0f} s.",
+        "A named error is a refusal that says what is wrong; refused means by Python itself, for the arguments of a call.",
+        "",
+        f"| kind | cases | {' | '.join((*CALM, *FINDINGS))} | s in all | ms each | worst s (seed) | most memory (MB) |",
+        f"|---|{'---|' * (5 + len(CALM) + len(FINDINGS))}",
+    ]
+    lines += [_row(name, record) for name, record in campaign.records.items()]
+    if not campaign.findings:
+        return "\n".join([*lines, "", "Nothing was found.", ""])
+    lines += ["", "| found in | first seed | fault |", "|---|---|---|"]
+    for (name, key), known in sorted(campaign.findings.items()):
+        lines.append(f"| {name} | {known[0]['seed']} | {key.replace('|', '/')} |")
+    return "\n".join([*lines, ""])
+
+
+def _row(name: str, record: Record) -> str:
+    counts = " | ".join(f"{record.outcomes[word]:,}" for word in (*CALM, *FINDINGS))
+    each = 1e3 * record.seconds / max(record.cases, 1)
+    worst = f"{record.worst:.2f} ({record.worst_seed})"
+    return f"| {name} | {record.cases:,} | {counts} | {record.seconds:,.0f} | {each:.2f} | {worst} | {record.memory / 2**20:,.0f} |"

@@ -1,0 +1,246 @@
+"""The same events through every loop find the same times, states and ends: compiled steppers, SciPy's methods, the
+NumPy target, an exported package, IDA, ensembles, sensitivities; and no loop ends early in silence."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import DOP853
+
+import eomgen as eg
+from eomgen import pipeline
+
+G, E, END = 9.81, 0.9, 2.0
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+COMPILED = ["RK23", "RK45", "DOP853", "Radau", "Taylor", "RK4"]
+STEPPED = ["RK45", "DOP853", "Radau", "BDF", "LSODA"]
+#: Error of the times of events: methods of low order keep fewer digits.
+ERROR = {"BDF": 2e-6, "LSODA": 1e-6, "RK23": 1e-7, "IDA": 1e-6, "sensitivities": 1e-6}
+
+
+def ball(**floor: Any) -> eg.Model:
+    m = eg.Model("ball", gravity=(0, -G, 0))
+    e = m.parameter("e", E)
+    m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
+    m.initial(h=1.0)
+    m.event("floor", "h", **({"direction": -1, "reset": {"h_dot": -e * m.coordinate("h_dot")}} | floor))
+    return m
+
+
+@pytest.fixture(scope="module")
+def modules(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+    """By target; ``exported``: a package of the NumPy target, imported from its own folder."""
+    folder = tmp_path_factory.mktemp("exported")
+    pipeline.generate(ball(), folder, target="numpy")
+    sys.path.insert(0, str(folder))
+    try:
+        package = importlib.import_module("ball")
+        yield {"exported": package, **{target: ball().compile(target=target) for target in ("cython", "numpy")}}
+    finally:
+        sys.path.remove(str(folder))
+        for name in [name for name in sys.modules if name == "ball" or name.startswith("ball.")]:
+            del sys.modules[name]
+
+
+def levels(n: int) -> dict[str, Any]:
+    """So many events, of every direction; two of them at one instant."""
+    found: dict[str, Any] = {"same": "h - 0.05", "again": "2*h - 0.1"}
+    for i in range(n):
+        found[f"level{i}"] = {"expression": f"h - {0.04 * (i + 1):.2f}", "direction": (0, 1, -1)[i % 3]}
+    return found
+
+
+def functions(events: dict[str, Any]) -> dict[str, Any]:
+    """The same as functions: a package without eomgen reads no texts."""
+
+    def made(given: Any) -> Any:
+        options = {"expression": given} if isinstance(given, str) else given
+        head, level = options["expression"].split(" - ")
+        factor = 2.0 if head == "2*h" else 1.0
+
+        def value(t: float, x: np.ndarray) -> float:
+            return factor * float(x[0]) - float(level)
+
+        value.direction = options.get("direction", 0)  # type: ignore[attr-defined]
+        value.terminal = options.get("terminal", 0)  # type: ignore[attr-defined]
+        return value
+
+    return {name: made(given) for name, given in events.items()}
+
+
+def floors(e: float = E, end: float = END) -> np.ndarray:
+    times, gap = [np.sqrt(2 / G)], 2 * e * np.sqrt(2 / G)
+    while times[-1] + gap < end:
+        times.append(times[-1] + gap)
+        gap *= e
+    return np.array(times)
+
+
+def passages(height: float, direction: int) -> np.ndarray:
+    """Times at which the ball passes a height, by the closed form."""
+    hits, found = [0.0, *floors(), np.inf], []
+    for k, start in enumerate(hits[:-1]):
+        v, h0 = (0.0, 1.0) if k == 0 else (np.sqrt(2 * G) * E**k, 0.0)
+        if (square := v * v + 2 * G * (h0 - height)) < 0.0:
+            continue
+        for sign, way in ((-1.0, 1), (1.0, -1)):
+            t = (v + sign * np.sqrt(square)) / G
+            if 1e-9 < t < min(hits[k + 1], END) - start and direction in (0, way):
+                found.append(start + t)
+    return np.array(found)
+
+
+def loops(modules: dict[str, Any]) -> dict[str, Callable[..., Any]]:
+    """Name of a loop -> events -> Trajectory."""
+
+    def run(target: str, method: Any) -> Callable[..., Any]:
+        options = {"step": 1e-3} if method == "RK4" else TIGHT
+        return lambda events, **more: modules[target].simulate((0, END), method=method, events=events, **options | more)
+
+    found = {f"cython {method}": run("cython", method) for method in COMPILED}
+    found |= {f"numpy {method}": run("numpy", method) for method in STEPPED}
+    found["own solver"] = run("cython", type("Own", (DOP853,), {}))
+    found["exported DOP853"] = lambda events: run("exported", "DOP853")(functions(events))
+    found["numpy IDA"] = lambda events: modules["numpy"].dae.solve((0, END), events=events, max_step=0.02, **TIGHT)
+    slopes = modules["cython"].sensitivities
+    found["cython sensitivities"] = lambda events, **more: (
+        slopes(["e"], (0, END), events=events, **TIGHT | more).trajectory
+    )
+    return found
+
+
+@pytest.mark.parametrize("n", [0, 6, 7, 18])
+def test_any_number_of_events_in_every_loop(modules: dict[str, Any], n: int) -> None:
+    events = levels(n)
+    for name, run in loops(modules).items():
+        found, error = run(events), ERROR.get(name.split()[1], 1e-8)
+        assert (found.status, found.t[-1]) == (0, END), name
+        np.testing.assert_allclose(found.t_events["floor"], floors(), atol=error, err_msg=name)
+        np.testing.assert_allclose(found.t_events["same"], passages(0.05, 0), atol=error, err_msg=name)
+        np.testing.assert_allclose(found.t_events["again"], found.t_events["same"], atol=1e-13, err_msg=name)
+        for i in range(n):
+            expected = passages(0.04 * (i + 1), (0, 1, -1)[i % 3])
+            np.testing.assert_allclose(found.t_events[f"level{i}"], expected, atol=10 * error, err_msg=name)
+        np.testing.assert_allclose(found["h_dot"][-1], last_rate(), atol=30 * error, err_msg=name)
+
+
+def last_rate() -> float:
+    k, start = len(floors()), float(floors()[-1])
+    return float(np.sqrt(2 * G) * E**k - G * (END - start))
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_ensembles_meet_them_as_well(modules: dict[str, Any], target: str) -> None:
+    options = {"method": "RK45", "events": levels(12), "keep_events": 200, **TIGHT}
+    many = modules[target].simulate_many((0, END), {"h": np.array([1.0, 0.9, 1.0])}, **options)
+    assert (many.status == 0).all()
+    assert (many.t_end == END).all()
+    for name, expected in {"floor": floors(), "same": passages(0.05, 0), "level4": passages(0.2, 1)}.items():
+        np.testing.assert_allclose(many.events(name)[0][: len(expected), 0], expected, atol=1e-8, err_msg=name)
+
+
+@pytest.mark.parametrize("n", [0, 6, 7, 18])
+def test_resets_that_die_away_are_named_by_every_loop(modules: dict[str, Any], n: int) -> None:
+    """Never status 0 before the end, and never through the floor: with 7 events a run once ended so at 1.35 s of 10."""
+    events = levels(n)
+    for target, methods in {"cython": ["RK45", "DOP853", "Radau", "Taylor"], "numpy": STEPPED}.items():
+        for method in methods:
+            with pytest.raises(eg.ZenoError, match=r"floor .*near t = 1\.354"):
+                modules[target].simulate((0, 10), parameters={"e": 0.5}, events=events, method=method)
+    with pytest.raises(eg.ZenoError, match=r"floor .*near t = 1\.35"):
+        modules["numpy"].dae.solve((0, 10), parameters={"e": 0.5}, events=events)
+    many = modules["cython"].simulate_many((0, 10), {"h": np.ones(2)}, {"e": 0.5}, events=events, method="RK45")
+    assert not many.ok.any()
+
+
+@pytest.mark.parametrize("n", [1, 7, 14])
+def test_a_terminal_event_among_many(modules: dict[str, Any], n: int) -> None:
+    events = levels(n) | {"stop": {"expression": "h - 0.3", "direction": 1, "terminal": 2}}
+    expected = passages(0.3, 1)[1]
+    for name, run in loops(modules).items():
+        found = run(events)
+        assert found.status == 1, name
+        assert found.t[-1] == pytest.approx(expected, abs=ERROR.get(name.split()[1], 1e-8)), name
+
+
+@pytest.mark.parametrize("law", [{"reset": {"h_dot": "-0.8*h_dot"}, "direction": -1}, {"restitution": 0.8}])
+def test_resets_of_one_instant_among_many(law: dict[str, Any]) -> None:
+    m = eg.Model("several", gravity=(0, -G, 0))
+    for i in range(8):
+        m.prismatic(f"J{i}", m.ground, m.body(f"b{i}", mass=1.0), axis="y", coordinate=f"h{i}")
+        own = {"direction": -1, "reset": {f"h{i}_dot": f"-0.8*h{i}_dot"}} if "reset" in law else law
+        m.event(f"floor{i}", f"h{i}", **own)
+    starts = {f"h{i}": 1.0 if i % 2 else 0.7 for i in range(8)}
+    for target, methods in {"cython": ["DOP853"], "numpy": STEPPED}.items():
+        mod = m.compile(target=target)
+        for method in methods:
+            run = mod.simulate(0.9, starts, method=method, **TIGHT)
+            assert (run.status, run.t[-1]) == (0, 0.9)
+            for i in range(8):
+                expected = [np.sqrt(2 * starts[f"h{i}"] / G)]
+                np.testing.assert_allclose(run.t_events[f"floor{i}"][:1], expected, atol=1e-6, err_msg=method)
+                assert run[f"h{i}"][-1] > 0.0
+
+
+TOUCHES = {
+    "square": "(t - 1)**2",
+    "above": "sin(4*t) - 1",
+    "below": {"expression": "1 + sin(4*t)", "direction": -1},
+    "dip": "(t - 1.3)**2 - 1e-10",
+    "misses": "(t - 0.7)**2 + 1e-9",
+    "kink": "abs(h) + 1",
+}
+
+
+def test_a_value_that_only_touches_zero_is_found_by_every_loop(modules: dict[str, Any]) -> None:
+    """As the docs promise; IDA, whose own root finding is used, sees changes of sign between its steps."""
+    for name, run in loops(modules).items():
+        if "IDA" in name or "exported" in name:
+            continue
+        found = run(TOUCHES, **({} if name == "cython RK4" else {"max_step": 0.3}))
+        np.testing.assert_allclose(found.t_events["square"], [1.0], atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(found.t_events["above"], [np.pi / 8, 5 * np.pi / 8], atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(found.t_events["below"], [3 * np.pi / 8], atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(found.t_events["dip"], [1.3 - 1e-5, 1.3 + 1e-5], atol=1e-9, err_msg=name)
+        assert [len(found.t_events[k]) for k in ("misses", "kink")] == [0, 0], name
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-12, 1e-9, -1e-9, 1e-7, -1e-7, 1e-6, -1e-6, 1e-5, -3e-5])
+def test_a_touch_beside_the_end_of_a_step_is_found_once(offset: float) -> None:
+    m = eg.Model("slides")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", m.input("u"))
+    table = {"u": ([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])}  # a corner at 1, where a step ends
+    for target, methods in {"cython": ["RK45", "Radau"], "numpy": ["RK45", "LSODA"]}.items():
+        mod = m.compile(target=target)
+        for method in methods:
+            run = mod.simulate(2.0, inputs=table, events={"touch": f"(t - 1 - {offset})**2"}, method=method)
+            np.testing.assert_allclose(run.t_events["touch"], [1.0 + offset], atol=1e-6)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_a_reset_where_a_value_touches_zero_happens_once(target: str) -> None:
+    m = eg.Model("kicked")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.event("kick", "(t - 1)**2", reset={"s_dot": "s_dot + 2"})
+    run = m.compile(target=target).simulate(2.0, method="RK45")
+    assert (run.status, len(run.t_events["kick"])) == (0, 1)
+    assert run["s_dot"][-1] == pytest.approx(2.0)
+    assert run["s"][-1] == pytest.approx(2.0, abs=1e-5)
+
+
+def test_a_solver_that_ends_early_in_silence_is_named(modules: dict[str, Any]) -> None:
+    class Lazy(DOP853):
+        def step(self) -> Any:
+            message = super().step()
+            if self.t > 1.35:
+                self.status = "finished"
+            return message
+
+    with pytest.raises(eg.SimulationError, match=r"is at the end, t = 2 s, and is at t = 1\."):
+        modules["numpy"].simulate((0, END), method=Lazy)
