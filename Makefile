@@ -3,6 +3,8 @@
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
 # make mutations  puts deliberate faults into a copy of the sources; fails if no test notices one (half an hour)
+# make fuzz   attacks the package with hostile files, texts, calls and objects: CASES=100000, or HOURS=8 with new ones;
+#             KINDS='yaml sympy' only these, JOBS=2 processes, OUT=DIR for what is found, RESULTS=1 writes the table
 # make clean  removes what the other targets made, .venv included
 # Each makes its own .venv (Python 3.11 or later) and installs what it needs; a second call goes straight to work.
 
@@ -12,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test bench lint mutations clean
+.PHONY: demo test bench lint mutations fuzz clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
@@ -30,6 +32,10 @@ bench: $(VENV)/.installed-plot
 
 mutations: $(VENV)/.installed-test
 	@$(BIN)/python tests/mutations/run.py --jobs 2
+
+fuzz: $(VENV)/.installed-test
+	@cd tests && ../$(BIN)/python -m hostile.run $(KINDS) $(if $(HOURS),--hours $(HOURS)) $(if $(CASES),--cases $(CASES)) \
+	  $(if $(JOBS),--jobs $(JOBS)) $(if $(OUT),--out $(abspath $(OUT))) $(if $(RESULTS),--results)
 
 clean:
 	@rm -rf $(VENV) build dist demo_output eomgen.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

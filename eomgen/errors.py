@@ -29,7 +29,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from .texts import visible
+from .texts import shortened, visible
+
+#: Characters of each part of a problem that are shown: names and expressions may be as long as the file.
+SHOWN = 2000
 
 
 class EomgenError(Exception):
@@ -50,8 +53,8 @@ class Problem(NamedTuple):
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}: " if self.file else ""
-        tail = f"; {self.remedy}" if self.remedy else ""
-        return visible(f"{place}{self.path}: {self.message}{tail}", lines=False)
+        path, message, remedy = (shortened(part, SHOWN) for part in (self.path, self.message, self.remedy))
+        return visible(f"{place}{path}: {message}{f'; {remedy}' if remedy else ''}", lines=False)
 
 
 class ModelError(EomgenError):

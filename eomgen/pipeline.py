@@ -13,8 +13,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from .derivation import Equations
 from .equations import GIVEN, METHODS, take_given
+from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
 from .errors import AssemblyError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
@@ -69,6 +72,7 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
     return method
 
 
+@np.errstate(all="ignore")  # results are looked at, and what is not finite is refused by name
 def derive(
     model: Model,
     method: str = "auto",
@@ -154,6 +158,7 @@ def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
         raise AssemblyError(str(mechanism.problem(place, str(error))), error.rows) from None
 
 
+@np.errstate(all="ignore")
 def check(model: Model) -> MechanismReport:
     """Everything that can be wrong with a model before code is generated.
 
@@ -165,9 +170,12 @@ def check(model: Model) -> MechanismReport:
     equations.kinematics.mechanism.require_values()
     idle = require_inertia(equations.kinematics, equations.mobility, equations.tree)
     found = report(equations.kinematics, equations.mobility)
-    return replace(found, notes=[*found.notes, f"kinematics only: {idle}"]) if idle else found
+    note = note_lost_digits(equations.kinematics, equations.mobility, equations.tree)
+    more = [f"kinematics only: {idle}"] if idle else [note] if note else []
+    return replace(found, notes=[*found.notes, *more])
 
 
+@np.errstate(all="ignore")
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
     from .program import Limits
@@ -193,6 +201,7 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     return build_program(collect_terms(kinematics, mobility, tree), metadata, kernels=kernels, limits=limits)
 
 
+@np.errstate(all="ignore")
 def compile_equations(
     equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
 ) -> Module:
@@ -257,8 +266,7 @@ def _load(
             from .emit import emit_c
             from .emit.sources import keep_bytecode
 
-            if (folder := shortcut.cache.open_templates()) is not None:
-                keep_bytecode(folder)
+            keep_bytecode(shortcut.cache.templates)
             sources = emit_c(program)
     with _timed(seconds, "compile"):
         if artifact is None:
@@ -271,6 +279,7 @@ def _load(
         return cast("Core", load_core(artifact))
 
 
+@np.errstate(all="ignore")
 def generate(
     model: Model,
     directory: Path | str,

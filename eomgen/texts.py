@@ -63,6 +63,11 @@ def visible(text: str, lines: bool = True) -> str:
     return "".join(c if c.isprintable() or (lines and c == "\n") else repr(c)[1:-1] for c in text)
 
 
+def shortened(text: str, longest: int) -> str:
+    """The beginning of a text that is longer."""
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
 def comment_text(text: str) -> str:
     """One line for the inside of a comment of C, Python, TOML, YAML or make.
 
@@ -98,8 +103,7 @@ def yaml_quoted(text: str) -> str:
 
 def summary_text(text: str, longest: int = 500) -> str:
     """One printable line, as the descriptions of packages must be; shortened where it is long."""
-    line = visible(" ".join(text.split()), lines=False)
-    return line if len(line) <= longest else f"{line[: longest - 3]}..."
+    return shortened(visible(" ".join(text.split()), lines=False), longest)
 
 
 def markdown_text(text: str) -> str:

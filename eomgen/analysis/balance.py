@@ -13,6 +13,7 @@ import numpy as np
 
 from ..limits.constraints import STATE
 from ..limits.rounding import TINY
+from ..numeric import algebra
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
@@ -135,7 +136,7 @@ def slopes(
         C_q = module.constraint_jacobian(x[:n_q], t=t, rows="all")[:n_h]
         stacked = np.vstack([scales.jacobian(C_q), held * scales.q])
         wanted = np.vstack([moved / scales.c[:n_h, None], held_by[:, list(parameters)]])
-        step = -np.linalg.lstsq(stacked, wanted, rcond=STATE)[0]
+        step = -algebra.lstsq(stacked, wanted, rcond=STATE)
         motion[:, : len(parameters)] = scales.q[:, None] * step
         by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[n_q:]
     along = tangent.T[:, : tangent.Z.shape[1]]

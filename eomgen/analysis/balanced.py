@@ -8,6 +8,7 @@ import numpy as np
 
 from ..limits.constraints import STATE
 from ..limits.statics import DIFFERENCES
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
@@ -103,12 +104,12 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
         found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
         free = weigh(module, t, q)
-        pull = np.linalg.lstsq((held @ free.B).T, free.forces, rcond=STATE)[0]
+        pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A, second = _held_motion(search, module, here, t)
         stability = judge(A, error=DIFFERENCES) if second is None else verdict(second, A, error=DIFFERENCES)
-        found |= {"eigenvalues": np.sort_complex(np.linalg.eigvals(A)), "stability": stability}
+        found |= {"eigenvalues": np.sort_complex(algebra.eigvals(A)), "stability": stability}
     return Equilibrium(module, t, here.x, found)
 
 
@@ -122,7 +123,7 @@ def _held_motion(search: Search, module: Module, here: Balance, t: float) -> tup
     K, C = -slopes, -here.B.T @ tree @ damping @ here.B
     A = np.block([
         [rates[here.positions], here.B[here.positions]],
-        [-np.linalg.solve(M, K), -np.linalg.solve(M, C)],
+        [-algebra.solve(M, K), -algebra.solve(M, C)],
     ])  # fmt: skip
     if len(here.positions) != len(M) or np.any(here.v):
         return A, None

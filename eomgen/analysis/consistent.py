@@ -18,6 +18,7 @@ from ..errors import ProjectionError, UsageError
 from ..limits.constraints import ACCEPTED, EXACT, GENTLE
 from ..limits.constraints import STATE as RANK
 from ..limits.motions import NEAREST
+from ..numeric import algebra
 from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
@@ -125,11 +126,11 @@ def _positions(
 
     def rows(q: Array) -> tuple[Array, Array]:
         C_q = module.constraint_jacobian(q, t=t, rows="all")[:n_h][:, free] / scales.c[:n_h, None]
-        return module.constraints(q, t=t, rows="all") / scales.c[:n_h], np.linalg.solve(L, C_q.T).T
+        return module.constraints(q, t=t, rows="all") / scales.c[:n_h], algebra.solve(L, C_q.T).T
 
     def moved(q: Array, y: Array) -> Array:
         step = np.zeros(layout.n_v)
-        step[free] = np.linalg.solve(L.T, y)
+        step[free] = algebra.solve(L.T, y)
         longest = largest(step / scales.q)
         return _move(layout, q, step * min(1.0, DAMPING / longest) if longest else step)
 
@@ -165,11 +166,11 @@ def _positions(
     share = 1.0
     for _ in range(STEPS if free.any() else 0):
         _, J = rows(q)
-        _, sizes, Vt = np.linalg.svd(J, full_matrices=False)
+        _, sizes, Vt = algebra.svd(J, full_matrices=False)
         across = Vt[sizes > RANK * sizes[0]]
         y = change(q)
         slope = y - across.T @ (across @ y)
-        if largest(np.linalg.solve(L.T, slope) / scales.q[free]) <= NEAREST:
+        if largest(algebra.solve(L.T, slope) / scales.q[free]) <= NEAREST:
             break
         trial = close(moved(q, -share * slope))
         if trial is not None and float(change(trial) @ change(trial)) < float(y @ y):
@@ -194,7 +195,7 @@ def _velocities(
     free = np.array([name not in held for name in layout.v])
     L = _metric(module, q, t, weights, layout.v)[np.ix_(free, free)]
     J = module.constraint_jacobian(q, t=t, rows="all")[:, free] / scales.c[:, None]
-    J = np.linalg.solve(L, J.T).T
+    J = algebra.solve(L, J.T).T
     sizes = np.linalg.norm(J, axis=1)
     sizes = np.where(sizes > RANK * sizes.max(initial=0.0), sizes, np.inf)
     J = J / sizes[:, None]  # rows alike, so that the Tikhonov term weighs all in the same way
@@ -205,7 +206,7 @@ def _velocities(
             break
         before = largest(rate)
         fast = max(largest(v / scales.q), largest(rate))
-        v[free] += np.linalg.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
+        v[free] += algebra.solve(L.T, least(J, -rate / sizes, np.zeros(J.shape[1]), fast))
     rate = module.velocity_constraints(np.concatenate([q, v]), t=t, rows="all") / scales.c
     if largest(rate) > ACCEPTED * max(1.0, largest(v / scales.q)):
         worst = layout.constraint_labels[int(np.abs(rate).argmax())]

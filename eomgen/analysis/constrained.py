@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
+from ..numeric import algebra
 from ..numeric.scales import Array, Scales
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
     if not C_q.shape[1]:
         return np.zeros((0, force.shape[1]))
     J = C_q * (scales.q / scales.c[:, None])
-    U, sizes, Vt = np.linalg.svd(J, full_matrices=False)
+    U, sizes, Vt = algebra.svd(J, full_matrices=False)
     kept = sizes > RANK * np.maximum(sizes[:, :1], np.finfo(float).tiny)
     inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
     right = -(scales.q[:, None] * force).T[:, :, None]
@@ -170,6 +171,6 @@ def conditioned_motions(J: Array, scales: Scales) -> tuple[Array, float]:
     """The same, and the condition of the constraints that leave them; 0 without any."""
     if not len(J):
         return np.diag(scales.q), 0.0
-    _, sizes, Vt = np.linalg.svd(scales.jacobian(J))
+    _, sizes, Vt = algebra.svd(scales.jacobian(J))
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
     return np.asarray(scales.q[:, None] * Vt[rank:].T), float(sizes[0] / sizes[rank - 1]) if rank else 0.0

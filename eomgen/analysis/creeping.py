@@ -13,6 +13,7 @@ import numpy as np
 
 from ..limits.rounding import EPS
 from ..limits.statics import CLOSE
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST, largest
 
@@ -76,7 +77,7 @@ class _Flow(NamedTuple):
     def implicit(self, rate: float, drive: Array) -> Array | None:
         """(rate - A)^-1 drive; None where that does not lead down a potential."""
         shifted = rate * np.eye(len(self.A)) - self.A
-        return np.asarray(np.linalg.solve(shifted, drive)) if _definite(self.M @ shifted) else None
+        return np.asarray(algebra.solve(shifted, drive)) if _definite(self.M @ shifted) else None
 
 
 def _corrected(search: Search, start: Point, rate: float, displacement: Array) -> tuple[Point | None, float]:
@@ -92,7 +93,7 @@ def _corrected(search: Search, start: Point, rate: float, displacement: Array) -
         here = _Flow.at(search, point)
         assert here is not None
         moved = here.basis.T @ search.layout.scales.distance(point.q, start.q)
-        change = np.linalg.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)[0]
+        change = algebra.lstsq(rate * np.eye(len(here.A)) - here.A, here.drive - rate * moved, rcond=None)
         displacement = here.basis @ change
         size = float(np.linalg.norm(displacement))
         if not size <= CONTRACTS * before:

@@ -20,6 +20,7 @@ from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..limits.rounding import TINY
 from ..limits.statics import AFFINE, REACHED, REMAINDER
+from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
@@ -130,9 +131,9 @@ def _solve(A: Array, want: Array, weights: Array) -> Array:
     m, n = A.shape
     if m == n and m:
         rows = np.abs(A * (1.0 / weights)).max(axis=1, keepdims=True)
-        if rows.all() and np.linalg.cond(A / weights / rows) < 1e-2 / RANK:
-            return np.asarray(np.linalg.solve(A / rows, want / rows[:, 0]))
-    return np.asarray(np.linalg.lstsq(A / weights, want, rcond=RANK)[0] / weights)
+        if rows.all() and algebra.cond(A / weights / rows) < 1e-2 / RANK:
+            return np.asarray(algebra.solve(A / rows, want / rows[:, 0]))
+    return np.asarray(algebra.lstsq(A / weights, want, rcond=RANK) / weights)
 
 
 def _check_inputs(
@@ -198,7 +199,7 @@ def _basis(J: Array, layout: Layout) -> Array:
     s = layout.scales
     if len(J):
         scaled = s.jacobian(J)
-        sizes = np.linalg.svd(scaled, compute_uv=False)
+        sizes = algebra.singular_values(scaled)
         rank = int((sizes > RANK * max(sizes.max(initial=0.0), np.finfo(float).tiny)).sum())
         if rank == layout.rank:  # by elimination, which keeps mechanisms apart that have nothing to do with each other
             return np.asarray(s.q[:, None] * partition(scaled, rank, layout.independent).B)
@@ -233,12 +234,12 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
             if not B.shape[1]:
                 continue
             part = B[chosen]
-            if np.linalg.cond(part) > 1 / RANK:
+            if algebra.cond(part) > 1 / RANK:
                 raise UsageError(
                     f"a: at t = {states.t[k]:g} the accelerations of {', '.join(rows)} do not tell the others (a dead "
                     "centre): give a of all velocities"
                 )
-            result[:, k] += B @ np.linalg.solve(part, values[chosen, k] - free[chosen, k])
+            result[:, k] += B @ algebra.solve(part, values[chosen, k] - free[chosen, k])
         return result
     array = np.asarray(a, dtype=float)
     wanted = (layout.n_v,) if states.single else (layout.n_v, count)
@@ -294,7 +295,7 @@ def _input_effect(states: States, j: int) -> Array:
 
 def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: float, k: int | None) -> str:
     """Why drives cannot make a motion, by the freedom they do not move."""
-    U, sizes, _ = np.linalg.svd(A)
+    U, sizes, _ = algebra.svd(A)
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), TINY)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
     moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]

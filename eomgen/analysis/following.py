@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import EomgenError
 from ..limits.constraints import ACCEPTED, AT_ONCE, SETTLED
 from ..limits.motions import NULL
+from ..numeric import algebra
 from ..numeric.projection import largest, within
 from ..numeric.scales import Array
 
@@ -145,7 +146,7 @@ class Follower:
                 return q
             if step == STEPS:
                 break
-            dz = np.linalg.lstsq(K, e, rcond=NULL)[0]
+            dz = algebra.lstsq(K, e, rcond=NULL)
             longest = largest(dz)
             q = self.scales.move(q, -dz * min(1.0, LONGEST / longest) if longest else dz)
             before = size
@@ -163,7 +164,7 @@ class Follower:
     def tangent(self, t: float, q: Array, t1: float, y1: Array) -> Tangent:
         """dq/ds where dt/ds = t1 and dy/ds = y1."""
         K = self.matrix(q, t)
-        U, S, V = np.linalg.svd(K, full_matrices=False)
+        U, S, V = algebra.svd(K, full_matrices=False)
         right = U.T @ self.right(q, t, t1, y1)
         small = NULL * S[0]
         rate = V.T @ np.divide(right, S, out=np.zeros_like(S), where=small < S)
@@ -185,7 +186,7 @@ class Follower:
             found = self._kinematics(np.concatenate([self.led_values(q, t), y1, y2, q]), t=t)
             return found[n_q : n_q + n], found[n_q + n :]
         K = self.matrix(q, t)
-        v = self.scales.q * np.linalg.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)[0]
+        v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
         a = self._some_acceleration(t, q, v)
         if not all(self.in_tree):
             second = self._loop_values(q, t, v, a)[2]
@@ -194,7 +195,7 @@ class Follower:
             for k, (tree, column) in enumerate(zip(self.in_tree, self.columns, strict=True))
         ]
         right = np.concatenate([np.zeros(layout.n_c), np.array(gap, dtype=float) / self.led_scales])
-        a = a + self.scales.q * np.linalg.lstsq(K, right, rcond=NULL)[0]
+        a = a + self.scales.q * algebra.lstsq(K, right, rcond=NULL)
         return v, a
 
     def motions(self, t: Array, y: Array, y1: Array, y2: Array, guesses: Array) -> tuple[Array, Array, Array]:

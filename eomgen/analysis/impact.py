@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import MEASURED
 from ..limits.impacts import HELD, ROUNDED, TOUCHING
+from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
@@ -221,9 +222,9 @@ def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[
             )
     if B.shape[1]:
         factor = definite_factor(B.T @ M @ B, "an impact")
-        H = np.where(fixed, 0.0, np.linalg.solve(factor, B.T @ rows.T))
+        H = np.where(fixed, 0.0, algebra.solve(factor, B.T @ rows.T))
         impulses, z = collide(H, np.where(fixed, 0.0, rates), e, rest, names)
-        change = B @ np.linalg.solve(factor.T, z)
+        change = B @ algebra.solve(factor.T, z)
     else:
         impulses, change = np.zeros(len(rates)), np.zeros_like(v)
     after = np.concatenate([states.q[:, 0], v + change])

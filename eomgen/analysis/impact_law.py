@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.impacts import ENDLESS, FREE, LEFT, PUSHES, STILL
+from ..numeric import algebra
 from ..numeric.scales import Array
 
 ROUNDS = 1000  #: impacts that may follow each other at one instant
@@ -58,11 +59,11 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
     locks, gaps = unit[:, count:], unit[:, :count]
     change: Array = np.zeros(len(H))
     if locks.shape[1]:
-        change = np.asarray(np.linalg.lstsq(locks.T, -rates[count:], rcond=None)[0])
+        change = np.asarray(algebra.lstsq(locks.T, -rates[count:], rcond=None))
     left = np.abs(locks.T @ change + rates[count:])
     if (left > rest[count:] + LEFT * np.abs(rates[count:]).max(initial=0.0)).any():
         raise UsageError("no impulses obey the constraints: the locked coordinates cannot all stop")
-    free = gaps - locks @ np.linalg.lstsq(locks, gaps, rcond=None)[0] if locks.shape[1] else gaps
+    free = gaps - locks @ algebra.lstsq(locks, gaps, rcond=None) if locks.shape[1] else gaps
     impulses = np.zeros(count)
     live = np.linalg.norm(free, axis=0) > FREE
     step = _need(rates[:count], e, rest[:count])
@@ -90,7 +91,7 @@ def collide(H: Array, rates: Array, e: Array, rest: Array, names: Sequence[objec
         now = rates[:count] + gaps.T @ change
         if k == ROUNDS:
             break
-    held = np.linalg.lstsq(locks, change - gaps @ impulses, rcond=None)[0] if locks.shape[1] else np.zeros(0)
+    held = algebra.lstsq(locks, change - gaps @ impulses, rcond=None) if locks.shape[1] else np.zeros(0)
     return np.concatenate([impulses, held]) / sizes, change
 
 
@@ -119,8 +120,8 @@ def _least_change(H: Array, need: Array) -> tuple[Array, Array] | None:
         return None
     z, g = most * (H @ u) / r, most * u / r
     P = u > 0.0  # again from the gaps that push, to the last digits
-    z_P = np.asarray(np.linalg.lstsq(H[:, P].T, need[P], rcond=None)[0])
-    g_P = np.asarray(np.linalg.lstsq(H[:, P], z_P, rcond=None)[0])
+    z_P = np.asarray(algebra.lstsq(H[:, P].T, need[P], rcond=None))
+    g_P = np.asarray(algebra.lstsq(H[:, P], z_P, rcond=None))
     slack = FREE * max(most, float(np.abs(z_P).max(initial=0.0)))
     if (g_P >= 0.0).all() and (H.T @ z_P >= need - slack).all():
         g[P], z = g_P, z_P
@@ -141,7 +142,7 @@ def _positive_least_squares(E: Array, y: Array) -> Array:
         first = True
         while passive.any():
             s = np.zeros(n)
-            s[passive] = np.linalg.lstsq(E[:, passive], y, rcond=None)[0]
+            s[passive] = algebra.lstsq(E[:, passive], y, rcond=None)
             if first and s[j] <= 0.0:  # a slope that is rounding
                 passive[j], barred[j] = False, True
                 break

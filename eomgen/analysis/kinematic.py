@@ -49,6 +49,7 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
     UsageError
     """
     from ..runtime.names import unknown
+    from ..runtime.room import require_room
 
     layout = module.layout
     coordinates = layout.q + layout.loops
@@ -70,6 +71,7 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
     if len(set(sizes.values())) > 1:
         raise UsageError(f"all must have one length, not {', '.join(f'{n}: {k}' for n, k in sizes.items())}")
     n = next(iter(sizes.values()))
+    require_room(f"a range of {n} points", n * (3.0 * layout.n_x + len(known)), "give fewer points")
 
     def stack(suffix: str) -> Array:
         rows = [np.broadcast_to(arrays.get(name + suffix, np.zeros(())), n) for name in names]
@@ -85,6 +87,8 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
 
 def _column(name: str, value: Any) -> Array:
     try:
+        if np.iscomplexobj(value):
+            raise TypeError
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None

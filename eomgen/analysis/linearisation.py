@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.statics import COUPLED, STILL
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from .rounding import BALANCED
@@ -75,7 +76,7 @@ class Linearisation:
 
     @cached_property
     def _sorted(self) -> tuple[Any, Any]:
-        values, vectors = np.linalg.eig(self.A)
+        values, vectors = algebra.eig(self.A)
         order = np.lexsort((values.imag, np.round(values.real, 9), np.round(np.abs(values), 9)))
         return values[order], vectors[:, order]
 
@@ -153,7 +154,7 @@ class Linearisation:
         errors = np.zeros_like(self.A)
         if M.size:
             C_error = MARGIN * np.abs(M) @ np.abs(self.A[n:, n:])
-            errors[n:] = np.abs(np.linalg.inv(M)) @ np.hstack([self.stiffness_error, C_error])
+            errors[n:] = np.abs(algebra.inv(M)) @ np.hstack([self.stiffness_error, C_error])
             errors[self.A == 0.0] = 0.0  # no force at all, or one that rounding has not touched
         return verdict(self._second(), self.A, self.own, errors=errors)
 

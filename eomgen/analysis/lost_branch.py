@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import NoDerivativeError
 from ..limits.constraints import PASSED
 from ..limits.impacts import OPENS
+from ..numeric import algebra
 from ..runtime.change_points import scaled_jacobians
 from .balance import assembly_jacobian
 from .start import Columns
@@ -41,7 +42,7 @@ def refuse_lost_branches(module: Module, forcing: Forcing, run: Trajectory, colu
         x = np.concatenate([[point.coordinates[name] for name in layout.q], np.zeros(layout.n_v)])
         u = forcing(point.time, x)
         J = scaled_jacobians(module, np.array([point.time]), x[:, None], u[:, None] if len(u) else None)[0]
-        U, sizes, _ = np.linalg.svd(J[: layout.n_h])
+        U, sizes, _ = algebra.svd(J[: layout.n_h])
         lost = U[:, np.count_nonzero(sizes > 10.0 * PASSED * sizes.max(initial=0.0)) :]
         C = assembly_jacobian(module.bind(u=u), point.time, x)[: layout.n_h] / layout.scales.c[: layout.n_h, None]
         for name, k in by:

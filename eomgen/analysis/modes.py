@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.statics import SYMMETRIC
+from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
@@ -121,13 +122,13 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     if not M.size:
         return np.zeros(0), np.zeros((0, 0))
     factor = definite_factor(M, "modes")
-    inverse = np.linalg.inv(factor)
+    inverse = algebra.inv(factor)
     reduced = inverse @ K @ inverse.T
     if np.abs(reduced - reduced.T).max() <= SYMMETRIC * max(1.0, np.abs(reduced).max()):
         squares, shapes = symmetric_modes(M, K)
         vectors = factor.T @ shapes
     else:
-        values, complexes = np.linalg.eig(reduced)
+        values, complexes = algebra.eig(reduced)
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
             raise UsageError(
                 "the undamped modes are not real, because the stiffness is not symmetric (forces that follow the "

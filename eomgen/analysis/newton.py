@@ -13,6 +13,7 @@ import numpy as np
 
 from ..limits.rounding import EPS, TINY
 from ..limits.statics import ARRIVED, CLOSE, SHORTEST
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .rounding import BALANCED
 
@@ -45,7 +46,7 @@ class Solver:
         self.linear = linear
         self.sizes = np.where(linear.sizes > 0.0, linear.sizes, 1.0)
         self.J = linear.J / self.sizes[:, None]
-        self.U, values, self.V = np.linalg.svd(self.J, full_matrices=False)
+        self.U, values, self.V = algebra.svd(self.J, full_matrices=False)
         self.kept = values > linear.noise
         self.inverse = np.where(self.kept, 1.0 / np.where(self.kept, values, 1.0), 0.0)
 
@@ -173,7 +174,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
         there = None
         while damping < STIFFEST:
             stacked = np.vstack([J, np.sqrt(damping) * np.diag(scale)])
-            change = np.linalg.lstsq(stacked, np.concatenate([-r, np.zeros(len(scale))]), rcond=None)[0]
+            change = algebra.lstsq(stacked, np.concatenate([-r, np.zeros(len(scale))]), rcond=None)
             there = search.step(point, solver.linear.moved @ change, solver.linear.changed @ change)
             gain = -1.0
             if there is not None:

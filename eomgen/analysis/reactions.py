@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.constraints import UNMOVED
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .constrained import States, evaluate, prepare, solve_multipliers
 
@@ -136,9 +137,9 @@ def along_free(free: Array, wrench: Array) -> tuple[Array, Array]:
     size = np.abs(directions).max(initial=0.0)
     turning = np.abs(directions[:, :, 3:]).max(axis=(0, 2)) > UNMOVED * size
     slides, turns = directions[:, ~turning, :3], directions[:, turning, 3:]
-    force = np.linalg.pinv(slides) @ forces[:, ~turning, None] if slides.size else np.zeros((len(forces), 3, 1))
+    force = algebra.pinv(slides) @ forces[:, ~turning, None] if slides.size else np.zeros((len(forces), 3, 1))
     rest = forces[:, turning, None] - directions[:, turning, :3] @ force
-    torque = np.linalg.pinv(turns) @ rest if turns.size else np.zeros((len(forces), 3, 1))
+    torque = algebra.pinv(turns) @ rest if turns.size else np.zeros((len(forces), 3, 1))
     return forces.T, np.concatenate([force, torque], axis=1)[:, :, 0].T
 
 

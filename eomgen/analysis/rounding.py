@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..limits.rounding import EPS, TINY
+from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
@@ -48,8 +49,8 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING, errors: A
         return "no freedom"
     scale = _balance(A, own)
     balanced = A * scale / scale[:, None]
-    values = np.linalg.eigvals(balanced)
-    far = error * float(np.linalg.norm(balanced, 2))
+    values = algebra.eigvals(balanced)
+    far = error * float(algebra.norm2(balanced))
     zero = np.array([_reaches_axis(balanced, complex(value), far) for value in values])
     if errors is not None:
         scale = _balance(np.maximum(np.abs(A), errors), own)  # so that what is but an error is not blown up
@@ -64,9 +65,7 @@ def judge(A: Array, own: Array | None = None, error: float = ROUNDING, errors: A
 def _reaches_axis(A: Array, value: complex, far: float) -> bool:
     """Whether a change of A by a norm of `far` can move an eigenvalue to the imaginary axis, straight on."""
     identity = np.eye(len(A))
-    return all(
-        np.linalg.svd(A - (1j * value.imag + part * value.real) * identity, compute_uv=False)[-1] <= far for part in WAY
-    )
+    return all(algebra.singular_values(A - (1j * value.imag + part * value.real) * identity)[-1] <= far for part in WAY)
 
 
 def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: complex) -> bool:
@@ -87,9 +86,9 @@ def _reaches_axis_in_cluster(A: Array, errors: Array, sizes: Array, value: compl
         projector = np.mean([z * np.linalg.inv(z * identity - A) for z in nodes], axis=0).real
     except np.linalg.LinAlgError:
         return False
-    basis = np.linalg.svd(projector)[0][:, : len(inner)]
+    basis = algebra.svd(projector)[0][:, : len(inner)]
     left = basis.T @ projector
-    far = float(np.linalg.norm(np.abs(left) @ errors @ np.abs(basis), 2))
+    far = float(algebra.norm2(np.abs(left) @ errors @ np.abs(basis)))
     return _reaches_axis(left @ A @ basis, value, far)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
 from ..limits.statics import DIFFERENCES, MOVING
+from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
@@ -120,7 +121,7 @@ class Search:
         found = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
         basis, inverse = _orthonormal(found.Z / s[:, None])
         if len(held):  # only displacements that leave the held coordinates alone
-            split = np.linalg.svd(held * s @ basis)
+            split = algebra.svd(held * s @ basis)
             free = split[2][len(held) :].T
             basis, inverse = basis @ free, inverse @ free
         weights = np.maximum(np.abs(point.unknowns), 1e-3 * np.maximum(1.0, np.abs(point.unknowns).max(initial=0.0)))
@@ -140,7 +141,7 @@ class Search:
         if not n:
             return np.asarray(np.abs(J).sum(axis=1))
         mass = self.mass(point)
-        spread = np.abs(np.linalg.inv(mass)) @ np.abs(mass)
+        spread = np.abs(algebra.inv(mass)) @ np.abs(mass)
         s = self.layout.scales.q[here.velocities]
         own = own_accelerations(point.module, self.t, here.x, here.B, here.velocities, mass)
         rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
@@ -252,4 +253,4 @@ class Search:
 def _orthonormal(Z: Array) -> tuple[Array, Array]:
     """Z R^-1 with columns of length 1 at right angles, and R^-1."""
     basis, R = np.linalg.qr(Z)
-    return basis, np.linalg.inv(R)
+    return basis, algebra.inv(R)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..limits.constraints import BALANCE as RANK
 from ..limits.statics import SEEN
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .constrained import States
 from .reactions import GROUND, Geometry, along_free, free_of, shift, transmitted
@@ -30,12 +31,12 @@ def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Arra
         reach = [i for i, owner in enumerate(table["reach"]) if owner == joint]
         if reach:
             G = np.moveaxis(geometry.reach[reach], -1, 0) * _per(length)
-            _, sizes, Vt = np.linalg.svd(G, full_matrices=False)
+            _, sizes, Vt = algebra.svd(G, full_matrices=False)
             kept = sizes > RANK * sizes[:, :1]
         else:
             F = np.moveaxis(geometry.free[free_of(table, joint)], -1, 0) / _per(length)
             size = np.sqrt((F**2).sum(axis=2, keepdims=True))
-            _, sizes, Vt = np.linalg.svd(F / np.where(size > 0.0, size, 1.0))
+            _, sizes, Vt = algebra.svd(F / np.where(size > 0.0, size, 1.0))
             kept = np.ones(Vt.shape[:2], dtype=bool)
             kept[:, : sizes.shape[1]] = sizes <= RANK
         columns = Vt[:, kept.any(axis=0)] * kept[:, kept.any(axis=0), None]
@@ -78,7 +79,7 @@ def element_wrenches(states: States, table: dict[str, Any], geometry: Geometry) 
 def _driving(free: Array, forces: Array) -> Array:
     """The wrench (6, k) at S with these generalized forces (n, k): torques where directions turn."""
     directions = np.moveaxis(free, -1, 0)
-    _, unit = along_free(free, (np.linalg.pinv(directions) @ forces.T[:, :, None])[:, :, 0].T)
+    _, unit = along_free(free, (algebra.pinv(directions) @ forces.T[:, :, None])[:, :, 0].T)
     return unit
 
 
@@ -104,7 +105,7 @@ def remove_self_stress(
                 A[:, body, :, ends[j] : ends[j + 1]] += sign * (_shifts(arm) @ B)
     elements = element_wrenches(states, table, geometry) * per[:, None] / sizes[:, None, None, None]
     A[..., ends[-2] :] = -np.moveaxis(elements, (0, 3), (3, 0))
-    _, found, Vt = np.linalg.svd(A.reshape(count, 6 * n_b, ends[-1]))
+    _, found, Vt = algebra.svd(A.reshape(count, 6 * n_b, ends[-1]))
     null = np.ones(Vt.shape[:2], dtype=bool)
     null[:, : found.shape[1]] = found <= RANK * found.max(axis=1, initial=0.0)[:, None]
     N = Vt * null[:, :, None]  # its rows span the self-stresses

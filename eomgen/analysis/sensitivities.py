@@ -24,8 +24,10 @@ from ..runtime.integrate import Solution, choose_solver, integrate, require_end
 from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
+from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from ..runtime.simulate import DEFAULTS, find_span, find_state, ordered_times
+from ..runtime.tolerances import check_tolerances
 from .lost_branch import refuse_lost_branches
 from .saltation import Saltation
 from .sensitivity_result import Sensitivities
@@ -72,19 +74,23 @@ def differentiate_run(
     columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
-    options = {"rtol": rtol, "atol": atol, **options}
+    options = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **options})
+    require_steps("max_step", float(options.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:
         alone = bound.simulate((start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
-    times = None if t_eval is None else ordered_times(t_eval, start, stop)
+    width = layout.n_x * (1 + len(columns.names))
+    times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
     salts = Saltation(run, watched, (start, stop), (rtol, atol), corners)
     fail, title = bound.kernels.fail, solver.__name__
     longest = float(options.get("max_step", np.inf))
-    pace = Pace(start, stop, z0, layout.n_q, longest, lambda t, z: fail.trouble(z[: layout.n_x], t) is not None)
+    numbers = len(z0) if times is None else 0
+    troubled = lambda t, z: fail.trouble(z[: layout.n_x], t) is not None  # noqa: E731
+    pace = Pace(start, stop, z0, layout.n_q, longest, troubled, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.rounding import EPS
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .rounding import ROUNDING, graded_modes, judge
 
@@ -59,10 +60,10 @@ def stiffness_errors(M: Array, slopes: Array, own: Array, sizes: Array, error: f
 
 def symmetric_modes(M: Array, K: Array) -> tuple[Array, Array]:
     """Squares of frequencies, ascending, and shapes (columns, s^T M s = 1) of symmetric M and K."""
-    factor = np.linalg.cholesky(M)
-    inverse = np.linalg.inv(factor)
+    factor = algebra.cholesky(M)
+    inverse = algebra.inv(factor)
     reduced = inverse @ K @ inverse.T
-    return graded_modes(M, K, inverse.T @ np.linalg.eigh(0.5 * (reduced + reduced.T))[1])
+    return graded_modes(M, K, inverse.T @ algebra.eigh(0.5 * (reduced + reduced.T))[1])
 
 
 def uncertainty(squares: Array, shapes: Array, K_error: Array) -> Array:
@@ -113,7 +114,7 @@ def _is_dissipative(second: SecondOrder) -> bool:
         inverse = np.linalg.inv(np.linalg.cholesky(M))
     except np.linalg.LinAlgError:
         return False
-    rates, shapes = np.linalg.eigh(inverse @ (0.5 * (C + C.T)) @ inverse.T)
+    rates, shapes = algebra.eigh(inverse @ (0.5 * (C + C.T)) @ inverse.T)
     sizes = np.abs(inverse.T @ shapes)
     bound = np.einsum("ik,ij,jk->k", sizes, second.C_error, sizes)
     return bool((rates >= -bound - ROUNDING * np.abs(rates).max(initial=0.0)).all())

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.constraints import CONTRADICTION, STATE
+from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
@@ -162,7 +163,7 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
     A, b = np.array(rows).reshape(len(rows), n), np.array(right).reshape(len(rows), count)
     if not A.size or not count:
         return np.zeros((n, count))
-    found = np.linalg.lstsq(A, b, rcond=STATE)[0]
+    found = algebra.lstsq(A, b, rcond=STATE)
     left = np.abs(A @ found - b).max(axis=0)
     bad = np.flatnonzero(left > CONTRADICTION * np.maximum(1.0, np.abs(b).max(axis=0)))
     if bad.size:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import NoDerivativeError
 from ..limits.impacts import OFF
+from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from .constrained import free_motions, solve_multipliers
@@ -60,7 +61,7 @@ class Strike:
         K = np.zeros((free + len(n), free + len(n)))
         K[:free, :free], K[:free, free:], K[free:, :free] = B.T @ metric @ B, -closed.T, closed
         right = np.vstack([B.T @ (metric @ (dv - w) - force), -gap - n @ w])
-        return np.asarray(w + B @ np.linalg.solve(K, right)[:free])
+        return np.asarray(w + B @ algebra.solve(K, right)[:free])
 
 
 def after_impact(
@@ -91,7 +92,7 @@ def after_impact(
     M = module.mass_matrix(strike.q, t=t)
     n = strike.rows(v, change, none, rest)[3][event : event + 1, n_q:n_x]
     g = np.array(rest)
-    g[event] = np.linalg.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0][0]
+    g[event] = algebra.lstsq(strike.B.T @ n.T, strike.B.T @ M @ change, rcond=None)[0]
     force = M @ change - n[0] * g[event]
     l = solve_multipliers(strike.C_q[None], force[:, None], layout.scales)[:, 0]
     held = move._replace(x=np.vstack([move.x[:n_q], np.zeros_like(move.x[n_q:])]))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..files.writing import whole_file
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.storage import table_path
@@ -233,7 +234,7 @@ def _measures(J: Array) -> tuple[Array, Array, Array, Array]:
     fine = np.isfinite(A).all(axis=(-2, -1))
     found = np.full((4, *A.shape[:-2]), np.nan)
     if fine.any():
-        S = np.linalg.svd(A[fine], compute_uv=False)
+        S = algebra.singular_values(A[fine])
         with np.errstate(divide="ignore", invalid="ignore"):
             found[:, fine] = S[:, -1], S[:, 0], S.prod(axis=1), S[:, 0] / S[:, -1]
     smallest, largest, product, quotient = found

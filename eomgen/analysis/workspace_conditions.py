@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .roots import find_root
 from .singular import SHARE, Singular
@@ -102,7 +103,7 @@ class Reader:
     def motion(self, q: Array, t: float) -> tuple[Array, float]:
         """Velocities (n_v, n_over) along each axis of the grid, and the quality of the position."""
         K = self.follower.matrix(q, t)
-        U, S, W = np.linalg.svd(K, full_matrices=False)
+        U, S, W = algebra.svd(K, full_matrices=False)
         R = np.array([self.follower.right(q, t, *self.stage.along(k)) for k in range(len(self.stage.grid.names))]).T
         V = W.T @ np.divide(U.T @ R, S[:, None], out=np.zeros((len(S), R.shape[1])), where=S[:, None] > NULL * S[0])
         return self.follower.scales.q[:, None] * V, float(S[-1] / S[0])
@@ -163,7 +164,7 @@ def judge(stage: Stage, reader: Reader, filled: Flood) -> Conditions:
             singular[index] = lost[index] = True
             continue
         A = J[index] = reader.jacobian(q, t, V)
-        U, S, _ = np.linalg.svd(A)
+        U, S, _ = algebra.svd(A)
         if not S[-1] > DEGENERATE * S[0]:
             singular[index] = lost[index] = True
             found.append(_lost(stage, index, stage.at(index), q, U[:, len(S) - 1]))
@@ -239,6 +240,6 @@ def _locate(stage: Stage, reader: Reader, filled: Flood, one: Index, other: Inde
         return None
     t = path.at(s)[0]
     A = reader.jacobian(here, t, reader.motion(here, t)[0])
-    U, S, _ = np.linalg.svd(A)
+    U, S, _ = algebra.svd(A)
     near = one if s <= 0.5 * length else other
     return _lost(stage, near, path.at(s), here, U[:, -1]) if S[-1] < SINGULAR * S[0] else None

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..limits.motions import FLAT_CELL, SLACK
+from ..numeric import algebra
 from ..numeric.scales import Array
 
 CHUNK = 2_000_000  #: raster cells looked at in one go
@@ -83,7 +84,7 @@ def _draw(raster: np.ndarray[Any, Any], corners: Array) -> None:
     high = np.minimum(np.floor(corners.max(axis=1) - 0.5).astype(int), np.array(raster.shape) - 1)
     sizes = np.maximum(high - low + 1, 0)
     counts = sizes.prod(axis=1)
-    inverse = np.linalg.inv(edges) if len(edges) else edges
+    inverse = algebra.inv(edges) if len(edges) else edges
     ends = np.cumsum(counts)
     first = 0
     while first < len(counts):

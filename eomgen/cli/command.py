@@ -84,6 +84,17 @@ def eomgen() -> None:
     """Equations of motion of mechanisms: derived, compiled, simulated."""
 
 
+def _check_words(words: Sequence[str]) -> None:
+    """Refuse what cannot be part of a file's name; no file system takes it."""
+    for word in words:
+        try:
+            bad = b"\0" in os.fsencode(word)
+        except UnicodeEncodeError:
+            bad = True
+        if bad:
+            raise click.UsageError(f"{word!a:.80} holds a character that no command line can; write it without")
+
+
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Parse and run a command line; returns the exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -91,6 +102,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
+        _check_words(words)
         code = eomgen.main(words, prog_name="eomgen", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:  # wrong options, unknown verbs, files that cannot be read

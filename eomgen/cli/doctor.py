@@ -142,7 +142,11 @@ def _fresh_cache() -> Iterator[None]:
 def _cache() -> Finding:
     from ..compilation import Cache, cache_directory
 
-    cache = Cache(cache_directory())
+    try:
+        cache = Cache(cache_directory())
+        cache.require_own()
+    except EomgenError as error:
+        return Finding("cache", False, "not safe to use, or not there", str(error))
     entries = cache.entries()
     detail = f"{cache.root}: {len(entries)} entries, {readable_size(sum(e.size for e in entries))}"
     folder = next(p for p in (cache.root, *cache.root.parents) if p.exists())

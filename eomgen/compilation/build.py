@@ -14,10 +14,12 @@ from typing import Any
 from ..errors import UsageError
 from ..layer import LAYER, read_header, read_layer
 from .cache import Cache, CacheEntry, cache_directory, compute_key
-from .compiler import CompilerInfo, describe_native, find_compiler, raise_failure, run
+from .commands import Running, allowed, raise_failure
+from .compiler import CompilerInfo, describe_native, find_compiler
 from .cython_layer import HEADERS, build_layer, describe_interpreter, describe_layer
 from .options import Options, compile_flags, link_flags, machine_flags
 from .processor import choose_lanes, late_files
+from .products import require_library, require_object, stamp, write_stamp
 
 Progress = Callable[[str], None]
 
@@ -176,13 +178,13 @@ def _build(
         for file, text in sources.items():
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
         files = {file: Path("sources", file) for file in flags if file}
-        compile_and_link(directory, name, files, flags, product, compiler, options.jobs, objects, progress)
+        compile_and_link(directory, key, name, files, flags, product, compiler, options.jobs, objects, progress)
         recipe = {"compiler": [*compiler.command, compiler.version], "flags": dict(flags), "options": asdict(options)}
         return cache.publish(directory, key, kind, name, product, recipe)
 
 
 def compile_and_link(
-    directory: Path, name: str, files: Mapping[str, Path], flags: Mapping[str, Sequence[str]], product: str,
+    directory: Path, key: str, name: str, files: Mapping[str, Path], flags: Mapping[str, Sequence[str]], product: str,
     compiler: CompilerInfo, jobs: int | None = None, objects: Callable[[], list[str]] = list,
     tell: Progress | None = None,
 ) -> None:  # fmt: skip
@@ -192,6 +194,8 @@ def compile_and_link(
     ----------
     directory : Path
         Where to work; of what is made nothing but the product stays there.
+    key : str
+        Of the build; the product bears it.
     name : str
         Of the model.
     files : mapping of str to Path
@@ -204,32 +208,43 @@ def compile_and_link(
     jobs : int, optional
         Files compiled at a time.
     objects : callable, optional
-        Makes further object files meanwhile.
+        Makes further object files meanwhile, in the folder of their own key.
     tell : callable, optional
         Told what is being done.
+
+    Raises
+    ------
+    ToolchainError
+        The compiler fails, does not come to an end, or made something else than it was told to.
     """
     compiled = {file: f"{file}.o" for file in files}
+    running, size = Running(), sum(os.path.getsize(directory / path) for path in files.values())
     say: Callable[[str], Any] = tell or (lambda line: None)
 
     def compile_one(file: str) -> None:
         say(f"compiling {file}")
-        command = [*compiler.command, *flags[file], "-c", str(files[file]), "-o", compiled[file]]
-        _command(command, directory, directory / files[file])
+        stamped = write_stamp(directory, key, compiled[file])
+        command = [*compiler.command, *flags[file], *stamped, "-c", str(files[file]), "-o", compiled[file]]
+        _command(running, command, directory, directory / files[file], size)
+        require_object(directory / compiled[file], stamp(key, compiled[file]), command)
+        (directory / stamped[-1]).unlink()
 
-    further = _run_all(compile_one, list(files), jobs or os.cpu_count() or 1, objects)
+    further = _run_all(compile_one, list(files), jobs or os.cpu_count() or 1, objects, running)
     say(f"linking {name}")
     words = [*compiler.command, *compiled.values(), *further, "-o", product, *flags[""]]
-    _command(words, directory, directory / product)
+    _command(running, words, directory, directory / product, size)
+    marks = [stamp(key, file) for file in compiled.values()]
+    require_library(directory / product, [*marks, *(stamp(p.parent.name, p.name) for p in map(Path, further))], words)
     for file in compiled.values():
         (directory / file).unlink()
 
 
 def _run_all(
-    task: Callable[[str], None], files: Sequence[str], jobs: int, meanwhile: Callable[[], list[str]]
+    task: Callable[[str], None], files: Sequence[str], jobs: int, meanwhile: Callable[[], list[str]], running: Running
 ) -> list[str]:
     """Do a task for every file, some at a time, and something else in this thread, whose result is returned.
 
-    The first failure stops the tasks that have not begun.
+    The first failure, or Ctrl-C, ends the commands of the other tasks.
     """
     if jobs == 1:
         for file in files:
@@ -243,12 +258,13 @@ def _run_all(
             made = meanwhile()
             list(results)
         except BaseException:
+            running.stop()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     return made
 
 
-def _command(command: Sequence[str], directory: Path, source: Path) -> None:
-    result = run(command, directory)
+def _command(running: Running, command: Sequence[str], directory: Path, source: Path, size: int) -> None:
+    result = running.run(command, directory, allowed(size))
     if result.returncode != 0:
         raise_failure(f"compiling {source}", result, directory)

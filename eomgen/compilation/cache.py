@@ -3,12 +3,14 @@
 A build works in a private directory under ``attempts/``, writes its manifest last, and is published by one rename to
 ``entries/<key>``. So an entry is complete or not there, a killed build leaves only an attempt to sweep, and of two
 processes that build the same thing the second to finish takes the first one's entry.
+
+What an entry holds is loaded as code. It counts only while every file is as its sealed manifest says, and while nobody
+but this user and root could have written it, or any folder above it; see :mod:`eomgen.files.ownership`.
 """
 
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import os
 import shutil
@@ -20,27 +22,46 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ToolchainError
+from ..files.entry import MANIFEST, digest, read_entry, read_manifest, sealed
+from ..files.kept import Kept
+from ..files.locks import hold, locked
+from ..files.ownership import OTHERS_WRITE, make_private, require_trusted
 
 #: Layout of keys, entries and manifests; part of every key.
-FORMAT = 1
-#: Age in seconds after which an attempt is taken for abandoned.
+FORMAT = 2
+#: Age in seconds after which an attempt is taken for abandoned, if no process holds it.
 GRACE = 3600.0
-_MANIFEST = "manifest.json"
 
 
 def cache_directory() -> Path:
-    """Where builds are kept: the environment variable EOMGEN_CACHE_DIR, else eomgen's folder in the user's cache."""
-    if chosen := os.environ.get("EOMGEN_CACHE_DIR"):
-        return Path(chosen).expanduser().absolute()
-    from platformdirs import user_cache_path
+    """Where builds are kept: the environment variable EOMGEN_CACHE_DIR, else eomgen's folder in the user's cache.
 
-    return user_cache_path("eomgen", appauthor=False)
+    Raises
+    ------
+    ToolchainError
+        Neither can be told: there is no home directory, no such user, no current directory.
+    """
+    chosen = os.environ.get("EOMGEN_CACHE_DIR")
+    try:
+        if chosen:
+            return Path(chosen).expanduser().absolute()
+        from platformdirs import user_cache_path
+
+        found = user_cache_path("eomgen", appauthor=False)
+        if str(found).startswith("~"):
+            raise RuntimeError("this user has no home directory")
+        return found.absolute()
+    except (RuntimeError, OSError) as error:
+        origin = f"EOMGEN_CACHE_DIR={chosen!r}: " if chosen else ""
+        raise ToolchainError(
+            f"{origin}the cache directory cannot be told: {error}. Set EOMGEN_CACHE_DIR to a directory of your own"
+        ) from error
 
 
 def compute_key(parts: Mapping[str, Any]) -> str:
     """SHA-256 of everything a build depends on, given as JSON-like data."""
-    text = json.dumps({"format": FORMAT, **parts}, sort_keys=True, ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
+    text = json.dumps({"format": FORMAT, **parts}, sort_keys=True)  # in ASCII: names of files may be no proper text
+    return digest(text.encode())
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,45 +117,56 @@ class Cache:
         return self.root / "attempts"
 
     @property
-    def shortcuts(self) -> Path:
-        """Folder of notes that tell keys of builds; see :mod:`.shortcut`."""
-        return self.root / "shortcuts"
+    def shortcuts(self) -> Kept:
+        """Notes that tell keys of builds; see :mod:`.shortcut`."""
+        return Kept(self.root / "shortcuts")
 
-    def open_templates(self) -> Path | None:
-        """Folder of the templates' bytecode, made if need be; None where it cannot be written."""
-        folder = self.root / "templates"
-        try:
-            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
-            _check_private(self.root)
-            folder.mkdir(mode=0o700, exist_ok=True)
-        except (OSError, ToolchainError):
-            return None
-        return folder if os.access(folder, os.W_OK) else None
+    @property
+    def templates(self) -> Kept:
+        """Bytecode of templates."""
+        return Kept(self.root / "templates")
 
     def find(self, key: str) -> CacheEntry | None:
-        """The entry of a key if it is there and every file is as it was published; notes that it was used."""
+        """The entry of a key if it is there and every file is as it was published; notes that it was used.
+
+        Raises
+        ------
+        ToolchainError
+            Another user could have written it.
+        """
         directory = self._entries / key
+        if not os.path.isdir(directory):
+            return None
         try:
-            manifest = json.loads((directory / _MANIFEST).read_bytes())
-            for file, digest in manifest["files"].items():
-                if _hash(directory / file) != digest:
-                    return None
-            entry = _read(directory, manifest)
+            self.require_own()
+            manifest, _ = read_entry(directory)
+            entry = _describe(directory, manifest)
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             return None
         if entry.key != key:
             return None
-        _check_private(self.root)
         with suppress(OSError):  # a cache that cannot be written still serves
-            os.utime(directory / _MANIFEST)
+            os.utime(directory / MANIFEST)
         return entry
+
+    def require_own(self) -> None:
+        """Refuse a cache whose folders others own or can write.
+
+        Raises
+        ------
+        ToolchainError
+        """
+        for folder in (self.root, self._entries, self._attempts):
+            if os.path.lexists(folder):
+                require_trusted(folder)
 
     @contextmanager
     def attempt(self, key: str) -> Iterator[Path]:
         """A private directory to build in; removed at the end unless published, kept after a ToolchainError."""
         directory = self._open_attempt(key)
         try:
-            yield directory
+            with hold(directory):  # so that no other process sweeps it
+                yield directory
         except ToolchainError:
             raise  # its message names files in here
         except OSError as error:
@@ -147,10 +179,9 @@ class Cache:
 
     def _open_attempt(self, key: str) -> Path:
         try:
-            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
-            _check_private(self.root)
-            for directory in (self._entries, self._attempts):
-                directory.mkdir(mode=0o700, exist_ok=True)
+            for directory in (self.root, self._entries, self._attempts):
+                make_private(directory)
+                require_trusted(directory)
             self.sweep()
             return self._make_attempt(key[:16])
         except OSError as error:
@@ -185,33 +216,40 @@ class Cache:
         CacheEntry
             The new entry, or that of another process that was faster.
         """
-        files = {str(path.relative_to(attempt)): _hash(path) for path in sorted(attempt.rglob("*")) if path.is_file()}
+        paths = sorted(attempt.rglob("*"))
+        for path in paths:  # whatever the umask of the compiler
+            path.chmod(path.stat().st_mode & ~OTHERS_WRITE)
+        files = {str(path.relative_to(attempt)): digest(path.read_bytes()) for path in paths if path.is_file()}
         manifest = {
             "key": key, "kind": kind, "name": name, "product": product, "created": time.time(),
             "size": sum((attempt / file).stat().st_size for file in files),
             "files": files, "recipe": dict(recipe),
         }  # fmt: skip
-        (attempt / _MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
+        with open(os.open(attempt / MANIFEST, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as f:
+            f.write(sealed(manifest))
         target = self._entries / key
         for _ in range(10):
-            try:
-                os.rename(attempt, target)
-            except OSError as error:
-                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR, errno.EACCES):
-                    raise
-                if (entry := self.find(key)) is not None:
-                    return entry
-                self._remove(target)  # damaged
-            else:
-                return _read(target, manifest)
+            with locked(self.root / "lock"):
+                try:
+                    os.rename(attempt, target)
+                except OSError as error:
+                    if error.errno not in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR, errno.EACCES):
+                        raise
+                    if not os.path.lexists(target):
+                        raise  # the folder cannot be written
+                    if (entry := self.find(key)) is not None:
+                        return entry
+                    self._remove(target)  # damaged, and nobody mends it meanwhile
+                else:
+                    return _describe(target, manifest)
         raise ToolchainError(f"the damaged cache entry {target} cannot be replaced; remove it by hand")
 
     def entries(self) -> list[CacheEntry]:
         """Every readable entry, the most recently used first."""
         found = []
         for directory in self._entries.iterdir() if self._entries.is_dir() else ():
-            with suppress(OSError, ValueError, KeyError, TypeError):
-                found.append(_read(directory, json.loads((directory / _MANIFEST).read_bytes())))
+            with suppress(OSError, ValueError, KeyError, TypeError, ToolchainError):
+                found.append(_describe(directory, read_manifest(directory)))
         return sorted(found, key=lambda entry: entry.used, reverse=True)
 
     def prune(self, older_than: float | None = None, max_size: int | None = None) -> list[CacheEntry]:
@@ -229,9 +267,13 @@ class Cache:
         list of CacheEntry
             What was removed.
         """
+        self.require_own()
         now, total, removed = time.time(), 0, []
         for entry in self.entries():
             total += entry.size
+            if entry.used > now:  # by a clock that was wrong then, or is now
+                with suppress(OSError):
+                    os.utime(entry.directory / MANIFEST)
             aged = older_than is not None and now - entry.used > older_than
             if aged or (max_size is not None and total > max_size):
                 self._remove(entry.directory)
@@ -243,35 +285,48 @@ class Cache:
 
     def clear(self) -> int:
         """Remove every entry and abandoned attempt; returns the number of entries removed."""
+        self.require_own()
         directories = list(self._entries.iterdir()) if self._entries.is_dir() else []
         for directory in directories:
             self._remove(directory)
-        shutil.rmtree(self.root / "templates", ignore_errors=True)
+        shutil.rmtree(self.templates.folder, ignore_errors=True)
         self.sweep()
         self._forget()
         return len(directories)
 
+    def discard(self, key: str) -> None:
+        """Remove the entry of a key that turned out to be of no use, if it can be removed."""
+        with suppress(ToolchainError):
+            self.require_own()
+            with locked(self.root / "lock"):
+                self._remove(self._entries / key)
+
     def _forget(self) -> None:
         """Remove the notes of builds that are gone."""
-        for note in self.shortcuts.iterdir() if self.shortcuts.is_dir() else ():
-            with suppress(OSError, ValueError):
-                if not (self._entries / note.read_text(encoding="ascii")).is_dir():
-                    note.unlink()
+        notes = self.shortcuts
+        for name in notes.names():
+            key = (notes.read(name) or b"").decode("ascii", "replace")
+            if not key or not os.path.isdir(self._entries / key):
+                notes.remove(name)
 
     def sweep(self, grace: float = GRACE) -> int:
-        """Remove the attempts that nobody has touched for `grace` seconds; returns their number."""
+        """Remove the attempts that nobody holds and nobody has touched for `grace` seconds; returns their number.
+
+        One whose time lies as far in the future was left by a clock that was wrong.
+        """
         count = 0
         for attempt in self._attempts.iterdir() if self._attempts.is_dir() else ():
             with suppress(OSError):  # another process may sweep too
-                if time.time() - attempt.stat().st_mtime > grace:
-                    shutil.rmtree(attempt)
-                    count += 1
+                if abs(time.time() - attempt.stat().st_mtime) > grace:
+                    with hold(attempt):
+                        shutil.rmtree(attempt)
+                        count += 1
         return count
 
     def _remove(self, entry: Path) -> None:
         """Remove an entry, which disappears at once and is then taken apart."""
         try:
-            self._attempts.mkdir(mode=0o700, exist_ok=True)
+            make_private(self._attempts)
             away = self._make_attempt("removed")
             with suppress(FileNotFoundError):
                 os.rename(entry, away / entry.name)
@@ -280,26 +335,9 @@ class Cache:
             raise ToolchainError(f"the cache entry {entry} cannot be removed: {error}") from error
 
 
-def _read(directory: Path, manifest: Mapping[str, Any]) -> CacheEntry:
+def _describe(directory: Path, manifest: Mapping[str, Any]) -> CacheEntry:
     return CacheEntry(
         key=manifest["key"], kind=manifest["kind"], name=manifest["name"], directory=directory,
         product=directory / manifest["product"], size=manifest["size"], created=manifest["created"],
-        used=(directory / _MANIFEST).stat().st_mtime,
+        used=(directory / MANIFEST).stat().st_mtime,
     )  # fmt: skip
-
-
-def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _check_private(root: Path) -> None:
-    """Refuse a directory that others can write to: what it holds is loaded as code."""
-    if not hasattr(os, "geteuid"):
-        return
-    status = root.stat()
-    if status.st_uid not in (os.geteuid(), 0) and os.geteuid() != 0:
-        raise ToolchainError(
-            f"the cache directory {root} belongs to another user; set EOMGEN_CACHE_DIR to one of your own"
-        )
-    if status.st_mode & 0o022:
-        raise ToolchainError(f"the cache directory {root} can be written by other users; run: chmod go-w {root}")

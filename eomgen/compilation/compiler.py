@@ -1,18 +1,17 @@
-"""Compiler: environment -> CompilerInfo, the C compiler that builds a model, and the running of its commands."""
+"""Compiler: environment -> CompilerInfo, the C compiler that builds a model."""
 
 from __future__ import annotations
 
 import functools
 import os
 import shutil
-import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 from ..errors import ToolchainError
+from .commands import raise_failure, run
 
 REMEDIES = """\
 Install one of these:
@@ -68,14 +67,18 @@ def find_compiler(command: str | None = None) -> CompilerInfo:
 def _find(command: str | None, variable: str, search_path: str) -> CompilerInfo:
     import shlex
 
-    wish = command or variable
+    wish = (command or variable).strip()
+    origin = "the option compiler" if command else "the environment variable CC"
+    try:
+        wished = [tuple(shlex.split(wish))]
+    except ValueError as error:  # a quotation without its end
+        raise ToolchainError(f"{origin} is no command: {error}: {wish}") from None
     tried = []
-    for words in [tuple(shlex.split(wish))] if wish else _candidates():
+    for words in wished if wish else _candidates():
         found = _identify(words, search_path)
         if isinstance(found, CompilerInfo):
             return found
         tried.append(f"{shlex.join(words)}: {found}")
-    origin = "the option compiler" if command else "the environment variable CC"
     heading = f"The C compiler named by {origin} does not work." if wish else "No C compiler was found."
     raise ToolchainError(f"{heading} Tried:\n  " + "\n  ".join(tried) + f"\n{REMEDIES}")
 
@@ -95,17 +98,19 @@ def _candidates() -> Iterator[tuple[str, ...]]:
 
 def _identify(words: tuple[str, ...], search_path: str) -> CompilerInfo | str:
     """The compiler behind a command, or why there is none."""
-    path = shutil.which(words[0], path=search_path)
+    path = None if "\0" in words[0] else shutil.which(words[0], path=search_path)
     if path is None:
-        return "not found"
-    command = (path, *words[1:])
+        return _why_missing(words[0])
+    command = (os.path.abspath(path), *words[1:])  # it is run in other folders
     try:
         result = run([*command, "--version"])
-    except OSError as error:
+    except ToolchainError as error:
         return str(error)
     if result.returncode != 0:
         return (result.stderr or result.stdout).strip() or f"exit status {result.returncode}"
     version = result.stdout.strip()
+    if not version:
+        return "not a compiler: it says nothing when asked for its --version"
     if any(Path(word).stem in ("zig", "ziglang") for word in command):
         kind = "zig"
         version += f"\nzig {run([*command[:-1], 'version']).stdout.strip()}"  # the above is clang's
@@ -115,7 +120,13 @@ def _identify(words: tuple[str, ...], search_path: str) -> CompilerInfo | str:
         kind = "gcc"
     else:
         kind = "other"
-    return CompilerInfo(path, command, kind, version)
+    return CompilerInfo(command[0], command, kind, version)
+
+
+def _why_missing(word: str) -> str:
+    if os.path.isdir(word):
+        return "a directory"
+    return "not executable" if os.path.isfile(word) else "not found"
 
 
 @functools.lru_cache(maxsize=16)
@@ -125,41 +136,3 @@ def describe_native(compiler: CompilerInfo, flags: tuple[str, ...]) -> str:
     if result.returncode != 0:
         raise_failure("asking the compiler about this processor (option native)", result, Path.cwd())
     return result.stdout
-
-
-def run(command: Sequence[str], directory: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a command and collect what it says, in English.
-
-    Parameters
-    ----------
-    command : sequence of str
-        Program and arguments.
-    directory : Path, optional
-        Working directory, also for temporary files, so that a killed compiler leaves nothing elsewhere.
-    """
-    environment = {**os.environ, "LC_ALL": "C"}
-    if directory is not None:
-        environment["TMPDIR"] = str(directory)
-    return subprocess.run(
-        command,
-        cwd=directory,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        errors="replace",
-        check=False,
-    )
-
-
-def raise_failure(task: str, result: subprocess.CompletedProcess[str], directory: Path) -> NoReturn:
-    """Raise the ToolchainError of a command that failed, with the command and the compiler's own words."""
-    import shlex
-
-    command, said = shlex.join(result.args), (result.stderr + result.stdout).strip()
-    raise ToolchainError(
-        f"{task} failed (exit status {result.returncode}):\n{said}\nThe command, run in {directory}:\n{command}",
-        command,
-        said,
-    )

@@ -15,9 +15,11 @@ import numpy as np
 from ..errors import MissingDependencyError, ToolchainError
 from ..layer import LAYER
 from .cache import Cache, CacheEntry, compute_key
-from .compiler import CompilerInfo, raise_failure, run
+from .commands import COMPILE, Running, raise_failure
+from .compiler import CompilerInfo
 from .options import layer_flags, stepper_flags
 from .processor import lane_width
+from .products import require_object, stamp, write_stamp
 
 SOURCE = "_core.pyx"
 #: Of a model, that the layer reads too.
@@ -101,15 +103,25 @@ def build_layer(
         ]
 
         def compile_one(command: list[str]) -> None:
-            result = run(command, directory)
+            made = command[-1]
+            command = [*command[:-4], *write_stamp(directory, key, made), *command[-4:]]
+            result = running.run(command, directory, 10.0 * COMPILE)
             if result.returncode != 0:
                 raise_failure(f"compiling the Cython layer {directory / command[-3]}", result, directory)
+            require_object(directory / made, stamp(key, made), command)
+            (directory / f"{made}.stamp.h").unlink()
 
+        running = Running()
         with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
-            others = pool.map(compile_one, commands[:-1])
-            _run_cython(directory / SOURCE)
-            compile_one(commands[-1])
-            list(others)
+            try:
+                others = pool.map(compile_one, commands[:-1])
+                _run_cython(directory / SOURCE)
+                compile_one(commands[-1])
+                list(others)
+            except BaseException:
+                running.stop()
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
         (directory / "_core.c").unlink()
         recipe = {"commands": commands, "cython": version}
         return _objects(cache.publish(directory, key, "layer", "_core", _OBJECTS[0], recipe))

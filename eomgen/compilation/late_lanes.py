@@ -7,13 +7,13 @@ the same compiler and flags.
 from __future__ import annotations
 
 import ctypes
-import json
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import ToolchainError
+from ..files.entry import read_manifest
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, find_compiler
@@ -43,7 +43,7 @@ def find_lanes(file: Path) -> int:
             return 0
         library = ctypes.CDLL(str(entry.product))
         table = library.eomgen_late_lanes
-    except (ToolchainError, OSError, AttributeError) as error:
+    except (ToolchainError, OSError, ValueError, AttributeError) as error:
         warnings.warn(
             f"batches of the model in {file} go one state after the other, as their lanes cannot be made: {error}",
             RuntimeWarning,
@@ -61,8 +61,10 @@ def _find_or_build(file: Path) -> CacheEntry | None:
     built = cache.find(file.parent.name)
     if built is None:
         raise ToolchainError("its cache entry is gone or was changed; compile the model again")
-    recipe = json.loads((file.parent / "manifest.json").read_bytes())["recipe"]
-    sources = {path.name: path for path in sorted((file.parent / "sources").iterdir())}
+    manifest = read_manifest(file.parent)
+    recipe = manifest["recipe"]
+    listed = [file.parent / name for name in sorted(manifest["files"]) if name.startswith("sources/")]
+    sources = {path.name: path for path in listed}
     width = next(iter(lane_files(sources).values()), 0)
     if width == 0:
         return None
@@ -89,5 +91,5 @@ def _build(
     flags = {**dict.fromkeys(files, words), "": recipe["flags"][""]}
     with cache.attempt(key) as directory:
         product = f"{built.name}_lanes.so"
-        compile_and_link(directory, built.name, {file: sources[file] for file in files}, flags, product, compiler)
+        compile_and_link(directory, key, built.name, {file: sources[file] for file in files}, flags, product, compiler)
         return cache.publish(directory, key, "lanes", built.name, product, {"flags": flags})

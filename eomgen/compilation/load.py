@@ -11,7 +11,9 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ToolchainError
+from ..files.ownership import require_trusted
 from .build import Artifact
+from .cache import Cache
 
 _lock = threading.Lock()
 
@@ -46,12 +48,16 @@ def load_core(artifact: Artifact) -> ModuleType:
         spec = importlib.util.spec_from_file_location(name, artifact.path, loader=loader)
         assert spec is not None
         try:
+            require_trusted(artifact.path)
             module = importlib.util.module_from_spec(spec)
             loader.exec_module(module)
-        except ImportError as error:
+        except ToolchainError:
+            raise
+        except Exception as error:  # of the loader, or of the first lines of the module
+            Cache(artifact.directory.parents[1]).discard(artifact.key)
             raise ToolchainError(
-                f"the compiled model {artifact.path} cannot be loaded: {error}. If it has gone, compile again; else "
-                "clear the cache first"
+                f"the compiled model {artifact.path} cannot be loaded: {error}. It is no longer in the cache; compile "
+                "the model again, with another compiler (CC) if this comes back"
             ) from error
         offer_lanes(module, artifact.path)
         sys.modules[name] = module

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from ..errors import ToolchainError
-from ..runtime.pickling import TEXTS
+from ..files.source import find_module, load_source
 from .cache import Cache, cache_directory, compute_key
 
 SOURCE = "_core.py"
@@ -37,16 +35,13 @@ def load_numpy(sources: Mapping[str, str], name: str, twins: Mapping[str, Any] |
     key = compute_key({"numpy": text})
     # a name inside the package, so that the module's relative imports find the runtime
     module_name = f"eomgen._{name}_{key[:16]}"
-    if not twins and (loaded := TEXTS.get(module_name)) is not None:
+    if not twins and (loaded := find_module(module_name)) is not None:
         return loaded
     try:
-        module = _execute(module_name, _cached(key, name, text), twins)
+        path = str(_cached(key, name, text))
     except ToolchainError:  # the cache cannot be used, and nothing here needs it
-        with tempfile.TemporaryDirectory(prefix="eomgen-") as private:
-            module = _execute(module_name, _written(Path(private), text), twins)
-    if not twins:  # other twins make another module of the same text
-        TEXTS[module_name] = module
-    return module
+        path = f"<{module_name}>"
+    return load_source(module_name, path, text.encode(), twins)
 
 
 def _cached(key: str, name: str, text: str) -> Path:
@@ -55,22 +50,6 @@ def _cached(key: str, name: str, text: str) -> Path:
     entry = cache.find(key)
     if entry is None:
         with cache.attempt(key) as attempt:
-            _written(attempt, text)
+            (attempt / SOURCE).write_text(text, encoding="utf-8")
             entry = cache.publish(attempt, key, "numpy", name, SOURCE, {})
     return entry.product
-
-
-def _written(folder: Path, text: str) -> Path:
-    path = folder / SOURCE
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def _execute(module_name: str, path: Path, twins: Mapping[str, Any] | None) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    vars(module).update(twins or {})
-    spec.loader.exec_module(module)
-    return module

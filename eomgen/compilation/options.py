@@ -56,6 +56,8 @@ class Options:
             raise UsageError(f"optimize must be None, 0, 1, 2 or 3, not {self.optimize!r}")
         if self.lanes not in (None, 0, 2, 4, 8):
             raise UsageError(f"lanes must be None, 0, 2, 4 or 8, not {self.lanes!r}")
+        if not isinstance(self.compiler, str | None):
+            raise UsageError(f"compiler must be a text, the command line of a compiler, not {self.compiler!r}")
         if isinstance(self.extra, str):
             raise UsageError(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))

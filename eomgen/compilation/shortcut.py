@@ -10,11 +10,9 @@ from __future__ import annotations
 import hashlib
 import os
 import time
-from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 from .. import _STARTED
 from .build import Artifact
@@ -40,7 +38,7 @@ class Shortcut:
 
     def __init__(self, fingerprint: str | None, options: Options) -> None:
         self.cache = Cache(cache_directory())
-        self.note: Path | None = None
+        self.note: str | None = None
         if fingerprint is None or options.native:  # what "native" means takes the compiler as long to say
             return
         if changed_since(_STARTED):  # the files are not the code that runs
@@ -51,31 +49,23 @@ class Shortcut:
             "compiler": [*compiler.command, compiler.version], "interpreter": describe_interpreter(),
             "lanes": lane_width(),
         }  # fmt: skip
-        self.note = self.cache.shortcuts / compute_key(parts)
+        self.note = compute_key(parts)
 
     def find(self) -> Artifact | None:
         """The build, if it was noted and is there."""
         start = time.perf_counter()
         if self.note is None:
             return None
-        try:
-            key = self.note.read_text(encoding="ascii")
-        except (OSError, ValueError):
-            return None
-        entry = self.cache.find(key) if len(key) == 64 and key.isalnum() else None
+        key = (self.cache.shortcuts.read(self.note) or b"").decode("ascii", "replace")
+        entry = self.cache.find(key) if key else None
         if entry is None or entry.kind != "extension":
             return None
         return Artifact(entry.product, entry.key, entry.directory, time.perf_counter() - start, True, entry.name)
 
     def keep(self, artifact: Artifact) -> None:
         """Note a build; a cache that cannot be written still serves."""
-        if self.note is None:
-            return
-        with suppress(OSError):
-            self.note.parent.mkdir(mode=0o700, exist_ok=True)
-            attempt = self.note.with_name(f".{self.note.name}.{os.getpid()}")
-            attempt.write_text(artifact.key, encoding="ascii")
-            os.replace(attempt, self.note)
+        if self.note is not None:
+            self.cache.shortcuts.write(self.note, artifact.key.encode())
 
 
 def changed_since(moment: float) -> bool:

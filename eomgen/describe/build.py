@@ -11,6 +11,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.operations import FOLD
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
@@ -253,8 +254,8 @@ def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -
         if name in known:
             result[name] = reader.expression(path, value)
         else:
-            remedy = nearest(str(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
-            reader.faults.add(path, f"no {' or '.join(kinds)} {name!r}", remedy)
+            remedy = nearest(shown(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
+            reader.faults.add(path, f"no {' or '.join(kinds)} {quoted(name)}", remedy)
     return result
 
 
@@ -273,7 +274,9 @@ def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
     for k, item in enumerate(listed):
         name = name_of(item)
         if name not in known:
-            reader.faults.add(f"independent[{k}]", f"no coordinate {name!r}", nearest(str(name), known, "coordinates"))
+            reader.faults.add(
+                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
+            )
         elif name in result:
             reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
         else:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..constraints import Constraint, KnifeEdge, RollingDisc, RollingSphere
 from ..frames import Marker
+from ..graph.shown import quoted, shown
 from .build_cam_points import Contacts
 from .build_cams import cam, cam_contact
 from .build_couplings import belt, coupling, gear, planetary, rack
@@ -45,8 +46,8 @@ def _build(e: Element) -> Constraint | None:
         return None
     given = e.values.get("type")
     if not isinstance(given, str) or given not in CONSTRAINT:
-        message = "is missing" if given is None else f"no constraint of type {given!r}"
-        faults.add(f"{path}.type", message, nearest(str(given), CONSTRAINT, "types"))
+        message = "is missing" if given is None else f"no constraint of type {quoted(given)}"
+        faults.add(f"{path}.type", message, nearest(shown(given), CONSTRAINT, "types"))
         return None
     e.fields = constraint_fields(given)
     check_keys(path, e.values, e.fields, faults)

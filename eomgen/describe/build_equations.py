@@ -9,6 +9,7 @@ from typing import Any
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.evaluate import evaluate
+from ..graph.shown import quoted, shown
 from ..graph.substitute import substitute, symbols_of
 from ..limits.descriptions import TENSOR
 from .checks import check_keys
@@ -153,14 +154,15 @@ def _rates(
     if given is None:
         if len(q) != len(v):
             faults.add(path, f"{len(v)} velocities for {len(q)} coordinates", "give the rate of each coordinate")
-        return tuple(reader.graph.symbol(name) for name in v[: len(q)])
+        symbols = [reader.graph.symbol(name) for name in v[: len(q)]]
+        return (*symbols, *(reader.stand_in,) * (len(q) - len(symbols)))
     if not isinstance(given, Mapping):
         reader.wrong(path, given, "rates")
         return (reader.stand_in,) * len(q)
     named = {name_of(key): value for key, value in given.items()}
     for name in named:
         if name not in q:
-            faults.add(f"{path}.{name}", f"no coordinate {name!r}", nearest(str(name), q, "coordinates"))
+            faults.add(f"{path}.{name}", f"no coordinate {quoted(name)}", nearest(shown(name), q, "coordinates"))
     result = []
     own = {f"{name}_dot" for name in q} - set(v)
     for name in q:

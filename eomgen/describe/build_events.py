@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graph.core import Expr
+from ..graph.shown import shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import Entry
@@ -84,6 +85,6 @@ def _reset(reader: Reader, path: str, given: Any) -> tuple[tuple[str, Expr], ...
         if name in known:
             result.append((str(name), _instant(reader, f"{path}.{name}", value)))
         else:
-            remedy = nearest(str(name), known, "coordinates and velocities")
+            remedy = nearest(shown(name), known, "coordinates and velocities")
             reader.faults.add(f"{path}.{name}", f"no coordinate or velocity {name!r}", remedy)
     return tuple(result)

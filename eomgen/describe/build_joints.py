@@ -8,6 +8,7 @@ from typing import Any
 
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
@@ -134,7 +135,7 @@ def _type(reader: Reader, entry: Entry) -> str | None:
     if given is None:
         reader.faults.add(path, "is missing", f"give one of {', '.join(JOINTS)}")
     else:
-        reader.faults.add(path, f"no joint of type {given!r}", nearest(str(given), JOINTS, "types"))
+        reader.faults.add(path, f"no joint of type {quoted(given)}", nearest(shown(given), JOINTS, "types"))
     return None
 
 

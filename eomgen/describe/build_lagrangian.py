@@ -7,6 +7,7 @@ from typing import Any
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
 from .description import items
@@ -83,7 +84,9 @@ def _forces(reader: Reader, path: str, given: Any, names: list[str]) -> tuple[Ex
     if isinstance(given, Mapping):
         for name, value in in_order(given, names):
             if name not in result:
-                reader.faults.add(f"{path}.{name}", f"no coordinate {name!r}", nearest(str(name), names, "coordinates"))
+                reader.faults.add(
+                    f"{path}.{name}", f"no coordinate {quoted(name)}", nearest(shown(name), names, "coordinates")
+                )
             else:
                 result[name] = reader.expression(f"{path}.{name}", value, MOTION)
         return tuple(result.values())

@@ -8,6 +8,7 @@ from ..forces import Bushing, Element, Force, JointCoordinate, Muscle, Path, Poi
 from ..forces.bushing import Mat6
 from ..frames import Frame, Marker
 from ..graph.core import Expr
+from ..graph.shown import quoted, shown
 from .description import items
 from .force_entry import ForceEntry
 from .names import nearest
@@ -90,7 +91,7 @@ def build_point_gravity(e: ForceEntry) -> Force | None:
         return None
     if not isinstance(given, str) or given not in own:
         if not reader.faults.under(f"bodies.{given}"):
-            e.fault("body", f"no body {given!r}", nearest(str(given), own, "bodies"))
+            e.fault("body", f"no body {quoted(given)}", nearest(shown(given), own, "bodies"))
         return None
     index = own[given]
     body = e.context.bodies[index]

@@ -35,6 +35,8 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     """
     import numpy as np
 
+    from ..numeric import algebra
+
     graph = Graph()
     names = {name_of(x): graph.symbol(name_of(x)) for x in (*forms.q, *forms.v)}
 
@@ -81,7 +83,7 @@ def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str])
     h = len(configuration)
     own = [k for k, new in enumerate(fresh) if new]
     for k in [k for k, new in enumerate(fresh) if not new]:
-        factors = np.linalg.lstsq(matrix[own].T, matrix[k], rcond=None)[0]
+        factors = algebra.lstsq(matrix[own].T, matrix[k], rcond=None)
         if abs(right[k] - factors @ right[own]) > SMALL * max(
             1.0, abs(right[k]), float(np.abs(factors).max(initial=0))
         ):

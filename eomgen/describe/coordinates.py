@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ..graph.shown import quoted, shown
 from .build_joints import Declared
 from .names import nearest
 from .reading import Reader
@@ -33,7 +34,7 @@ def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value
         if len(own.coordinates) == 1:
             return Found(own.coordinates[0], own.joint.coordinates[0].kind, own.entry.name)
         names = ", ".join(own.coordinates) or "none"
-        faults.add(path, f"joint {given!r} has {len(own.coordinates)} coordinates", f"name one of them: {names}")
+        faults.add(path, f"joint {quoted(given)} has {len(own.coordinates)} coordinates", f"name one of them: {names}")
         return None
     if isinstance(given, str) and reader.names.kinds.get(given) == "coordinate":
         return Found(given, "angle", None)
@@ -41,5 +42,5 @@ def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value
         return None  # the joint itself is at fault, which is told already
     known = [j.entry.name for j in joints]
     known += [c for c in reader.names.of("coordinate") if c not in known]
-    faults.add(path, f"no joint {given!r}", nearest(str(given), known, "joints and coordinates"))
+    faults.add(path, f"no joint {quoted(given)}", nearest(shown(given), known, "joints and coordinates"))
     return None

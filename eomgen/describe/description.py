@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import Problem
+from ..errors import Problem, UsageError
+from ..graph.shown import NO_TEXT, shortened, shown
 
 GROUND_NAME = "ground"
 
@@ -68,7 +69,7 @@ class Description:
 
     def add(self, section: str, name: Any, values: Values) -> Entry:
         """Append an entry to a section."""
-        entry = Entry(name, values, f"{section}.{name}")
+        entry = Entry(name, values, f"{section}.{shortened(name)}")
         self.sections[section].append(entry)
         return entry
 
@@ -148,6 +149,12 @@ def items(value: Any) -> list[Any] | None:
     return listed
 
 
+def is_zero(value: Any) -> bool:
+    """Whether a value is three plain zeros."""
+    listed = items(value)
+    return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
+
+
 def text_of(value: Any) -> str:
     """A value as it is shown in labels: numbers exactly, expressions as written."""
     if isinstance(value, float):
@@ -155,7 +162,7 @@ def text_of(value: Any) -> str:
     listed = items(value)
     if listed is not None:
         return "(" + ", ".join(text_of(x) for x in listed) + ")"
-    return str(value)
+    return shown(value)
 
 
 def label_of(reference: Mapping[str, Any]) -> str:
@@ -165,6 +172,10 @@ def label_of(reference: Mapping[str, Any]) -> str:
     if not text.startswith("("):
         text = f"({text})"
     turn = items(reference.get("rpy"))
-    if turn is not None and any(not (isinstance(x, int | float) and x == 0) for x in turn):
+    if turn is not None and not is_zero(turn):
         text = f"{text[:-1]}, rpy={text_of(turn)})"
+    if NO_TEXT in text:  # two such markers would bear one label
+        raise UsageError(
+            f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"
+        )
     return f"{reference.get('body')}.at{text}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..graph.shown import shown
 from ..texts import html_text
 from .description import Description, Entry, items, label_of, text_of
 
@@ -22,7 +23,7 @@ def _summary(entry: Entry) -> str:
     for key, value in entry.values.items():
         if key == "markers":
             names = list(value) if isinstance(value, Mapping) else [name for name, _ in value]
-            parts.append("markers " + ", ".join(map(str, names)))
+            parts.append("markers " + ", ".join(map(shown, names)))
         elif entry.path.startswith("functions.") and key in ("x", "y", "z"):
             parts.append(f"{len(items(value) or ())} {key}")
         elif key in ("type", "value", "expression"):
@@ -38,7 +39,7 @@ def _summary(entry: Entry) -> str:
 
 def model_html(description: Description) -> str:
     """The model as an HTML table, one row an entry."""
-    name = str(description.values.get("name", ""))
+    name = shown(description.values.get("name", ""))
     rows = [f"<tr><th colspan='3' style='text-align:left'>Model {html_text(name)}</th></tr>"]
     lagrangian = description.values.get("lagrangian")
     if isinstance(lagrangian, Mapping):
@@ -46,13 +47,13 @@ def model_html(description: Description) -> str:
         rows.append(f"<tr><td>Lagrangian</td><td></td><td>{html_text(text)}</td></tr>")
     equations = description.values.get("equations")
     if isinstance(equations, Mapping):
-        shown = ", ".join(text_of(q) for q in items(equations.get("coordinates")) or ())
-        rows.append(f"<tr><td>equations</td><td></td><td>of {html_text(shown)}</td></tr>")
+        names = ", ".join(text_of(q) for q in items(equations.get("coordinates")) or ())
+        rows.append(f"<tr><td>equations</td><td></td><td>of {html_text(names)}</td></tr>")
     for section, entries in description.sections.items():
         for k, entry in enumerate(entries):
             first = section if k == 0 else ""
             rows.append(
-                f"<tr><td>{first}</td><td>{html_text(str(entry.name))}</td>"
+                f"<tr><td>{first}</td><td>{html_text(shown(entry.name))}</td>"
                 f"<td style='text-align:left'>{html_text(_summary(entry))}</td></tr>"
             )
     return f"<table>{''.join(rows)}</table>"

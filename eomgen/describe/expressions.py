@@ -33,6 +33,8 @@ Resolve = Callable[[str], Expr]
 Locate = Callable[[str, str], Expr]
 
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.,+\-*/()<>=! \t\r\n]")
+#: A number that runs into a word: Python reads it as two, with a warning of its own.
+_JOINED = re.compile(r"(?<![A-Za-z0-9_])[0-9.][0-9A-Za-z_.]*?(and|or|not|if|is|in|else)")
 _HINTS = {
     "^": "write ** for powers",
     "%": "there is no remainder",
@@ -100,6 +102,10 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         raise ExpressionError(
             f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, ALLOWED), text
         )
+    joined = _JOINED.search(text)
+    if joined:
+        word = joined.group(1)
+        raise ExpressionError(f"a number runs into {word!r}", joined.start(1) + 1, "write a space between them", text)
     line = re.sub(r"\s", " ", text)
     start = len(line) - len(line.lstrip())
     try:

@@ -9,6 +9,7 @@ from ..forces import JointCoordinate, Line, Path, Route, Turn
 from ..frames import Marker
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Vec3
 from .build_joints import Declared
@@ -47,8 +48,8 @@ class ForceEntry:
             return None
         given = self.values.get("type")
         if not isinstance(given, str) or given not in FORCE:
-            message = "is missing" if given is None else f"no force of type {given!r}"
-            faults.add(f"{path}.type", message, nearest(str(given), FORCE, "types"))
+            message = "is missing" if given is None else f"no force of type {quoted(given)}"
+            faults.add(f"{path}.type", message, nearest(shown(given), FORCE, "types"))
             return None
         if given == "force" and self._on_a_joint():
             return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import UsageError
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
-from .description import GROUND_NAME, Entry, label_of
+from .description import GROUND_NAME, Entry, is_zero, items, label_of
 from .mechanism import velocity_names
 from .scope import RATES
 from .sympy_face import symbol
@@ -114,8 +114,9 @@ class BodyHandle(MarkerHandle):
         MarkerHandle
         """
         reference: dict[str, Any] = {"body": self.name, "at": (x, y, z)}
-        if tuple(rpy) != (0, 0, 0):
-            reference["rpy"] = tuple(rpy)
+        if not is_zero(rpy):
+            listed = items(rpy)
+            reference["rpy"] = rpy if listed is None else tuple(listed)
         return MarkerHandle(self.model, reference)
 
     def marker(self, name: str, at: Sequence[Any] = (0, 0, 0), rpy: Sequence[Any] = (0, 0, 0)) -> MarkerHandle:
@@ -137,7 +138,7 @@ class BodyHandle(MarkerHandle):
         if self._entry is None:
             self._entry = self.model.description.add("bodies", GROUND_NAME, {})
         placed: dict[str, Any] = {"at": at}
-        if not isinstance(rpy, tuple | list) or tuple(rpy) != (0, 0, 0):
+        if not is_zero(rpy):
             placed["rpy"] = rpy
         markers = self._entry.values.get("markers", [])
         listed = list(markers.items()) if isinstance(markers, dict) else list(markers)

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import ModelError, Problem
+from ..graph.shown import shortened
 from .description import Description, items
 from .expressions import names_in
 from .input_names import split_rate
 from .scope import RATES
-from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of
+from .sympy_face import derivative_names, free_names, function_names, is_sympy, name_of, sympy_name
 
 
 def describe_lagrangian(
@@ -55,13 +56,13 @@ def describe_lagrangian(
         A coordinate is neither a symbol nor a function of time ``q(t)``.
     """
     listed = items(coordinates)
-    names = [name_of(q) for q in ([coordinates] if listed is None else listed)]
+    listed = [coordinates] if listed is None else listed
+    names = [name_of(q) for q in listed]
+    remedy = "give symbols q or functions q(t) of the time t"
     wrong = [
-        Problem(
-            f"lagrangian.coordinates[{k}]", f"{q} is not a coordinate", "give symbols q or functions q(t) of the time t"
-        )
-        for k, q in enumerate(names)
-        if not isinstance(q, str)
+        Problem(f"lagrangian.coordinates[{k}]", f"{shortened(q)} is not a coordinate", remedy)
+        for k, q in enumerate(listed)
+        if not isinstance(q, str) and sympy_name(q) is None
     ]
     if wrong:
         raise ModelError(wrong)

@@ -7,6 +7,8 @@ import re
 import sys
 from collections.abc import Iterable
 
+from ..graph.shown import quoted
+
 #: Functions an expression may call, with the least and the greatest number of arguments.
 FUNCTIONS: dict[str, tuple[int, int]] = {
     "sin": (1, 1),
@@ -63,6 +65,8 @@ _C_KEYWORDS = frozenset(
 #: Packages that an exported package imports, or the like, and its own parts.
 _NEEDED = frozenset(("numpy", "scipy", "pandas", "matplotlib", "sympy", "cython", "setuptools", "eomgen"))
 _NEEDED |= {"errors", "limits", "numeric", "runtime"}
+#: Headers in quotes in what Cython writes, in lower case: some systems do not tell it from upper case in file names.
+_HEADERS = frozenset(("python", "pythread", "structmember", "frameobject"))
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z", re.ASCII)
 LONGEST = 64  #: characters of a name
 
@@ -86,9 +90,9 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
         None if the name can be used.
     """
     if not isinstance(name, str):
-        return f"{name!r} is not a name", IDENTIFIER_RULE
+        return f"{quoted(name)} is not a name", IDENTIFIER_RULE
     if not _IDENTIFIER.match(name):
-        return f"{name!r} is not an identifier", IDENTIFIER_RULE
+        return f"{quoted(name)} is not an identifier", IDENTIFIER_RULE
     if len(name) > LONGEST:
         return f"a name of {len(name)} characters is too long", f"at most {LONGEST} characters"
     if keyword.iskeyword(name):
@@ -110,6 +114,8 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     if isinstance(name, str) and (name in _NEEDED or name in sys.stdlib_module_names):
         whose = "that it needs" if name in _NEEDED else "of Python's library"
         return f"a package {name!r} would hide the module {whose}", f"choose another name, e.g. {name}_model"
+    if isinstance(name, str) and (name.lower() in _HEADERS or name.lower().startswith("eomgen")):
+        return f"{name[:LONGEST]!r} is the name of a file that every package has", "choose another name, e.g. my_model"
     return fault_of_name(name, symbol=True)
 
 

@@ -17,6 +17,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import evaluate
+from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.inertia import word_of_check
@@ -71,8 +72,7 @@ class Reader:
         if value is None:
             self.faults.add(path, "has no value", f"give {KINDS[kind]}")
         else:
-            shown = repr(value)
-            self.faults.add(path, f"{shown if len(shown) < 80 else shown[:77] + '...'} is not {KINDS[kind]}")
+            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}")
 
     # -- scalars --------------------------------------------------------------------------------------------------
     def expression(
@@ -100,7 +100,7 @@ class Reader:
                 self.faults.add(path, error.place(), error.remedy)
             return self.stand_in
         except OverflowError:
-            self.faults.add(path, f"{value!r} is not a finite number")
+            self.faults.add(path, f"{quoted(value)} is not a finite number")
             return self.stand_in
         self.wrong(path, value, "expression")
         return self.stand_in
@@ -111,7 +111,11 @@ class Reader:
         result = value
         if isinstance(value, str) or is_sympy(value):
             result = self.expression(path, value, NUMBER).value
-        if not is_number(result) or not math.isfinite(result) or (positive and result <= 0):
+        try:
+            finite = is_number(result) and math.isfinite(result)
+        except OverflowError:  # a whole number of hundreds of digits
+            finite = False
+        if not finite or (positive and result <= 0):
             if not self.faults.under(path):
                 self.wrong(path, value, kind)
             return None
@@ -162,7 +166,7 @@ class Reader:
             return value
         shown = list(field.choices)
         remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
-        self.faults.add(path, f"{value!r} is not known", remedy)
+        self.faults.add(path, f"{quoted(value)} is not known", remedy)
         return str(field.default)
 
     # -- vectors and matrices -------------------------------------------------------------------------------------
@@ -241,7 +245,7 @@ class Reader:
             return None
         body = value["body"]
         if not isinstance(body, str) or body not in self.bodies:
-            self.faults.add(f"{path}.body", f"no body {body!r}", nearest(str(body), self.bodies, "bodies"))
+            self.faults.add(f"{path}.body", f"no body {quoted(body)}", nearest(shown(body), self.bodies, "bodies"))
             return None
         return Marker(self.bodies[body], self.frame(path, value), label_of(value))
 
@@ -266,11 +270,11 @@ class Reader:
         if isinstance(value, str):
             if value in TURNS:
                 return TURNS[value]
-            self.faults.add(path, f"{value!r} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
             return TURNS["z"]
         parts = items(value)
         if parts is None or len(parts) != 3:
-            self.faults.add(path, f"{value!r} is not an axis", f"allowed: {KINDS['axis']}")
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
             return TURNS["z"]
         x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
         if x is None or y is None or z is None:

@@ -60,12 +60,12 @@ class Namespace:
 
         A coordinate brings its rates along, a velocity (one that is no coordinate's rate) its own.
         """
+        levels = _RATES_OF.get(kind, (kind,))
         fault = fault_of_name(name, symbol=True)
         if fault or not isinstance(name, str):
             self.faults.add(path, *(fault or ("", "")))
-            self._refuse(kind, name, path)
+            self._refuse(levels[0], name, path)
             return False
-        levels = _RATES_OF.get(kind, (kind,))
         names = [name + suffix for suffix in RATES[: len(levels)]]
         kind = levels[0]
         clash = next((n for n in names if n in self.kinds), None)

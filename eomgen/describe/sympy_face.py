@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError
+from ..graph.shown import quoted
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph
@@ -35,13 +36,22 @@ def is_sympy(value: object) -> bool:
 
 
 def name_of(value: object) -> Any:
-    """The name behind a coordinate given as a symbol or as a function of time; other values unchanged."""
-    if not is_sympy(value):
+    """The name behind a coordinate given as a symbol or as a function of time; else a text that is no name.
+
+    Texts, numbers and plain lists are left as they are.
+    """
+    if value is None or isinstance(value, str | int | float | list | tuple | dict):
         return value
-    sympy = sys.modules["sympy"]
-    if isinstance(value, sympy.Symbol):
-        return value.name
-    return function_name(value) or value
+    return sympy_name(value) or quoted(value)
+
+
+def sympy_name(value: object) -> str | None:
+    """The name of a SymPy symbol or function of time; None for anything else."""
+    if not is_sympy(value):
+        return None
+    if isinstance(value, sys.modules["sympy"].Symbol):
+        return str(value.name)
+    return function_name(value)
 
 
 def in_order(given: Mapping[Any, Any], known: Sequence[str]) -> list[tuple[Any, Any]]:
@@ -92,8 +102,8 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
     from ..graph.sympy_lower import LoweringError, lower
 
     def meaning(part: Any) -> Expr | None:  # declared functions, also f(t), are calls and do not come here
-        name = name_of(part)
-        return resolve(name) if isinstance(name, str) else None
+        name = sympy_name(part)
+        return None if name is None else resolve(name)
 
     try:
         return lower(graph, expression, meaning)
@@ -101,34 +111,36 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
         raise ExpressionError(error.reason.replace("\n", "; ")) from None
 
 
+def _parts(expressions: list[Any]) -> Iterator[Any]:
+    """Every part of SymPy expressions, each object once, without recursion: expressions may be deep."""
+    seen: set[int] = set()
+    stack = [expression for expression in expressions if is_sympy(expression)]
+    while stack:
+        part = stack.pop()
+        if id(part) not in seen:  # the expressions keep their parts alive
+            seen.add(id(part))
+            stack += [x for x in part.args if is_sympy(x)]
+            yield part
+
+
 def free_names(expressions: list[Any]) -> list[str]:
     """Names of all symbols in SymPy expressions, the time excepted, sorted."""
     import sympy
 
-    names: set[str] = set()
-    for expression in expressions:
-        if is_sympy(expression):
-            names |= {s.name for s in expression.atoms(sympy.Symbol)}
-    return sorted(names - {"t"})
+    return sorted({part.name for part in _parts(expressions) if isinstance(part, sympy.Symbol)} - {"t"})
 
 
 def function_names(expressions: list[Any]) -> list[str]:
     """Names of all functions of time in SymPy expressions, sorted."""
     from sympy.core.function import AppliedUndef
 
-    found: set[str] = set()
-    for expression in expressions:
-        if is_sympy(expression):
-            found |= {name for f in expression.atoms(AppliedUndef) if (name := function_name(f))}
-    return sorted(found)
+    calls = (part for part in _parts(expressions) if isinstance(part, AppliedUndef))
+    return sorted({name for call in calls if (name := function_name(call))})
 
 
 def derivative_names(expressions: list[Any]) -> list[str]:
     """Names of all derivatives of functions of time in SymPy expressions, sorted."""
     import sympy
 
-    found: set[str] = set()
-    for expression in expressions:
-        if is_sympy(expression):
-            found |= {name for f in expression.atoms(sympy.Derivative) if (name := function_name(f))}
-    return sorted(found)
+    slopes = (part for part in _parts(expressions) if isinstance(part, sympy.Derivative))
+    return sorted({name for slope in slopes if (name := function_name(slope))})

@@ -31,7 +31,7 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
     from sympy.core.function import AppliedUndef
     from sympy.printing.str import StrPrinter
 
-    from ..graph.sympy_lower import shortened
+    from ..graph.shown import shortened
 
     class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
         """SymPy's text with the names of functions that a model file uses."""

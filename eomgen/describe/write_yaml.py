@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import UsageError
 from ..texts import comment_text, yaml_quoted
-from .description import SECTIONS, Description, items
+from .description import SECTIONS, Description, is_zero, items
 from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
 from .write_equations import with_intermediates
@@ -76,8 +76,7 @@ def _is_default(key: str, value: Any) -> bool:
     if value is None or (isinstance(value, str | list | tuple | dict) and len(value) == 0):
         return True
     if key in ("com", "inertia", "gravity", "rpy"):
-        listed = items(value)
-        return listed is not None and len(listed) == 3 and all(isinstance(x, int | float) and x == 0 for x in listed)
+        return is_zero(value)
     return key == "axis" and isinstance(value, str) and value == "z"
 
 
@@ -94,7 +93,7 @@ def _value(value: Any, functions: Names) -> str:
             return _value(listed, functions)
         if is_sympy(value):
             return _sympy(value, functions)
-        from ..graph.sympy_lower import shortened
+        from ..graph.shown import shortened
 
         raise UsageError(f"{shortened(value)} cannot be written to a model file")
     if is_sympy(value):

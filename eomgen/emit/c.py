@@ -87,7 +87,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     return {
         "name": program.name,
         "prefix": program.name.upper(),
-        "guard": f"EOMGEN_{program.name.upper()}_H",
+        "guard": f"EOMGEN_MODEL_{program.name.upper()}_H",
         "metadata": program.metadata,
         "sizes": sizes,
         "numbers": [(key.upper(), value) for key, value in numbers.items()],

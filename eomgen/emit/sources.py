@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import texts
+from ..files.kept import Kept
 from ..program import Program
 
 if TYPE_CHECKING:
@@ -58,11 +58,21 @@ def environment() -> Environment:
     return made
 
 
-def keep_bytecode(folder: Path) -> None:
-    """Keep what Jinja makes of templates in a folder of the user's own; it knows when a template has changed."""
-    from jinja2 import FileSystemBytecodeCache
+def keep_bytecode(kept: Kept) -> None:
+    """Keep what Jinja makes of templates in a folder of the user's own; Jinja knows when a template has changed."""
+    from jinja2 import BytecodeCache
+    from jinja2.bccache import Bucket
 
-    environment().bytecode_cache = FileSystemBytecodeCache(str(folder))
+    class Bytecode(BytecodeCache):
+        def load_bytecode(self, bucket: Bucket) -> None:
+            data = kept.read(bucket.key)
+            if data is not None:
+                bucket.bytecode_from_string(data)
+
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            kept.write(bucket.key, bucket.bytecode_to_string())
+
+    environment().bytecode_cache = Bytecode()
 
 
 def render(template: str, context: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
+from ..runtime.room import require_room
 from ..runtime.simulate import find_state
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def collect_cases(
     UsageError
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
-    lengths: dict[str, int] = {} if count is None else {"count": count}
+    lengths: dict[str, int] = {} if count is None else {"count": _count(count)}
     p = _bound("parameter", module.p_names, module.p, parameters, lengths)
     u = _bound("input", module.u_names, module.u, inputs, lengths)
     states, values = None, {}
@@ -108,6 +109,7 @@ def collect_cases(
         states = _columns("initial", initial, module.x_names, lengths)
     _require_one_length(lengths)
     k = next(iter(lengths.values()), 1)
+    require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
     if states is not None and states.ndim == 1:
         states = np.repeat(states[:, None], k, axis=1)
     return Cases(k, p, u, states, values)
@@ -205,6 +207,12 @@ def _bound(what: str, names: tuple[str, ...], base: Array, given: Any, lengths: 
     for name, value in values.items():
         result[names.index(name)] = value
     return result
+
+
+def _count(given: Any) -> int:
+    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
+        raise UsageError(f"count must be a whole number of runs, not {given!r}")
+    return int(given)
 
 
 def _require_one_length(lengths: Mapping[str, int]) -> None:

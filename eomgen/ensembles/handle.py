@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import MissingDependencyError, ToolchainError, UsageError
+from ..files.entry import MANIFEST, read_entry
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.pickling import restore
@@ -103,12 +104,16 @@ def digest(file: str) -> str:
 
 
 def _recipe(file: Path) -> str:
-    manifest = file.parent / "manifest.json"
-    folder = file.parent / "sources"
-    if not manifest.is_file() or not folder.is_dir():
+    if not (file.parent / MANIFEST).is_file():
         return ""
-    facts = json.loads(manifest.read_text(encoding="utf-8"))
-    sources = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
+    try:
+        facts, files = read_entry(file.parent)
+    except (OSError, ValueError) as error:
+        raise ToolchainError(f"the compiled code of the module is damaged: {error}; compile the model again") from None
+    folder = "sources/"
+    sources = {n.removeprefix(folder): text.decode() for n, text in sorted(files.items()) if n.startswith(folder)}
+    if not sources:
+        return ""
     return json.dumps({"name": facts["name"], "sources": sources, "options": facts["recipe"].get("options", {})})
 
 

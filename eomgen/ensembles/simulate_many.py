@@ -17,9 +17,10 @@ from ..runtime.compiled import can_run
 from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
+from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
-from ..runtime.simulate import DEFAULTS, check_count, find_span, ordered_times
+from ..runtime.simulate import DEFAULTS, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
@@ -124,7 +125,14 @@ def simulate_many(
     plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, options, (events, keep_events))
     threads = _positive("threads", threads, os.cpu_count() or 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
-    size = module.n_x * 8 * (1 if plan.t_eval is None else len(plan.t_eval))
+    each = module.n_x * (1 if plan.t_eval is None else len(plan.t_eval))
+    each += plan.keep_events * (2 + module.n_x) if find_events(module, plan).names else 0
+    whole = cases.count * (len(RUNS) + 2 * module.n_x) + each * (
+        cases.count if reduce in (None, "states", "events") else 1
+    )
+    fewer = "give fewer runs, fewer t_eval, fewer keep_events, or reduce='statistics'"
+    require_room(f"simulate_many with {cases.count} runs", whole, fewer)
+    size = 8 * each
     with ExitStack() as stack:
         if watch is not None:
             stack.callback(watch.close)
@@ -191,11 +199,12 @@ def _plan(
     if (method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     if step is not None:
-        check_count(step, start, end)
+        require_steps("step", step, start, end)
         options = {**options, "max_step": step, "first_step": step}
     chosen = {name: declared[name] for name in ("rtol", "atol")} | {k: v for k, v in options.items() if v is not None}
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
-    times = None if t_eval is None else ordered_times(t_eval, start, end)
+    require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)
+    times = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     most, keep = _positive("max_steps", max_steps, 1), _positive("keep_events", watched[1], 1)
     plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep, constants)
     find_events(module, plan)

@@ -11,6 +11,7 @@ from ..kinematics import Kinematics
 from ..kinematics.mobility import ConstraintFunctions, Mobility
 from ..limits.inertia import LEAST
 from ..limits.rounding import TINY
+from ..numeric import algebra
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
 from .equations import TreeEquations
@@ -103,7 +104,7 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
         except PartitionError:
             continue  # rank is lost here, and another configuration will do
         embedded = B.T @ M @ B
-        sizes, modes = np.linalg.eigh(correlated(embedded))
+        sizes, modes = algebra.eigh(correlated(embedded))
         if sizes[0] > LEAST or (m.negative and np.abs(sizes).min() > LEAST):
             return []
         if m.negative:  # what is near 0 counts, not what is negative

@@ -21,7 +21,7 @@ from contextlib import suppress
 from ..errors import ToolchainError
 
 LINKS = 40  #: symbolic links followed in one path, as Linux does
-GROUP, OTHERS = stat.S_IWGRP, stat.S_IWOTH
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 ACL = "system.posix_acl_access"
 
 
@@ -103,15 +103,15 @@ def _judge(path: str, status: os.stat_result, *, above: bool) -> None:
             f"{_describe(path, status)} belongs to another user than {_name(me)}, and what a cache holds is loaded as "
             "code; set EOMGEN_CACHE_DIR to a folder of your own, in one that only you or root can write"
         )
-    if stat.S_ISLNK(status.st_mode) or not status.st_mode & (GROUP | OTHERS):
+    if stat.S_ISLNK(status.st_mode) or not status.st_mode & OTHERS_WRITE:
         return
     if above and status.st_mode & stat.S_ISVTX:
         return
-    if above and not status.st_mode & OTHERS and _private_group(path, status.st_gid, me):
+    if above and not status.st_mode & stat.S_IWOTH and _private_group(path, status.st_gid, me):
         return
     raise ToolchainError(
-        f"{_describe(path, status)} can be written by other users, and what a cache holds is loaded as code; run: "
-        f"chmod go-w {shlex.quote(path)}; or set EOMGEN_CACHE_DIR to a folder that nobody else can write"
+        f"{_describe(path, status)} can be written by other users; run: chmod go-w {shlex.quote(path)}, or set "
+        "EOMGEN_CACHE_DIR to a folder that nobody else can write: what a cache holds is loaded as code"
     )
 
 

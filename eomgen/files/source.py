@@ -1,15 +1,20 @@
 """Source: the text of a Python module -> the module, compiled in memory.
 
-No bytecode is read or written beside it: a damaged or foreign file of bytecode would run unchecked.
+No bytecode is read or written beside it: a damaged or foreign file of bytecode would run unchecked.  Nor is the module
+entered among those of Python, where it would stay for good: it goes with its last user.
 """
 
 from __future__ import annotations
 
 import importlib.abc
 import importlib.util
+import sys
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
+from weakref import WeakValueDictionary
+
+_loaded: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()
 
 
 class _Text(importlib.abc.SourceLoader):
@@ -43,4 +48,11 @@ def load_source(name: str, path: str, data: bytes, given: Mapping[str, Any] | No
     module = importlib.util.module_from_spec(spec)
     vars(module).update(given or {})
     loader.exec_module(module)
+    if not given:  # given other things, it is another module
+        _loaded[name] = module
     return module
+
+
+def find_module(name: str) -> ModuleType | None:
+    """A module that is loaded, here or by Python's import; None if there is none."""
+    return _loaded.get(name) or sys.modules.get(name)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from .core import Expr
 
 
-def solve_with_pivots(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
-    """x with matrix x = right by L^T D L, and D; the last is eliminated first, so that a tree's branches stay apart."""
+def solve_symmetric(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
+    """x with matrix x = right by L^T D L; the last is eliminated first, so that a tree's branches stay apart."""
     n = len(right)
     rows, x = [list(row) for row in matrix], list(right)
     for k in reversed(range(n)):
@@ -23,9 +23,4 @@ def solve_with_pivots(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -
         for j in range(i):
             x[i] = x[i] - rows[i][j] * x[j]
         x[i] = x[i] / rows[i][i]
-    return x, [rows[k][k] for k in range(n)]
-
-
-def solve_symmetric(matrix: Sequence[Sequence[Expr]], right: Sequence[Expr]) -> list[Expr]:
-    """x with matrix x = right."""
-    return solve_with_pivots(matrix, right)[0]
+    return x

@@ -8,7 +8,7 @@ sinh cosh tanh sech csch coth exp log sqrt; Abs sign Min Max Heaviside re im con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import reduce
 from typing import Any
@@ -21,6 +21,7 @@ from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
 from .core import Expr, Graph
+from .shown import shortened
 
 Resolve = Callable[[sympy.Basic], Expr | None]
 Build = Callable[[Graph, Sequence[int]], int]
@@ -30,6 +31,15 @@ KNOWN = (
     "numbers, + - * / **, sqrt exp log, sin cos tan sec csc cot asin acos atan atan2, sinh cosh tanh sech csch coth, "
     "Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
 )
+
+
+#: What else SymPy may differentiate: quantities, derivatives, and what holds them.
+DIFFERENTIABLE = (
+    *(sympy.Symbol, AppliedUndef, sympy.Number, sympy.NumberSymbol, sympy.Derivative, sympy.Subs, sympy.Tuple),
+    *(sympy.Piecewise, ExprCondPair, BooleanTrue, BooleanFalse),
+)
+ORDER = 8  #: of a derivative that SymPy carries out; each may double its length
+ARGUMENT = 1e6  #: of a function that SymPy evaluates
 
 
 class LoweringError(EomgenError):
@@ -94,21 +104,12 @@ def lower(graph: Graph, expression: Any, resolve: Resolve, allowed: Iterable[str
 
 def _error(walk: _Walk, allowed: list[str]) -> LoweringError:
     lines = [f"{shortened(part)}: {why}" for part, why in walk.faults]
-    unresolved = sorted(walk.unresolved, key=str)
+    unresolved = sorted(walk.unresolved, key=shortened)
     if unresolved:
         names = ", ".join(shortened(x) for x in unresolved)
         lines.append(f"no meaning for {names}; " + (f"known are {', '.join(allowed)}" if allowed else "declare them"))
     first = walk.faults[0][0] if walk.faults else unresolved[0]
     return LoweringError(first, "\n".join(lines), unresolved)
-
-
-def shortened(expression: Any) -> str:
-    """An expression as messages show it: at most 120 characters."""
-    try:
-        text = str(expression)
-    except RecursionError:  # SymPy prints recursively
-        text = type(expression).__name__
-    return text if len(text) <= 120 else f"{text[:117]}..."
 
 
 class _Walk:
@@ -149,6 +150,8 @@ class _Walk:
 
     def _open(self, part: Any) -> tuple[Sequence[Any], Build]:
         """The operands of a part and how to combine them once they are lowered."""
+        if not isinstance(part, sympy.Basic):
+            raise _Fault(f"a SymPy scalar is expected, not {type(part).__name__}")
         build = BUILD.get(part.func)
         if build is not None:
             return part.args, build
@@ -194,7 +197,7 @@ class _Walk:
             along = [i for i, argument in enumerate(part.args) if argument == variable]
             others = [a for a in part.args if a != variable and a.has(variable)]
             if len(along) != 1 or others or not order.is_Integer:
-                other = whole.doit()  # SymPy's own chain rule brings it into the form above
+                other = _worked_out(whole)  # SymPy's own chain rule brings it into the form above
                 return None if other == whole else ((other,), lambda g, ids: ids[0])
             orders[along[0]] += int(order)
         operands = [argument.xreplace(places) for argument in part.args]
@@ -206,18 +209,57 @@ class _Walk:
             return (), lambda g, ids: g.one.id
         other = part
         if isinstance(part, (sympy.Derivative, sympy.Subs)):
-            other = part.doit()
+            other = _worked_out(part)
             if other == part and isinstance(part.expr, AppliedUndef):
                 self.unresolved[part] = None
                 return (), lambda g, ids: g.one.id
-        elif isinstance(part, sympy.Expr) and not part.free_symbols and not part.atoms(AppliedUndef):
-            other = part.evalf(30)  # e.g. gamma(1/3)
-            if not isinstance(other, sympy.Number):
-                other = part
+        elif isinstance(part, sympy.Function) and all(isinstance(x, sympy.Rational | sympy.Float) for x in part.args):
+            other = _evaluated(part)
         if other == part or not isinstance(other, sympy.Basic):
             name = part.func.__name__
             raise _Fault(f"{name} is not among what can be lowered: {KNOWN}")
         return (other,), lambda g, ids: ids[0]
+
+
+def _worked_out(part: Any) -> Any:
+    """A derivative or substitution carried out by SymPy; of parts that are known here only.
+
+    Of others (sums, integrals, limits) SymPy searches for a closed form, for any time, and runs texts as code.
+    """
+    for inner in _inside(part):
+        if not isinstance(inner, sympy.Basic):
+            raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
+        if not (inner.func in BUILD or isinstance(inner, DIFFERENTIABLE)):
+            raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {KNOWN}")
+        orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
+        if not all(n.is_Integer for n in orders) or sum(orders) > ORDER:
+            raise _Fault(f"derivatives go up to order {ORDER}, a plain number")
+    try:
+        return part.doit()
+    except Exception as error:  # of many classes: the part may be odd in any way
+        raise _Fault(f"SymPy cannot work it out ({type(error).__name__})") from None
+
+
+def _inside(part: Any) -> Iterator[Any]:
+    """Every part of an expression, without recursion."""
+    stack, seen = [part], set()
+    while stack:
+        inner = stack.pop()
+        if id(inner) not in seen:
+            seen.add(id(inner))
+            yield inner
+            stack += inner.args if isinstance(inner, sympy.Basic) else ()
+
+
+def _evaluated(part: Any) -> Any:
+    """A function of numbers that is not known here, such as gamma(1/3), as a number."""
+    if any(abs(x) > ARGUMENT or (isinstance(x, sympy.Rational) and x.q > ARGUMENT) for x in part.args if x.is_finite):
+        raise _Fault(f"a function that is not known here is evaluated at numbers up to {ARGUMENT:g} only")
+    try:
+        other = part.evalf(30)
+    except Exception as error:  # of many classes: the part may be odd in any way
+        raise _Fault(f"SymPy cannot work it out ({type(error).__name__})") from None
+    return other if isinstance(other, sympy.Number) else part
 
 
 def _number(part: Any) -> float:

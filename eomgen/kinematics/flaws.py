@@ -117,7 +117,8 @@ def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
         moving = sorted(symbols_of([left]) & clock)
         if moving and all(x.is_zero for x in row):
             what = f"{label} depends on {', '.join(moving)} and on no coordinate, so nothing can hold it"
-            problems.append(mechanism.problem(_place(mechanism, label), what, "let a coordinate follow it, or take it away"))
+            remedy = "let a coordinate follow it, or take it away"
+            problems.append(mechanism.problem(_place(mechanism, label), what, remedy))
     if problems:
         raise ModelError(problems)
 

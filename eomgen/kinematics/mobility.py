@@ -17,6 +17,7 @@ from ..limits.constraints import CHOSEN
 from ..numeric import (
     Assembly,
     Scales,
+    algebra,
     assemble,
     choose_independent,
     conditioning,
@@ -286,11 +287,8 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         else:
             near = get_close_matches(name, known, 1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            problems.append(
-                kinematics.mechanism.problem(
-                    "independent", f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"
-                )
-            )
+            what, remedy = f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"
+            problems.append(kinematics.mechanism.problem("independent", what, remedy))
     if problems:
         raise ModelError(problems)
 
@@ -322,7 +320,7 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
         return [functions.place.move(q, random.uniform(0.2, 0.9, len(functions.place.q))) for _ in range(PROBES)]
     for k in range(PROBES):
         J = functions.place_jacobian(q)
-        basis = np.linalg.svd(J)[2][rank(J).rank :]
+        basis = algebra.svd(J)[2][rank(J).rank :]
         step = random.normal(size=len(basis)) @ basis
         length = float(np.linalg.norm(step))
         if length == 0.0:

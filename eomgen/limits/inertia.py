@@ -18,6 +18,9 @@ STILL = 1e-26
 #: Smallest eigenvalue of M with its diagonal scaled to 1, at configurations that are known to 1e-10.
 LEAST = 1e-12
 
+#: The same below which `check` says how many digits rounding leaves: 1e-6 leaves ten of sixteen, more than runs use.
+WORTH_A_WORD = 1e-6
+
 #: A moment may exceed the sum of the other two by this part of it before it counts as wrong: published inertias of real
 #: machines, measured or rounded, exceed it by up to a tenth (PUMA 560, link 3).
 TRIANGLE = 0.1

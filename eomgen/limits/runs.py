@@ -14,6 +14,11 @@ STILL = 1e-4  #: change of the state in a window of steps, relative to the large
 NOTICED = 1e-12  #: part of a state below which its change is rounding of the steps
 STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrator
 
+# -- size of a run ---------------------------------------------------------------------------------------------------
+MOST_STEPS = 10**8  #: steps of limited size
+MOST_NUMBERS = 5 * 10**7  #: kept by one call: 0.4 GB, of which results are copied two or three times
+ENOUGH, ENDLESS = 3000, 10**9  #: a run that has taken so many steps and needs so many more at their pace would not end
+
 # -- events ----------------------------------------------------------------------------------------------------------
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time
 TOUCHED = 1e-13  #: part of its largest size within which a value that comes to zero and back was there: 500 roundings

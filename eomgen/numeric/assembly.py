@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from ..limits.constraints import CONTRADICTION, MEASURED
+from . import algebra
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
 from .closure import FAR, Equations, System, close, closed, remoteness
 from .projection import largest
@@ -31,6 +32,7 @@ class Assembly(NamedTuple):
     distance: float  #: largest scaled distance of a coordinate from the guess
 
 
+@np.errstate(all="ignore")
 def assemble(
     position: Position,
     guess: Array,
@@ -172,7 +174,7 @@ class _Failure(NamedTuple):
             J, e = self.system.scales.jacobian(C_q)[rows], self.system.scales.residual(C)[rows]
             if not np.isfinite(J).all():
                 return ""
-            out_of_reach = np.linalg.svd(J)[0][:, rank(J).rank :]
+            out_of_reach = algebra.svd(J)[0][:, rank(J).rank :]
             if largest(out_of_reach.T @ e) <= MEASURED:
                 return ""
         names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from ..limits.constraints import CONTRADICTION, GIVEN
+from . import algebra
 from .ranks import rank
 from .scales import Array, Indices, Scales
 
@@ -30,6 +31,7 @@ class Rates(NamedTuple):
     residual: float  #: largest scaled residual
 
 
+@np.errstate(all="ignore")
 def assemble_velocity(
     C_q: Array,
     C_t: Array,
@@ -78,7 +80,7 @@ def assemble_velocity(
         row_scales = np.concatenate([row_scales, equations.scales])
         offset = np.concatenate([C_t, equations.y_t - equations.values])
         all_labels += list(equations.names)
-    inverse = np.linalg.pinv(J[:, free], rcond=GIVEN)
+    inverse = algebra.pinv(J[:, free], rcond=GIVEN)
     for _ in range(2):
         e = J @ (v / scales.q) + offset / row_scales
         v[free] -= scales.q[free] * (inverse @ e)

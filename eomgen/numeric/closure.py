@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.constraints import ACCEPTED, AT_ONCE, EXACT, SETTLED, TIKHONOV
+from . import algebra
 from .projection import largest, within
 from .scales import Array, Position, Scales
 
@@ -85,7 +86,7 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         if top == 0.0 or largest(K.T @ f) <= EXACT * top:
             break  # nothing that may move makes a difference
         G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
-        dz = -K.T @ np.linalg.solve(G, f)
+        dz = -K.T @ algebra.solve(G, f)
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest

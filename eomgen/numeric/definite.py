@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
 from ..limits.inertia import FAINT, NOTHING, SINGULAR, STILL
+from . import algebra
 from .scales import Array
 
 
@@ -48,7 +49,7 @@ def definite_factor(M: Array, what: str) -> Array:
     try:
         return np.asarray(np.linalg.cholesky(M))
     except np.linalg.LinAlgError:
-        least = float(np.linalg.eigvalsh(correlated(M))[0])
+        least = float(algebra.eigvalsh(correlated(M))[0])
         size = "negative inertia" if least < -SINGULAR else "no inertia"
         raise SingularMassMatrixError(
             f"{what}: some motion has {size} behind it (smallest eigenvalue {least:.2g}), and the mass matrix must be "

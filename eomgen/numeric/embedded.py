@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError, SingularMassMatrixError
+from . import algebra
 from .definite import indefinite_factor, moves_inertia, safely_positive
 from .partitions import Partition, partition
 from .projection import largest, minimum_norm, project, tangent_projector
@@ -50,8 +51,8 @@ class Embedded(NamedTuple):
 
     def solve(self, f: Array) -> Array:
         """``B (B^T M B)^-1 B^T f``, f (n,) or (n, k)."""
-        y = np.linalg.solve(self.factor, self.split.B.T @ f)
-        return np.asarray(self.split.B @ np.linalg.solve(self.factor.T, (y.T * self.signs).T))
+        y = algebra.solve(self.factor, self.split.B.T @ f)
+        return np.asarray(self.split.B @ algebra.solve(self.factor.T, (y.T * self.signs).T))
 
 
 def embed(

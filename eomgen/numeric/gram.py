@@ -22,6 +22,7 @@ import numpy as np
 from ..errors import NonFiniteError, ProjectionError
 from ..limits.constraints import BELOW, EXACT, FAST, GENTLE, TIKHONOV, UNMOVED
 from ..limits.rounding import SUMMED
+from . import algebra
 from .space import Array
 
 PASSES = 50  #: at most
@@ -47,7 +48,7 @@ def gram_solver(J: Array, relative: float = GENTLE) -> Callable[[Array], Array]:
         L = np.linalg.cholesky(G)
     except np.linalg.LinAlgError:
         raise ProjectionError("rounding leaves J J^T of the constraints indefinite") from None
-    return lambda e: np.asarray(np.linalg.solve(L.T, np.linalg.solve(L, e)))
+    return lambda e: np.asarray(algebra.solve(L.T, algebra.solve(L, e)))
 
 
 def weakness(J: Array, z: Array) -> float:

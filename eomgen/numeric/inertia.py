@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ..limits.inertia import COMPUTED, DIGITS, MOMENT, TRIANGLE
 from ..limits.rounding import ROUNDED
+from . import algebra
 
 #: What may be done about a body or a motion without a possible inertia, by the word of ``check_inertia``.
 CHECKS = ("error", "note", "off")
@@ -56,10 +57,11 @@ def longest_within(bodies: Iterable[Sequence[ArrayLike]]) -> float:
     longest = 0.0
     for points in bodies:
         places = np.asarray(points, dtype=float).reshape(-1, 3)
-        rounding = ROUNDED * float(np.abs(places).max(initial=0.0))
+        size = float(np.abs(places).max(initial=0.0))
+        places = places / (size or 1.0)  # squares of what is large overflow
         for k, place in enumerate(places):
             apart = float(np.linalg.norm(places[k + 1 :] - place, axis=1).max(initial=0.0))
-            longest = max(longest, apart if apart > rounding else 0.0)
+            longest = max(longest, apart * size if apart > ROUNDED else 0.0)
     return longest
 
 
@@ -122,7 +124,7 @@ def fault_of_inertia(
         if moment < -max(DIGITS * size, computed):
             return f"the moment about the centre of mass is {moment * unit:.6g}", SHIFTED
         return None
-    a, b, c = np.linalg.eigvalsh(full).tolist()
+    a, b, c = algebra.eigvalsh(full).tolist()
     size = max(abs(a), abs(c))
     if a < -max(DIGITS * size, computed):
         return f"has a negative principal moment {a * unit:.6g}", NEGATIVE

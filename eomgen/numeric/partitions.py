@@ -15,6 +15,7 @@ from ..errors import PartitionError
 from ..limits.constraints import CHOSEN as STRICT
 from ..limits.constraints import PREFERENCE
 from ..limits.constraints import STATE as RANK
+from . import algebra
 from .scales import Array, Indices
 
 
@@ -98,7 +99,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     chosen = set(dependent.tolist())
     order = [int(i) for i in independent if int(i) not in chosen]
     kept = np.array(order + [i for i in range(n) if i not in chosen and i not in set(order)], dtype=np.intp)
-    inverse: Array = np.asarray(np.linalg.inv(J[np.ix_(rows, dependent)]), dtype=np.float64)
+    inverse: Array = np.asarray(algebra.inv(J[np.ix_(rows, dependent)]), dtype=np.float64)
     B = np.zeros((n, n - rank))
     B[kept, np.arange(n - rank)] = 1.0
     B[dependent] = -inverse @ J[np.ix_(rows, kept)]

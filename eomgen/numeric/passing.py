@@ -39,6 +39,7 @@ from ..limits.crossings import (
     STILL,
     WEAKEST,
 )
+from . import algebra
 from .partitions import Partition, partition
 from .projection import correct_position, largest, within
 from .scales import Array, Indices, Position, Scales
@@ -105,7 +106,7 @@ class Curve:
         _, J = around.close(self.time(1), around.scales.move(around.q, reach * d))
         there = around.split(J)
         self.T, self.pivots = there.B, [there.weakest]
-        self.inverse = np.linalg.pinv(self.T)
+        self.inverse = algebra.pinv(self.T)
         self.heading = self.inverse @ d
         if self.T.shape[1]:
             size = largest(self.T @ self.heading)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..limits.constraints import PREFERENCE, UNMOVED
 from ..limits.constraints import STRUCTURE as TOLERANCE
+from . import algebra
 from .scales import Array, Indices
 
 ENUMERATED = 500  #: at most so many sets of coordinates are compared one by one
@@ -31,7 +32,7 @@ class Rank(NamedTuple):
 
 def rank(J: Array, tolerance: float = TOLERANCE) -> Rank:
     """Numerical rank of a scaled Jacobian J (m, n) by its singular values."""
-    values = np.linalg.svd(J, compute_uv=False) if J.size else np.empty(0)
+    values = algebra.singular_values(J) if J.size else np.empty(0)
     if not values.size or values[0] == 0.0:
         return Rank(0, 1.0, 0.0)
     relative = values / values[0]
@@ -75,10 +76,10 @@ def conditioning(J: Array, independent: Sequence[int] | Indices) -> float:
     dependent = np.delete(np.arange(n), np.asarray(independent, dtype=np.intp))
     if not dependent.size:
         return 1.0
-    values = np.linalg.svd(J[:, dependent], compute_uv=False)
+    values = algebra.singular_values(J[:, dependent])
     if len(values) < len(dependent):
         return 0.0
-    size = np.linalg.norm(J, 2)
+    size = algebra.norm2(J)
     return float(values[len(dependent) - 1] / size) if size else 0.0
 
 

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import algebra
+
 Array = np.ndarray
 
 #: Kind of a table -> what it is, for messages and documents.
@@ -87,7 +89,7 @@ def _periodic(h: Array, rise: Array) -> Array:
     lower, diagonal, upper = h.copy(), 2.0 * (before + h), before.copy()
     if n == 2:  # both neighbours of a point are the other one
         matrix = np.array([[diagonal[0], lower[0] + upper[0]], [lower[1] + upper[1], diagonal[1]]])
-        s = np.linalg.solve(matrix, right)
+        s = algebra.solve(matrix, right)
     else:
         corner_top, corner_bottom = lower[0], upper[-1]  # of unknown n - 1 in row 0, of unknown 0 in row n - 1
         gamma = -diagonal[0]

@@ -240,11 +240,11 @@ class LoopBlocks:
             *([-row.get(k, graph.zero) for row in self.rows] for k in terms.preferred),
         ]
         blocks = diagonal_blocks(left) if len(left) == len(dependent) else None
-        if not dependent:  # the rows hold nothing: parameters alone decide whether they are closed
-            first, *found = ([] for _ in right)
-        elif blocks is None or any(len(b.rows) > 2 for b in blocks):
+        first: list[Expr] = []
+        found: list[list[Expr]] = [[] for _ in terms.preferred]
+        if dependent and (blocks is None or any(len(b.rows) > 2 for b in blocks)):
             first, *found = self._least_squares(left, right, conditions)
-        else:
+        elif blocks is not None:  # else rows that hold nothing: parameters alone decide whether they are closed
             first, *found = (self._substitute(left, blocks, r, [] if j else conditions) for j, r in enumerate(right))
         x = [graph.zero] * terms.n_v
         for i, value in zip(dependent, first, strict=True):

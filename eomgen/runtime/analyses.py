@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
@@ -89,6 +90,7 @@ class Analyses(ForceAnalyses):
         """
         return self._derivative("parameter_jacobian")
 
+    @np.errstate(all="ignore")
     def verify(self, *, states: int = 6, seed: int = 0, seconds: float = 12.0) -> Verification:
         """Compare this module with several independent calculations.
 
@@ -131,6 +133,7 @@ class Analyses(ForceAnalyses):
         refused = layout.given_rates or not layout.projects
         return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
 
+    @np.errstate(all="ignore")
     def linearise(
         self,
         x: Mapping[str, float] | ArrayLike | None = None,
@@ -179,6 +182,7 @@ class Analyses(ForceAnalyses):
 
         return linearise(self, x, t, p=p, u=u, form=form, independent=independent)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def modes(
         self,
         x: Mapping[str, float] | ArrayLike | None = None,
@@ -217,6 +221,7 @@ class Analyses(ForceAnalyses):
 
         return find_modes(self, x, t, p=p, u=u, independent=independent)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def equilibrium(
         self,
         guess: Mapping[str, float] | ArrayLike | None = None,

@@ -23,6 +23,7 @@ class Assembled:
     layout: Layout
     n_q: int
 
+    @np.errstate(all="ignore")
     def x0(
         self,
         values: Mapping[str, float] | None = None,
@@ -64,6 +65,7 @@ class Assembled:
         v = initial.velocities(q, given.rates if given.positions or given.rates else None)
         return np.concatenate([q, v])
 
+    @np.errstate(all="ignore")
     def assemble(
         self,
         guess: Mapping[str, float] | None = None,
@@ -100,6 +102,7 @@ class Assembled:
             raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
         return initial.from_guess(given.positions) if values else initial.assembled({})
 
+    @np.errstate(all="ignore")
     def branches(
         self,
         values: Mapping[str, float] | None = None,
@@ -119,6 +122,7 @@ class Assembled:
         first = initial.assembled(given)
         return initial.branches(given or initial.sort(self.layout.initial).positions, first)
 
+    @np.errstate(all="ignore")
     def branch(self, x: ArrayLike, t: float = 0.0) -> int:
         """Which side of the dead centres a state or position lies on.
 
@@ -132,8 +136,11 @@ class Assembled:
             1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
             coordinates.
         """
+        state = np.asarray(x, dtype=float)
+        if state.shape not in ((self.n_q,), (self.n_x,)):
+            raise UsageError(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
         initial = self._initial(t, None, None)
-        here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
+        here = initial.side(state[: self.n_q])
         there = initial.side(initial.reference())
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 

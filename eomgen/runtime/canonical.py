@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import STATE
 from ..limits.inertia import SINGULAR
+from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.projection import correct_position
 from ..numeric.scales import Array
@@ -83,20 +84,20 @@ class Canonical:
             J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, rows="all"))
             rest = np.concatenate([q, np.zeros(layout.n_v)])
             rate = layout.scales.residual(module.velocity_constraints(rest, t=t, rows="all"))
-            N = np.linalg.svd(J)[2][layout.rank :].T
-            least = -np.linalg.lstsq(J, rate, rcond=STATE)[0]
+            N = algebra.svd(J)[2][layout.rank :].T
+            least = -algebra.lstsq(J, rate, rcond=STATE)
         else:
             least = np.zeros(layout.n_v)
         still = self.momenta(np.concatenate([q, np.zeros(layout.n_v)]), t)  # what p is at v = 0
         M = s[:, None] * module.mass_matrix(q, t=t) * s
         right = N.T @ (s * (p - still) - M @ least)  # N^T (M v + b) = N^T p, v = least + N y
         embedded = N.T @ M @ N
-        sizes = np.linalg.eigvalsh(correlated(embedded)) if np.isfinite(embedded).all() else np.zeros(1)
+        sizes = algebra.eigvalsh(correlated(embedded)) if np.isfinite(embedded).all() else np.zeros(1)
         if layout.metadata.get("indefinite"):
             sizes = np.abs(sizes)
         if sizes.min(initial=np.inf) <= SINGULAR:  # momenta determine no velocities
             raise module.kernels.fail.exception("canonical", 2, t, np.concatenate([q, np.zeros(layout.n_v)]))
-        y = np.linalg.solve(embedded, right)
+        y = algebra.solve(embedded, right)
         return np.concatenate([q, s * (least + N @ y)])
 
     def _position(self, q: Array, t: float) -> tuple[Array, Array]:

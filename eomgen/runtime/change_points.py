@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import EvaluationError
 from ..limits.constraints import PASSED as SINGULAR
 from ..limits.rounding import TINY
+from ..numeric import algebra
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) 
     for k in range(0, len(t), block):
         p = slice(k, k + block)
         J = scaled_jacobians(module, t[p], x[:, p], None if u is None else u[:, p])
-        found.append(np.linalg.svd(J, compute_uv=False))
+        found.append(algebra.singular_values(J))
     values = np.concatenate(found)
     return np.asarray(values / np.maximum(values[:, :1], TINY))
 

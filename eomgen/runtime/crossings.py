@@ -1,7 +1,7 @@
 """Stage runtime: values of events along a run -> where they come to zero, for integrators stepped in Python.
 
-The same as the compiled loop does in C (steppers/crossings.c, event_values.c, event_zero.c), function by function, so that
-a run finds the same events by every method: changes of sign between the ends of a step, values that come to zero
+The same as the compiled loop does in C (steppers/crossings.c, event_values.c, event_zero.c), function by function, so
+that a run finds the same events by every method: changes of sign between the ends of a step, values that come to zero
 and leave again within it, and zeros after a reset, once the value has been seen on its side.
 """
 

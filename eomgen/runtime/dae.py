@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
+from ..numeric import algebra
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -112,7 +113,7 @@ class Dae:
             q, v, a = x[: layout.n_q], x[layout.n_q :], rates[layout.n_q :]
             J = layout.scales.jacobian(module.constraint_jacobian(q, t=t, u=u, rows="all"))[layout.rows]
             force = layout.scales.q * module.inverse_dynamics(q, v, a, t=t, u=u)
-            l = np.linalg.lstsq(J.T, -force, rcond=None)[0]
+            l = algebra.lstsq(J.T, -force, rcond=None)
             y[layout.n_x : layout.n_x + len(l)] = l / layout.scales.c[layout.rows]
         return y, yp
 

@@ -14,14 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
+from ..limits.runs import ENDLESS, ENOUGH
 from ..numeric.scales import Array
 from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
 from .integrate import Solution, require_end
 from .names import require
 from .recording import record
 from .resets import Resets
+from .room import require_steps
 from .signals import Forcing
 from .simulate import find_span, find_state, ordered_times
+from .tolerances import check_step, check_tolerances
 
 if TYPE_CHECKING:
     from .dae import Dae
@@ -41,7 +44,7 @@ def integrate_dae(
     inputs: Mapping[str, Any] | None,
     t_eval: Any,
     events: Any,
-    tolerances: Mapping[str, float],
+    tolerances: Mapping[str, Any],
     options: Mapping[str, Any],
 ) -> Trajectory:
     """One run; see :meth:`~.dae.Dae.solve`."""
@@ -54,9 +57,12 @@ def integrate_dae(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     forcing.begin(start, end)
+    tolerances = {**tolerances, "rtol": check_tolerances(module.n_x, np.inf, tolerances)["rtol"]}
     watched = Events(module.layout, events)
     x0 = find_state(bound, initial, start, forcing)
-    times = None if t_eval is None else ordered_times(t_eval, start, end)
+    times = None if t_eval is None else ordered_times(t_eval, start, end, module.dae.n_y)
+    if options.get("max_step"):
+        require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
     run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
     warn_of_unknown([event.name for event in run.listed if not event.known])
@@ -92,6 +98,7 @@ class _Run:
         self.t_events: list[list[float]] = [[] for _ in self.listed]
         self.x_events: list[list[Array]] = [[] for _ in self.listed]
         self.counts = {"nfev": 0, "njev": 0}
+        self.calls = 0
         self.status, self.message, self.reached = 0, "", span[1]
 
     def travel(self, x: Array) -> None:
@@ -177,7 +184,15 @@ class _Run:
     def _solver(self, form: Dae) -> Any:
         forcing, n_x, listed = self.forcing, self.module.n_x, self.listed
 
+        start, end = self.span
+
         def residual(t: float, y: Array, yp: Array, res: Array) -> None:
+            self.calls += 1
+            if self.calls > 10 * ENOUGH and abs(end - t) * self.calls > 10 * ENDLESS * abs(t - start):
+                raise SimulationError(
+                    f"IDA has evaluated its equations {self.calls} times to t = {t:.6g} s of {end:.6g} s and would not "
+                    "come to the end; take a shorter span, or looser tolerances"
+                )
             form.residual(t, y, yp, res, forcing(t, y[:n_x]))
 
         def jacobian(t: float, y: Array, yp: Array, res: Array, cj: float, JJ: Array) -> None:

@@ -199,7 +199,7 @@ class Events:
 
 
 def crowd_of(actions: Sequence[int]) -> int:
-    """How many resets in a row, each right after the one before, count as endless: all of one instant may take turns."""
+    """How many resets in a row, each right after the one before, count as endless: those of one instant take turns."""
     return max(CROWD, 2 * sum(action in (RESET, WAIT) for action in actions))
 
 

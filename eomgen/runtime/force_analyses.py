@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ class ForceAnalyses:
         """Names of all constraint rows, in the order of :meth:`multipliers`."""
         return self.kernels.layout.constraint_labels
 
+    @np.errstate(all="ignore")
     def multipliers(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
         """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
 
@@ -51,6 +53,7 @@ class ForceAnalyses:
 
         return multipliers(self, t, x, p, u, out)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
         """Reaction forces and moments of all joints.
 
@@ -82,6 +85,7 @@ class ForceAnalyses:
 
         return reactions(self, t, x, p, u, out)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def undetermined_reactions(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
         """Which components of :meth:`reactions` redundant constraints leave undetermined.
 
@@ -93,6 +97,7 @@ class ForceAnalyses:
 
         return undetermined_reactions(self, t, x, p, u)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def driving_forces(self, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Any]:
         """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
 
@@ -107,6 +112,7 @@ class ForceAnalyses:
 
         return driving_forces(self, t, x, p, u)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def actuator_forces(
         self,
         t: ArrayLike,
@@ -148,6 +154,7 @@ class ForceAnalyses:
 
         return find_forces(self, t, x, a, actuated=actuated, p=p, u=u)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def impact(
         self,
         t: float,
@@ -246,6 +253,7 @@ class ForceAnalyses:
 
         return run_with_impacts(self, span, gaps, initial, parameters, inputs, most=most, **options)  # type: ignore[arg-type]
 
+    @np.errstate(all="ignore")
     def consistent(
         self,
         x: ArrayLike,

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import AssemblyError, UsageError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
+from ..numeric import algebra
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
 from ..numeric.closure import Equations, System, close, closed
 from ..numeric.continuation import follow, follow_time
@@ -173,6 +174,7 @@ class Initial:
         except AssemblyError:
             return None
 
+    @np.errstate(all="ignore")
     def assembled(self, given: Mapping[str, float]) -> Array:
         """Position with the given values exact, and the declared ones where they leave room."""
         layout = self.layout
@@ -277,7 +279,7 @@ class Initial:
         if not layout.n_c:
             return
         J = self.scales.jacobian(self._C_q(q, t=self.t))
-        basis = np.linalg.svd(J)[2][rank(J).rank :]
+        basis = algebra.svd(J)[2][rank(J).rank :]
         driven = self._solve_rates(q, {}).v / self.scales.q  # what driven constraints impose
         for name, value in given.items():
             scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
@@ -342,7 +344,7 @@ class Initial:
         if rows:
             stacked = np.array(rows)
             count = rank(stacked).rank
-            basis = np.linalg.svd(stacked)[2][:count]
+            basis = algebra.svd(stacked)[2][:count]
         kept = {}
         for name, value in rest.items():
             added = basis

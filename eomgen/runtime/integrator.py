@@ -17,9 +17,10 @@ from .integrate import choose_solver
 from .late import eager
 from .names import check_names
 from .pace import Crawling, Pace
+from .room import require_steps
 from .run import Run
 from .signals import Forcing
-from .simulate import check_count, check_method, declare, simulate
+from .simulate import check_method, declare, simulate
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class Integrator:
         self.module, self.method = module, method
         self._step = check_method(method, step)
         sizes = {"max_step": max_step, "first_step": first_step} if step is None else {"max_step": self._step}
-        self._options = check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol, **sizes})
+        self._options: dict[str, Any] = check_tolerances(module.n_x, np.inf, {"rtol": rtol, "atol": atol, **sizes})
         self._evaluations = 0
         self._compiled: Any = None
         if can_run(module, method, Forcing(module.layout, None)):
@@ -125,8 +126,8 @@ class Integrator:
                 raise ValueError(f"t and t + h must be finite, not {t} and {end}")
             if end == t and h != 0.0:
                 raise ValueError(f"h = {h} is lost in rounding at t = {t}")
-            if self._step is not None:
-                check_count(self._step, t, end)
+            if "max_step" in self._options:
+                require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
             advance = self._plainly if self._compiled is None else self._compiled.advance
             result, trouble = advance(t, x, h, p, u, out)
         except (TypeError, ValueError) as error:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..limits.inertia import SINGULAR
+from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
@@ -101,7 +102,7 @@ class Kernels:
             M = self.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
             if not np.isfinite(M).all():
                 return ""
-            values, vectors = np.linalg.eigh(correlated(M))  # whatever the units of the coordinates
+            values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
             if layout.metadata.get("indefinite"):
                 return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
             if values[0] > SINGULAR:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .analyses import require_velocities
 
 if TYPE_CHECKING:
@@ -72,6 +74,7 @@ class KinematicAnalyses:
             module = module.bind(parameters, inputs)
         return analyse(module, asked, initial, partial)
 
+    @np.errstate(all="ignore")
     def motion_range(
         self,
         name: str,
@@ -114,6 +117,7 @@ class KinematicAnalyses:
             module = module.bind(parameters, inputs)
         return find_range(module, name, initial, t, within)
 
+    @np.errstate(all="ignore")
     def workspace(
         self,
         over: Mapping[str, Any],

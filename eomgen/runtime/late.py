@@ -68,7 +68,7 @@ class LateKernel:
     maker : {'timed', 'state', 'motion'}
     name : str
     options : tuple
-        What the maker takes after the name: the context with parameters and inputs, then all else.
+        What the maker takes after the name: the context with parameters and inputs, then all else, the error last.
     """
 
     def __init__(self, core: LateCore, maker: str, name: str, options: tuple[Any, ...]) -> None:
@@ -78,7 +78,7 @@ class LateKernel:
     def kernel(self) -> Any:
         """The kernel itself."""
         core, (context, *rest) = self.core.further, self.options
-        return getattr(core, self.maker)(self.name, core.context(context.p, context.u), *rest)
+        return getattr(core, self.maker)(self.name, core.context(context.p, context.u, rest[-1]), *rest)
 
     @property
     def failure(self) -> tuple[int, float, Array] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -20,12 +21,29 @@ REMEMBERED = 7  #: calls that the next one is compared with, less one
 SUDDEN = 3.0  #: a change of velocity this many times what the accelerations explain is a change of branch
 
 
+class Memory(threading.local):
+    """What the calls of one thread leave for its next one.
+
+    Attributes
+    ----------
+    q : (n_q,) array or None
+        Where Newton's iteration starts; in a new thread, the position that was set last.
+    recent : list of (time, velocities and accelerations)
+        Of the last calls.
+    """
+
+    def __init__(self, start: list[Array | None]) -> None:
+        self.q = start[0]
+        self.recent: list[tuple[float, Array]] = []
+
+
 class Minimal:
     """The strictly minimal form of a model.
 
     The set of independent coordinates is fixed.  The dependent ones are solved by Newton's iteration, starting from the
-    last converged position, which is the only memory a call leaves; :meth:`reset` sets it.  A step that would end on
-    another branch of the mechanism is refused.
+    last converged position, which is the only memory a call leaves; :meth:`reset` sets it.  Each thread has a memory of
+    its own, so that threads do not disturb one another; a new thread begins where :meth:`reset` was told last.  A step
+    that would end on another branch of the mechanism is refused.
 
     Attributes
     ----------
@@ -45,8 +63,8 @@ class Minimal:
         self.v_names = tuple(layout.v[i] for i in layout.independent)
         self.x_names = self.q_names + self.v_names
         self.n_x = len(self.x_names)
-        self._q: Array | None = None
-        self._recent: list[tuple[float, Array]] = []  # time, velocities and accelerations of the last calls
+        self._start: list[Array | None] = [None]
+        self._memory = Memory(self._start)
 
     def __repr__(self) -> str:
         return f"<minimal form of {self._layout.name}: x = [{', '.join(self.x_names)}]>"
@@ -62,7 +80,8 @@ class Minimal:
         start = self._module.assemble() if q is None else np.array(q, dtype=float)
         if start.shape != (self._layout.n_q,):
             raise UsageError(f"q must have shape ({self._layout.n_q},), not {start.shape}")
-        self._q, self._recent = start, []
+        self._start[0] = self._memory.q = start
+        self._memory.recent = []
 
     def x0(self, values: Mapping[str, float] | None = None, /, *, t: float = 0.0, **named: float) -> Array:
         """Assembled initial state (n_x,), from the same named values as ``Module.x0``; calls :meth:`reset`."""
@@ -73,8 +92,10 @@ class Minimal:
     def reduce(self, x: ArrayLike) -> Array:
         """The independent part (n_x,) or (n_x, k) of full states (2 n,) or (2 n, k)."""
         full = np.asarray(x, dtype=float)
-        chosen = self._layout.independent
-        return np.concatenate([full[self._layout.independent_q], full[self._layout.n_q + chosen]])
+        layout = self._layout
+        if full.ndim not in (1, 2) or len(full) != layout.n_x:
+            raise UsageError(f"x must be of shape ({layout.n_x},) or ({layout.n_x}, k), not {full.shape}")
+        return np.concatenate([full[layout.independent_q], full[layout.n_q + layout.independent]])
 
     def expand(self, x_min: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """Full states from minimal ones.
@@ -103,7 +124,7 @@ class Minimal:
         result = np.empty((self._layout.n_x, x.shape[1]))
         for j in range(x.shape[1]):
             result[:, j] = self._solve(float(times[j]), x[:, j])
-        self._recent = []
+        self._memory.recent = []
         return result
 
     def rhs(self, t: float, x: ArrayLike, p: Any = None, u: ArrayLike | None = None) -> Array:
@@ -130,28 +151,30 @@ class Minimal:
         state = np.asarray(x, dtype=float)
         if state.shape != (self.n_x,):
             raise UsageError(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
-        before = self._q
+        memory = self._memory
+        before = memory.q
         full = self._solve(t, state)
         x_dot = self._module.rhs(t, full, u=u)
         motion = np.concatenate([full[self._layout.n_q :], x_dot[self._layout.n_q :]])
         self._check_crossing(t, motion, state, before)
-        self._recent = [*self._recent[-REMEMBERED:], (t, motion)]
+        memory.recent = [*memory.recent[-REMEMBERED:], (t, motion)]
         return self.reduce(x_dot)
 
     def _solve(self, t: float, x: Array) -> Array:
         n, k = self._layout.n_q, self._layout.n_dof
-        if self._q is None:
+        memory = self._memory
+        if memory.q is None:
             self.reset()
-        assert self._q is not None
+        assert memory.q is not None
         q_i, v_i = x[:k], x[k:]
-        way = np.abs((q_i - self._q[self._layout.independent_q]) / self._path.scales_i)
-        near = self._q
+        way = np.abs((q_i - memory.q[self._layout.independent_q]) / self._path.scales_i)
+        near = memory.q
         if way.size and not way.max() <= STEP:
             if not np.isfinite(way).all():
                 raise UsageError(f"x is not finite: {x}")
             near = self._path.walk(near, q_i, t)
         full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: self._layout.n_x]
-        self._q = full[:n].copy()
+        memory.q = full[:n].copy()
         return full
 
     def _check_crossing(self, t: float, motion: Array, x: Array, before: Array | None) -> None:
@@ -168,7 +191,7 @@ class Minimal:
         own = np.abs(motion[layout.independent] / scales[layout.independent]).max()
         if v <= AMPLIFIED * own:
             return
-        for time, other in self._recent:
+        for time, other in self._memory.recent:
             gap = abs(t - time)
             v_other, a_other = np.abs(other.reshape(2, -1) / scales).max(axis=1)
             own_other = np.abs(other[layout.independent] / scales[layout.independent]).max()
@@ -177,7 +200,7 @@ class Minimal:
             change = (motion - other)[: layout.n_v] / scales
             turned = (motion[: layout.n_v] / scales) @ (other[: layout.n_v] / scales) < 0.0
             if turned and np.abs(change).max() > SUDDEN * max(a, a_other) * gap:
-                self._q = before
+                self._memory.q = before
                 raise PartitionError(
                     f"t = {t:.6g}: {', '.join(self.q_names)} passed a dead centre, where the branch is lost; "
                     "choose other independent coordinates, or integrate the full state",

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import PartitionError, SingularMassMatrixError, UnsolvedError
 from ..limits.crossings import NEAR
 from ..limits.inertia import SINGULAR
-from ..numeric import embedded, passing, projection
+from ..numeric import algebra, embedded, passing, projection
 from ..numeric.definite import correlated
 from ..numeric.dependent import kinematics as kinematics_of
 from ..numeric.partitions import partition
@@ -98,7 +98,7 @@ class Drivers:
         known = "mass_matrix" in self.blocks or "mass_times" in self.blocks
         if name in ("rhs", "jacobian", "outputs", *SHIFTS) and known and not self.layout.n_c:
             M = self._matrix(t, x[: self.layout.n_q], u, c)
-            if np.isfinite(M).all() and np.linalg.eigvalsh(correlated(M))[0] <= SINGULAR:
+            if np.isfinite(M).all() and algebra.eigvalsh(correlated(M))[0] <= SINGULAR:
                 return 2
         return 1
 

@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.runs import NOTICED, SHORT, STEEP, STILL
+from ..errors import SimulationError
+from ..limits.rounding import TINY
+from ..limits.runs import ENDLESS, ENOUGH, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from .failure import place
 
@@ -56,11 +58,15 @@ class Pace:
         The user's; steps that it keeps short are not a crawl.
     troubled : callable
         (t, x) -> whether the state is at a known singularity.
+    kept : int
+        Numbers that the run keeps of each step.
     """
 
     def __init__(
-        self, start: float, end: float, x: Array, n_q: int, max_step: float, troubled: Callable[[float, Array], bool]
-    ) -> None:
+        self, start: float, end: float, x: Array, n_q: int, max_step: float, troubled: Callable[[float, Array], bool],
+        kept: int = 0,
+    ) -> None:  # fmt: skip
+        self.start, self.taken, self.kept = start, 0, kept
         self.end, self.parts = end, (slice(n_q), slice(n_q, None))
         self.limit = min(SHORT * abs(end - start), 0.1 * max_step)
         self.troubled = troubled
@@ -71,6 +77,8 @@ class Pace:
     def look(self, t: float, x: Array, steps: int = 1) -> None:
         """Take note of so many further steps, the last of which came to x at t."""
         self.steps += steps
+        self.taken += steps
+        self._require_end(t)
         if self.steps < WINDOW:
             return
         step, moved = abs(t - self.t) / self.steps, np.abs(x - self.x)
@@ -81,6 +89,20 @@ class Pace:
         still = all((moved[part] <= STILL * self.largest[part].max(initial=0.0)).all() for part in self.parts)
         if still or self.troubled(t, self.x):
             raise Crawling(t, self.x, step)
+
+    def _require_end(self, t: float) -> None:
+        """Refuse to go on for ever, or to fill the memory."""
+        if self.taken * self.kept > MOST_NUMBERS:
+            raise SimulationError(
+                f"the run has taken {self.taken} steps to t = {t:.6g} s of {self.end:.6g} s, and no more are kept; "
+                "give the times to store, t_eval, or run in parts"
+            )
+        if self.taken > ENOUGH and abs(self.end - t) * self.taken > ENDLESS * abs(t - self.start):
+            more = abs(self.end - t) / max(abs(t - self.start), TINY) * self.taken
+            raise SimulationError(
+                f"the run has taken {self.taken} steps to t = {t:.6g} s and needs {more:.1e} more to "
+                f"t = {self.end:.6g} s, which would not end; take a shorter span, or looser tolerances"
+            )
 
 
 def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple[str, ...], atol: Any) -> str:
@@ -108,7 +130,7 @@ def steepest(rhs: Callable[[float, Array], Array], crawl: Crawling, names: tuple
             continue
         slope = change / (2 * size)
         i = int(slope.argmax())
-        if slope[i] > max(found, STEEP / crawl.step):
+        if slope[i] * crawl.step > max(found * crawl.step, STEEP):
             found = slope[i]
             words = f"the rate of {names[i]} changes by {change[i]:.3g} where {names[j]} changes by {2 * size:.1g}"
     return words

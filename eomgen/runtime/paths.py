@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, ProjectionError, UsageError
+from ..limits.motions import WALKED
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
@@ -70,7 +71,9 @@ class Path:
             return start
         origin = start[self.layout.independent_q]
         way = target - origin
-        steps = int(np.ceil(np.abs(way / self.scales_i).max() / STEP)) if way.size else 0
+        length = float(np.abs(way / self.scales_i).max(initial=0.0))
+        self._require_near(target, length)
+        steps = int(np.ceil(length / STEP))
         q = start
         try:
             for k in range(1, steps + 1):
@@ -93,6 +96,7 @@ class Path:
         for target in targets.T:
             sign = 1 if target[0] >= origin else -1
             points = known[sign]
+            self._require_near(target, abs(float(target[0]) - origin) / self.scales_i[0])
             count = int(abs(target[0] - origin) / step)
             try:
                 while len(points) <= count:
@@ -101,6 +105,14 @@ class Path:
             except EvaluationError as error:
                 raise self._too_far(target, error) from None
         return result
+
+    def _require_near(self, target: Array, length: float) -> None:
+        if not length <= WALKED:
+            raise UsageError(
+                f"the way to {self._place(target)} is {length:.3g} rad or length scales long, and positions are led "
+                f"along {WALKED:g} at most, in small steps that stay on the branch; give a nearer position (whole "
+                "turns less, where the mechanism repeats itself), or guess=, a position to start from"
+            )
 
     def _place(self, target: Array) -> str:
         return place([self.layout.freedoms[i] for i in self.layout.independent], target).removeprefix(", ")

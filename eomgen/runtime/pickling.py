@@ -13,17 +13,16 @@ from importlib import import_module, machinery, util
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
-from weakref import WeakValueDictionary
 
 from ..errors import ToolchainError, UsageError
+from ..files.entry import MANIFEST, read_entry
+from ..files.ownership import read_trusted, require_trusted
+from ..files.source import find_module, load_source
 from ..numeric.scales import Array
 from .late import LateCore, eager
 
 if TYPE_CHECKING:
     from .module import Module
-
-#: Cores of the numpy target by name, as long as a module uses them: ``sys.modules`` would keep each for ever.
-TEXTS: WeakValueDictionary[str, ModuleType] = WeakValueDictionary()
 
 #: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
 Late = tuple[tuple[str, ...], tuple[str, str] | None]
@@ -39,7 +38,7 @@ def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
     """
     core: Any = eager(module.core)
     name, file = getattr(core, "__name__", ""), getattr(core, "__file__", None)
-    if not file or _loaded(name) is not core:
+    if not file or find_module(name) is not core:
         raise TypeError(
             f"the module of {module.name!r} cannot be pickled: its code is not in a file of its own (a core made by "
             "hand, or the numpy target with native functions); target cython can be pickled"
@@ -57,7 +56,7 @@ def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: 
     Raises
     ------
     ToolchainError
-        The file of its code is gone.
+        The file of its code is gone or damaged, or another user could have written it.
     """
     core: Any = _find_core(name, file)
     if late is None:
@@ -74,30 +73,32 @@ def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: 
 
 
 def _find_core(name: str, file: str) -> ModuleType:
-    if (loaded := _loaded(name)) is not None:
+    if (loaded := find_module(name)) is not None:
         return loaded
     try:
         return import_module(name)  # of a generated package
     except ModuleNotFoundError:
         pass
     path = Path(file)
-    compiled = path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES))
-    loader = machinery.ExtensionFileLoader(name, file) if compiled else machinery.SourceFileLoader(name, file)
+    try:
+        if (path.parent / MANIFEST).exists():
+            read_entry(path.parent)
+        require_trusted(path)
+        if not path.name.endswith(tuple(machinery.EXTENSION_SUFFIXES)):
+            return load_source(name, file, read_trusted(path))
+    except (OSError, ValueError) as error:
+        what = "gone" if isinstance(error, FileNotFoundError) else f"damaged ({error})"
+        raise ToolchainError(
+            f"the compiled code of the pickled module is {what}: {file}; compile the model again"
+        ) from error
+    loader = machinery.ExtensionFileLoader(name, file)
     spec = util.spec_from_file_location(name, file, loader=loader)
     assert spec is not None
-    core = util.module_from_spec(spec) if path.is_file() else None
-    if core is None:
-        raise ToolchainError(f"the compiled code of the pickled module is gone: {file}; compile the model again")
+    core = util.module_from_spec(spec)
     loader.exec_module(core)
-    if compiled:
-        core.offer_lanes(partial(_find_lanes, path))
-    (sys.modules if compiled else TEXTS)[name] = core
+    core.offer_lanes(partial(_find_lanes, path))
+    sys.modules[name] = core
     return core
-
-
-def _loaded(name: str) -> ModuleType | None:
-    """The core of a name if it is loaded."""
-    return TEXTS.get(name) or sys.modules.get(name)
 
 
 def _find_lanes(file: Path) -> int:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
@@ -23,6 +24,7 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
+from .room import read_times, require_room, require_steps
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -31,8 +33,6 @@ if TYPE_CHECKING:
     from .module import Module
     from .trajectory import Trajectory
 
-#: Steps of one size in one run; storing them takes gigabytes.
-MOST_STEPS = 10**8
 #: Assemblies in turn, by secant steps, with inputs that depend on the state.
 ROUNDS = 50
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
@@ -167,7 +167,7 @@ def simulate(
         check_options(solver, options, OPTIONS)
     start, end = find_span(span, float(declared["end"]))
     if step is not None:
-        check_count(step, start, end)
+        require_steps("step", step, start, end)
         max_step, first_step = step, min(step, abs(end - start)) or None
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
@@ -189,13 +189,18 @@ def simulate(
     options = {**tolerances, **steps, **options}
     if compiled or solver.__module__.startswith("scipy."):  # another's solver may take anything
         options = check_tolerances(module.n_x, abs(end - start), options)
+        require_steps("max_step", float(options.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
     watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
-    stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
+    longest = float(options.get("max_step", np.inf))
+    numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
+    many = abs(end - start) / longest
+    require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     if kept is not None:
         kept.open(identify(bound, forcing, watched, nodes, x0, method, stored, dense_output, options))
-    pace = Pace(start, end, x0, module.n_q, float(options.get("max_step", np.inf)), run.troubled)
+    pace = Pace(start, end, x0, module.n_q, longest, run.troubled, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
@@ -317,18 +322,9 @@ def check_method(method: Any, step: Any) -> float | None:
     return None if step is None else check_step("step", step)
 
 
-def check_count(step: float, start: float, end: float) -> None:
-    """Refuse steps of one size that are too many for a run, or too small for its times."""
-    if abs(end - start) > MOST_STEPS * step or abs(end) + step == abs(end):
-        raise UsageError(f"step = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end")
-
-
-def ordered_times(t_eval: ArrayLike, start: float, end: float) -> Array:
-    """The times wanted, in order and within the span, or a UsageError."""
-    try:
-        times = np.array(t_eval, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"t_eval must be a list of times in seconds, not {t_eval!r}") from None
+def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
+    """The times wanted, in order and within the span, or a UsageError; n numbers are kept for each."""
+    times = read_times("t_eval", t_eval, 1 + n)
     first, last = (0, -1) if end >= start else (-1, 0)
     if (
         times.ndim != 1
@@ -372,7 +368,7 @@ def find_state(
             if before is not None:  # Broyden's update: the slope that explains the last step
                 move, change = before
                 secant += np.outer(gap - change - secant @ move, move) / (move @ move)
-            move = np.linalg.lstsq(secant, -gap, rcond=None)[0]
+            move = algebra.lstsq(secant, -gap, rcond=None)
             if not np.isfinite(move).all() or not move.any():
                 break
             before, u = (move, gap), found.copy()

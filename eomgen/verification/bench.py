@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..graph.core import Expr
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from ..runtime.layout import KERNELS
@@ -173,7 +174,7 @@ class Bench:
         dependent = np.delete(np.arange(self.layout.n_v), self.layout.independent)
         J = C[:, dependent] / np.maximum(np.linalg.norm(C, axis=1), 1e-300)[:, None]
         J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-        return float(np.linalg.cond(J)) if J.shape[0] == J.shape[1] and J.size else 1.0
+        return float(algebra.cond(J)) if J.shape[0] == J.shape[1] and J.size else 1.0
 
     def shift(self, k: int, C: Array) -> Array:
         """By how much the projection may move a state (n_x,) on the constraints."""
@@ -182,7 +183,7 @@ class Bench:
         moved = np.abs(x - case.x) + UNIT * np.abs(case.x)
         if len(C):
             rows = layout.rows
-            back = np.abs(np.linalg.pinv(C))
+            back = np.abs(algebra.pinv(C))
             held = rows[rows < layout.n_h]
             E_q = (
                 back[:, : len(held)] @ self._at("constraints", k, (layout.n_h,))[1][held]
@@ -222,7 +223,7 @@ def _inverse(K: Array) -> Array:
             size = np.abs(K * d * d[:, None]).max(axis=1, initial=0.0)
             d = d / np.sqrt(np.where(size > 0.0, size, 1.0))
         scaled = K * d * d[:, None]
-    return np.asarray(np.linalg.pinv(scaled, rcond=1e-15) * d * d[:, None])
+    return np.asarray(algebra.pinv(scaled, rcond=1e-15) * d * d[:, None])
 
 
 def numbers(values: Sequence[Any]) -> Array:

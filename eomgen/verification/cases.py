@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
+from ..numeric import algebra
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -144,6 +145,6 @@ def _closed(module: Module, x: Array, t: float, p: Array, u: Array) -> bool:
     if layout.n_a and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
         return False
     J = scales.jacobian(module.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
-    values = np.linalg.svd(J, compute_uv=False)
+    values = algebra.singular_values(J)
     rank = module.n_v - module.n_dof
     return bool(values[rank - 1] > 1e-3 * values[0]) if rank and rank <= len(values) else True

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import EomgenError
 from ..limits.rounding import EPS
+from ..numeric import algebra
 from ..numeric.scales import Array
 from .bench import Bench, numbers
 from .cases import Case
@@ -64,14 +65,14 @@ def _condition(bench: Bench, case: Case) -> float:
     d = 1.0 / np.sqrt(np.maximum(np.diag(M), 1e-300 + EPS * size_of(np.diag(M))))
     M, C = M * d * d[:, None], C * d
     C = C / np.maximum(np.linalg.norm(C, axis=1), 1e-300)[:, None]
-    return float(np.linalg.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.n_v else 1.0
+    return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.n_v else 1.0
 
 
 def _tangent(bench: Bench, truth: Truth, rng: np.random.Generator) -> tuple[Array, Array]:
     """A random displacement w (n_v,) and change of velocity (n_v,) along the constraints."""
     case, module, n = truth.case, bench.module, bench.layout.n_v
     C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
-    back = np.linalg.pinv(C) if len(C) else np.zeros((n, 0))
+    back = algebra.pinv(C) if len(C) else np.zeros((n, 0))
     free = np.eye(n) - back @ C if len(C) else np.eye(n)
     sizes = module.layout.scales.q
     w, change = free @ (sizes * rng.standard_normal(n)), free @ (sizes * rng.standard_normal(n))

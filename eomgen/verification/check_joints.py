@@ -9,6 +9,7 @@ import numpy as np
 from ..describe.mechanism import JointSpec
 from ..frames import GROUND, Marker
 from ..joints import Prismatic, Revolute
+from ..numeric import algebra
 from . import bodies
 from .bench import Bench
 from .comparison import Comparison
@@ -98,7 +99,7 @@ def _joints(bench: Bench) -> Finding:
                 gaps += [float(x - y) for x, y in zip(own, flat, strict=True)]
                 labels += [f"{spec.name} {what}" for what in PARTS]
         C = bench.module.constraint_jacobian(truth.case.q, p=truth.case.p, u=truth.case.u, t=truth.case.t, rows="all")
-        moved = float(np.abs(np.linalg.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
+        moved = float(np.abs(algebra.pinv(C)).sum(axis=1).max(initial=0.0)) if C.size else 0.0
         length = max(1.0, bench.layout.length)
         rounding = float(held[:, k].max(initial=0.0)) + UNIT * float(np.abs(truth.case.q).max(initial=0.0)) * float(
             np.abs(C).max(initial=0.0)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
+from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.events import Events
 from ..runtime.names import require
@@ -98,7 +99,7 @@ def _held(bench: Bench) -> list[Case]:
 def _pace(bench: Bench, case: Case) -> float:
     """A time in which the state changes by about its own size (s): 1 / |eigenvalue of largest size|."""
     J = bench.slopes(case)
-    fastest = float(np.abs(np.linalg.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
+    fastest = float(np.abs(algebra.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
     speed = float(np.abs(case.v / bench.layout.scales.q).max(initial=0.0))
     return 1.0 / max(fastest, speed, 1e-3)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import EomgenError
 from ..limits.rounding import EPS
+from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from ..runtime.signal_rates import moving_inputs
@@ -63,7 +64,7 @@ def _definite(module: Module, cases: Sequence[Case]) -> Finding:
     for c in cases:
         M = module.embedded_mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
         found.add(c.number, M - M.T, KERNEL * size_of(M) * np.ones_like(M), size_of(M))
-        smallest = float(np.linalg.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
+        smallest = float(algebra.eigvalsh(correlated(M))[0]) if np.isfinite(M).all() else -np.inf
         found.add(c.number, [max(0.0, -smallest)], [0.0])
     return found.finding()
 
@@ -149,15 +150,15 @@ def _balance(module: Module, cases: Sequence[Case]) -> Finding:
 def _null(J: Array) -> Array:
     """Orthonormal columns that J (m, n) of full rank m maps to zero."""
     n = J.shape[1]
-    return np.linalg.svd(J)[2][len(J) :].T if len(J) else np.eye(n)
+    return algebra.svd(J)[2][len(J) :].T if len(J) else np.eye(n)
 
 
 def _condition(M: Array, C: Array, scale: Array) -> float:
     """Condition of C scaled, times that of the embedded matrix at unit diagonal."""
     free = _null(C * scale) * scale[:, None]
-    own = np.linalg.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
+    own = algebra.cond(correlated(free.T @ M @ free)) if free.shape[1] else 1.0
     rows = np.linalg.norm(C * scale, axis=1)
-    return float(own * (np.linalg.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
+    return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
 def condition_at(module: Module, c: Case) -> float:

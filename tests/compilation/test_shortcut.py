@@ -54,11 +54,17 @@ def test_a_second_run_writes_nothing(write: Any, cache: Cache) -> None:
     place, written = compiled(file)
     assert written
     assert compiled(file) == (place, False)
-    for note in cache.shortcuts.iterdir():  # notes that lead nowhere, or elsewhere, are not followed
-        note.write_text("0" * 64)
+    notes = cache.shortcuts
+    for lie in (b"0" * 64, b"../../nowhere", b"\xff\x00"):  # notes that lead nowhere are not followed
+        for note in notes.names():
+            notes.write(note, lie)
+        assert compiled(file) == (place, True)
+    for note in notes.names():  # nor are those of another program, or cut ones
+        (notes.folder / note).write_bytes((notes.folder / note).read_bytes()[:-1])
     assert compiled(file) == (place, True)
-    for note in cache.shortcuts.iterdir():
-        note.write_text("../../nowhere")
+    (first,) = notes.names()
+    (notes.folder / first).rename(notes.folder / ("0" * 64))
+    assert notes.read("0" * 64) is None
     assert compiled(file) == (place, True)
     assert compiled(file) == (place, False)
     Path(place).write_bytes(b"damaged")
@@ -128,28 +134,34 @@ def test_notes_of_builds_that_are_gone_go_too(write: Any, cache: Cache) -> None:
     kept, _ = compiled(write(model("stays")))
     shutil.rmtree(Path(place).parent)
     cache.prune(older_than=1e6)
-    noted = {note.read_text() for note in cache.shortcuts.iterdir()}
+    noted = {str(cache.shortcuts.read(note), "ascii") for note in cache.shortcuts.names()}
     assert Path(place).parent.name not in noted
     assert Path(kept).parent.name in noted
 
 
 def test_templates_are_compiled_once(tmp_path: Path, fresh_cache: Cache) -> None:
-    folder = fresh_cache.open_templates()
-    assert folder is not None
-    assert fresh_cache.root.stat().st_mode & 0o077 == 0
+    folder = fresh_cache.templates.folder
     code = (
         "import sys, time, jinja2; from pathlib import Path\n"
         "from eomgen.emit.sources import environment, keep_bytecode\n"
-        "keep_bytecode(Path(sys.argv[1])); environment()._compile = None if sys.argv[2:] else environment()._compile\n"
+        "from eomgen.files.kept import Kept\n"
+        "keep_bytecode(Kept(Path(sys.argv[1])))\n"
+        "environment()._compile = None if sys.argv[2:] else environment()._compile\n"
         "template = environment().get_template('c/lanes.c.j2')\n"
         "print(template.render(name='m', width=2, tests=(), feature='', series=False, contracted=False))"
     )
     first = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
     assert list(folder.iterdir())
+    assert fresh_cache.root.stat().st_mode & folder.stat().st_mode & 0o077 == 0
     again = subprocess.run([sys.executable, "-c", code, str(folder), "no"], capture_output=True, text=True, check=True)
     assert again.stdout == first.stdout
     assert "m_lanes2" in again.stdout
+    for file in folder.iterdir():
+        file.write_bytes(file.read_bytes()[:-1])
+    cut = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
+    assert cut.stdout == first.stdout
     fresh_cache.clear()
     assert not folder.exists()
-    (fresh_cache.root / "templates").write_text("in the way")
-    assert fresh_cache.open_templates() is None
+    folder.write_text("in the way")
+    blocked = subprocess.run([sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=True)
+    assert blocked.stdout == first.stdout

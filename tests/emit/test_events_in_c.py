@@ -51,7 +51,8 @@ static void travel(const eomgen_method *method)
     }
     run.F = run.K + N * method->rows_K;
     eomgen_events events = {.n = EVENTS, .n_model = EVENTS, .values = values, .direction = direction, .most = most,
-        .action = action, .count = count, .leaving = leaving, .whose = whose, .fired = fired, .touch = touch, .crowd = 12};
+        .action = action, .count = count, .leaving = leaving, .whose = whose, .fired = fired, .touch = touch,
+        .crowd = 12};
     double **const work[] = {&events.g, &events.g_new, &events.slope, &events.slope_new, &events.size, &events.trial,
         &events.latest, &events.y, &events.bracket};
     for (int k = 0; k < 9; k++) {

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import sympy
 
-from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.model import Model
+from eomgen.describe.yaml_file import describe_yaml
 from eomgen.errors import EomgenError
 
 from .guard import PACKAGE
@@ -27,15 +27,53 @@ from .yaml_files import SMALL
 MODELS = {"pendulum": SMALL["pendulum"], "spring": SMALL["spring"], "four_bar": "", "rolling_disc": ""}
 TARGETS = ("numpy", "cython")
 NOT_CALLED = {"verify", "bind", "report"}  #: take seconds by design, or are bound before each call
-RARE = {"simulate", "simulate_many", "simulate_impacts", "sensitivities", "workspace", "kinematic_analysis", "motion_range", "equilibrium", "branches", "integrator"}
+RARE = {
+    "simulate",
+    "simulate_many",
+    "simulate_impacts",
+    "sensitivities",
+    "workspace",
+    "kinematic_analysis",
+    "motion_range",
+    "equilibrium",
+    "branches",
+    "integrator",
+}
 LONG = {"span", "points", "most", "of", "over", "within"}  #: arguments in which a large number rightly takes long
 #: Options of runs that stand behind **options.
 OPTIONS = {
-    "rtol": 1e-6, "atol": 1e-8, "t_eval": [0.0, 0.01], "max_step": 0.01, "first_step": 0.001, "events": None, "step": 0.01,
-    "dense_output": True, "workers": 1, "samples": 3, "colour": "red", "method": "RK45", "vectorized": True,
-}  # fmt: skip
+    "rtol": 1e-6,
+    "atol": 1e-8,
+    "t_eval": [0.0, 0.01],
+    "max_step": 0.01,
+    "first_step": 0.001,
+    "events": None,
+    "step": 0.01,
+    "dense_output": True,
+    "workers": 1,
+    "samples": 3,
+    "colour": "red",
+    "method": "RK45",
+    "vectorized": True,
+}
 NUMBERS = (0, 1, -1, 2, 0.5, -0.0, 1e308, -1e308, 1e-308, 5e-324, 1e16, "nan", "inf", "-inf", 10**30, 2**63, 10**400)
-OBJECTS = ("set", "bytes", "complex", "symbol", "function", "self", "type", "generator", "object", "masked", "date", "ellipsis", "slice", "true", "false")
+OBJECTS = (
+    "set",
+    "bytes",
+    "complex",
+    "symbol",
+    "function",
+    "self",
+    "type",
+    "generator",
+    "object",
+    "masked",
+    "date",
+    "ellipsis",
+    "slice",
+    "true",
+    "false",
+)
 DTYPES = ("f8", "f4", "f2", "i8", "u1", "c16", "O", "U3", "?", ">f8", "M8[s]", "f8,f8", "S2", "g")
 FILLS = ("good", 0.0, 1.0, "nan", "inf", 1e308, 1e16, -1.0, 1e-320, "random")
 LAYOUTS = ("C", "F", "strided", "reversed", "readonly", "broadcast", "matrix")
@@ -47,6 +85,8 @@ class Calls:
     name = "calls"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = (TypeError, ValueError)
+    #: NumPy's of a complex array given for a real one, SciPy's of options that a solver does not know.
+    unjudged: tuple[type[Warning], ...] = (np.exceptions.ComplexWarning, UserWarning)
 
     def prepare(self, folder: Path) -> None:
         self.modules: dict[str, Any] = {}
@@ -55,7 +95,9 @@ class Calls:
             for name, text in MODELS.items():
                 text = text or (PACKAGE.parent / "examples" / f"{name}.yaml").read_text()
                 for target in TARGETS:
-                    self.modules[f"{name} {target}"] = Model.from_description(describe_yaml(text)).compile(target=target)
+                    self.modules[f"{name} {target}"] = Model.from_description(describe_yaml(text)).compile(
+                        target=target
+                    )
         self.good = {name: good_values(module) for name, module in self.modules.items()}
         self.calls = {name: list(callables(module)) for name, module in self.modules.items()}
         with warnings.catch_warnings(), contextlib.suppress(EomgenError):
@@ -78,6 +120,9 @@ class Calls:
             chosen[r.choice(("x", "out", "foo", "p", "__class__", "t", "rows", "theta"))] = odd(r, "")
         return {"module": module, "on": on, "call": call, "arguments": chosen}
 
+    def build(self, case: Any) -> Any:
+        return case
+
     def run(self, case: Any, folder: Path) -> str:
         module, good = self.modules[case["module"]], self.good[case["module"]]
         values = {name: made(spec, good.get(name, 1.0), module) for name, spec in case["arguments"].items()}
@@ -88,8 +133,8 @@ class Calls:
         bound = getattr(module.minimal if on == "minimal" else module, call)
         options = values.pop("options", None)
         named = values.pop("named", None)
-        values |= {k: v for k, v in (options or {}).items()} if isinstance(options, dict) else {}
-        values |= {k: v for k, v in (named or {}).items()} if isinstance(named, dict) else {}
+        for more in (options, named):
+            values |= more if isinstance(more, dict) else {}
         places = [values.pop(name) for name in ("guess_", "values_") if name in values]
         bound(*places, **values)
 
@@ -126,13 +171,49 @@ def good_values(module: Any) -> dict[str, Any]:
     x = module.x0()
     first = module.q_names[0]
     values: dict[str, Any] = {
-        "t": 0.0, "x": x, "q": x[: module.n_q], "v": x[module.n_q : module.n_q + module.n_v], "a": np.zeros(module.n_v), "p": module.p, "u": module.u, "out": np.empty(module.n_x),
-        "q_i": np.atleast_1d(x[: module.n_dof]), "v_i": np.zeros(module.n_dof), "a_i": np.zeros(module.n_dof), "guess": {first: float(x[0])}, "guess_": {first: float(x[0])}, "values_": {first: float(x[0])},
-        "rows": "all", "h": 0.01, "span": (0.0, 0.05), "initial": {first: float(x[0])}, "parameters": dict(zip(module.p_names, module.p, strict=True)), "inputs": dict(zip(module.u_names, module.u, strict=True)),
-        "name": first, "names": [*module.p_names[:1], first], "gaps": {first: 0.5}, "lock": [first], "hold": [first], "unknowns": list(module.p_names[:1]), "over": {first: (0.0, 0.5, 3)}, "of": first,
-        "method": "RK45", "form": "minimal", "independent": [first], "weights": {first: 2.0}, "points": 10, "most": 3, "limits": True, "partial": True, "closed": True, "within": (0.0, 1.0), "actuated": [first],
-        "options": dict(OPTIONS), "named": {first: float(x[0])}, "led": {first: [float(x[0]), float(x[0]) + 0.01]},
-    }  # fmt: skip
+        "t": 0.0,
+        "x": x,
+        "q": x[: module.n_q],
+        "v": x[module.n_q : module.n_q + module.n_v],
+        "a": np.zeros(module.n_v),
+        "p": module.p,
+        "u": module.u,
+        "out": np.empty(module.n_x),
+        "q_i": np.atleast_1d(x[: module.n_dof]),
+        "v_i": np.zeros(module.n_dof),
+        "a_i": np.zeros(module.n_dof),
+        "guess": {first: float(x[0])},
+        "guess_": {first: float(x[0])},
+        "values_": {first: float(x[0])},
+        "rows": "all",
+        "h": 0.01,
+        "span": (0.0, 0.05),
+        "initial": {first: float(x[0])},
+        "parameters": dict(zip(module.p_names, module.p, strict=True)),
+        "inputs": dict(zip(module.u_names, module.u, strict=True)),
+        "name": first,
+        "names": [*module.p_names[:1], first],
+        "gaps": {first: 0.5},
+        "lock": [first],
+        "hold": [first],
+        "unknowns": list(module.p_names[:1]),
+        "over": {first: (0.0, 0.5, 3)},
+        "of": first,
+        "method": "RK45",
+        "form": "minimal",
+        "independent": [first],
+        "weights": {first: 2.0},
+        "points": 10,
+        "most": 3,
+        "limits": True,
+        "partial": True,
+        "closed": True,
+        "within": (0.0, 1.0),
+        "actuated": [first],
+        "options": dict(OPTIONS),
+        "named": {first: float(x[0])},
+        "led": {first: [float(x[0]), float(x[0]) + 0.01]},
+    }
     with contextlib.suppress(EomgenError):
         values["x_min"] = module.minimal.reduce(x)
     return values | ({} if "x_min" in values else {"x_min": x})
@@ -142,8 +223,16 @@ def odd(r: random.Random, name: str) -> dict[str, Any]:
     """The description of an odd value."""
     k = r.randrange(9)
     if name in ("options", "named", "led"):
-        keys = r.sample(list(OPTIONS), r.randint(0, 3)) if name == "options" else r.choices((*TEXTS, "theta", "q", "q_dot", "t", "p"), k=r.randint(0, 2))
-        return {"dict": {key: {"value": OPTIONS[key]} if r.random() < 0.4 and key in OPTIONS else odd(r, "span") for key in keys}}
+        keys = (
+            r.sample(list(OPTIONS), r.randint(0, 3))
+            if name == "options"
+            else r.choices((*TEXTS, "theta", "q", "q_dot", "t", "p"), k=r.randint(0, 2))
+        )
+        return {
+            "dict": {
+                key: {"value": OPTIONS[key]} if r.random() < 0.4 and key in OPTIONS else odd(r, "span") for key in keys
+            }
+        }
     if k <= 1 and name not in LONG:
         return {"value": r.choice(NUMBERS)}
     if k == 2:
@@ -151,12 +240,65 @@ def odd(r: random.Random, name: str) -> dict[str, Any]:
     if k == 3:
         return {"object": r.choice(OBJECTS)}
     if k == 4:
-        return {"value": r.choice((None, [], {}, [[]], [None], ["a"], [1, "a"], [[1, 2], [3]], {"": 1}, {"theta": "nan"}, {"q": None}, ["nan"], [-1.0], [1.0, 0.0], [0.0, "nan"], [0.0, 0.0], "theta", ["theta", "theta"]))}
+        return {
+            "value": r.choice(
+                (
+                    None,
+                    [],
+                    {},
+                    [[]],
+                    [None],
+                    ["a"],
+                    [1, "a"],
+                    [[1, 2], [3]],
+                    {"": 1},
+                    {"theta": "nan"},
+                    {"q": None},
+                    ["nan"],
+                    [-1.0],
+                    [1.0, 0.0],
+                    [0.0, "nan"],
+                    [0.0, 0.0],
+                    "theta",
+                    ["theta", "theta"],
+                )
+            )
+        }
     if k == 5:
         key = r.choice((*TEXTS, "theta", "q", "q_dot", "l", "k", "u"))
         return {"dict": {key: odd(r, name)}}
-    shape = r.choice(((), (0,), (1,), (2,), (3,), (5,), (0, 0), (2, 0), (2, 2), (4, 3), (1, 1, 1), (2, 1000), (100_000,), "good", "good", "good", "batch", "batch", "longer", "shorter"))
-    return {"array": {"shape": shape, "fill": r.choice(FILLS), "dtype": r.choice(DTYPES) if r.random() < 0.4 else "f8", "layout": r.choice(LAYOUTS)}}
+    shape = r.choice(
+        (
+            (),
+            (0,),
+            (1,),
+            (2,),
+            (3,),
+            (5,),
+            (0, 0),
+            (2, 0),
+            (2, 2),
+            (4, 3),
+            (1, 1, 1),
+            (2, 1000),
+            (100_000,),
+            "good",
+            "good",
+            "good",
+            "batch",
+            "batch",
+            "longer",
+            "shorter",
+        )
+    )
+    return {
+        "array": {
+            "shape": shape,
+            "fill": r.choice(FILLS),
+            "dtype": r.choice(DTYPES) if r.random() < 0.4 else "f8",
+            "layout": r.choice(LAYOUTS),
+        }
+    }
 
 
 def made(spec: Any, good: Any, module: Any) -> Any:
@@ -188,7 +330,12 @@ def array(spec: dict[str, Any], good: Any) -> Any:
     except (TypeError, ValueError):
         base = np.ones(2)
     shape, fill = spec["shape"], spec["fill"]
-    sizes = {"good": base.shape, "batch": (*base.shape, 3), "longer": (base.shape[0] + 1,), "shorter": (max(base.shape[0] - 1, 0),)}
+    sizes = {
+        "good": base.shape,
+        "batch": (*base.shape, 3),
+        "longer": (base.shape[0] + 1,),
+        "shorter": (max(base.shape[0] - 1, 0),),
+    }
     size = sizes[shape] if isinstance(shape, str) else tuple(shape)
     if fill == "good" and shape in ("good", "batch"):
         values = np.ascontiguousarray(np.broadcast_to(base.T, size[::-1]).T)

@@ -130,7 +130,16 @@ class Campaign:
                         worker = None
                         if str(death) and seed != IDLE:
                             outcome, _, how = str(death).partition(": ")
-                            self._found({"kind": name, "outcome": outcome, "seed": seed, "key": f"{outcome} {how}", "text": how, "seconds": 0.0})
+                            self._found(
+                                {
+                                    "kind": name,
+                                    "outcome": outcome,
+                                    "seed": seed,
+                                    "key": f"{outcome} {how}",
+                                    "text": how,
+                                    "seconds": 0.0,
+                                }
+                            )
                             with self.lock:
                                 self.records[name].cases += 1
                                 self.records[name].outcomes[outcome] += 1

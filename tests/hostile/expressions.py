@@ -21,10 +21,38 @@ NAMES = ("a", "b", "q", "q_dot", "t", "pi", "m_r", "x1", "unknown", "e", "E", "I
 OPERATORS = ("+", "-", "*", "/", "**", "<", "<=", ">", ">=", "==", "!=", " and ", " or ")
 FOREIGN = ("//", "%", "@", "<<", ">>", "&", "|", "^", " is ", " in ", " not in ", ":=", "=", ",", ";", "->", "...", "!")
 WRAPS = (
-    "lambda: {}", "[{}]", "{{{}}}", "({},)", "({}).real", "[{} for a in b]", "({} for a in b)", "f'{{{}}}'", "await {}",
-    "yield {}", "*{}", "{}[0]", "{}()", "{}(a=1)", "not {}", "~{}", "{}#", "import {}", "{}\n", "\n{}", "\t{}", "{}\\\n",
-    "print({})", "eval('{}')", "{}.__class__", "{}:{}", "{} if {}", "x({})", "diff({}, 1)", "diff(f({}), {})", "-{}",
-)  # fmt: skip
+    "lambda: {}",
+    "[{}]",
+    "{{{}}}",
+    "({},)",
+    "({}).real",
+    "[{} for a in b]",
+    "({} for a in b)",
+    "f'{{{}}}'",
+    "await {}",
+    "yield {}",
+    "*{}",
+    "{}[0]",
+    "{}()",
+    "{}(a=1)",
+    "not {}",
+    "~{}",
+    "{}#",
+    "import {}",
+    "{}\n",
+    "\n{}",
+    "\t{}",
+    "{}\\\n",
+    "print({})",
+    "eval('{}')",
+    "{}.__class__",
+    "{}:{}",
+    "{} if {}",
+    "x({})",
+    "diff({}, 1)",
+    "diff(f({}), {})",
+    "-{}",
+)
 CALLED = (*FUNCTIONS, *QUANTITIES, "f", "g", "foo", "open", "exec", "gamma", "Sum", "sympify")
 MARKERS = ("rod", "rod.tip", "com", "ground", "rod.tip.x", "1", "a b", "")
 
@@ -35,6 +63,7 @@ class Expressions:
     name = "expressions"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         """Nothing."""
@@ -44,6 +73,9 @@ class Expressions:
         for _ in range(r.choice((0, 0, 0, 1, 1, 3))):
             text = disturbed(text, r)
         return text
+
+    def build(self, case: Any) -> Any:
+        return case
 
     def run(self, case: Any, folder: Path) -> str:
         graph = Graph()
@@ -117,12 +149,35 @@ def long(r: random.Random) -> str:
     """Long, deep or both: what the bounds are for."""
     n = r.choice((10, 59, 60, 61, 100, 900, 1999, 4000, 20000))
     one = r.choice(("a", "1", "1.5", "q"))
-    return r.choice((
-        "(" * n + one + ")" * n, "-" * n + one, "not " * n + one, "+".join([one] * n), "*".join([one] * n), "**".join([one] * n),
-        "/".join([one] * n), "sin(" * n + one + ")" * n, "<".join([one] * n), " and ".join([one] * n), one * n, f"max({','.join([one] * n)})",
-        f"{one} if {one} else " * n + one, "(" * n, "[" * n, "a." * n + "b", "9" * n, "1e" + "9" * n, "0." + "0" * n + "1", "\n" * n + one, " " * n + one,
-        f"f({'f(' * n}{one}{')' * n})", f"({one}+" * n + one + ")" * n, f"{one}-(" * n + one + ")" * n, f"{one}**({one}+" * n + one + ")" * n,
-    ))  # fmt: skip
+    return r.choice(
+        (
+            "(" * n + one + ")" * n,
+            "-" * n + one,
+            "not " * n + one,
+            "+".join([one] * n),
+            "*".join([one] * n),
+            "**".join([one] * n),
+            "/".join([one] * n),
+            "sin(" * n + one + ")" * n,
+            "<".join([one] * n),
+            " and ".join([one] * n),
+            one * n,
+            f"max({','.join([one] * n)})",
+            f"{one} if {one} else " * n + one,
+            "(" * n,
+            "[" * n,
+            "a." * n + "b",
+            "9" * n,
+            "1e" + "9" * n,
+            "0." + "0" * n + "1",
+            "\n" * n + one,
+            " " * n + one,
+            f"f({'f(' * n}{one}{')' * n})",
+            f"({one}+" * n + one + ")" * n,
+            f"{one}-(" * n + one + ")" * n,
+            f"{one}**({one}+" * n + one + ")" * n,
+        )
+    )
 
 
 def disturbed(text: str, r: random.Random) -> str:

@@ -13,6 +13,8 @@ import sysconfig
 from pathlib import Path
 from typing import Any
 
+import sympy
+
 import eomgen
 
 PACKAGE = Path(eomgen.__file__).resolve().parent
@@ -31,20 +33,70 @@ ROOTS = tuple(
 )
 #: What Python and the system read for themselves.
 SYSTEM = ("/proc/self/", "/proc/cpuinfo", "/proc/meminfo", "/sys/", "/usr/lib/", "/usr/share/", "/lib/", "/etc/ld.so")
-DEVICES = ("/dev/null", "/dev/urandom", "/dev/tty")
+DEVICES = ("/dev/null", "/dev/full", "/dev/urandom", "/dev/tty")
 #: Events that no case may cause.
-FORBIDDEN = ["os.system", "os.exec", "os.spawn", "os.startfile", "os.fork", "os.forkpty", "pty.spawn", "socket.", "urllib.", "http.", "ftplib.", "smtplib.", "imaplib.", "poplib.", "telnetlib.", "webbrowser.", "pickle.", "ctypes.", "sys.addaudithook", "sys.setprofile", "sys.settrace", "os.setxattr", "os.chflags", "os.chroot", "os.kill", "os.killpg", "resource.", "syslog.", "sqlite3.", "fcntl.", "mmap.", "gc.get_objects", "code.__new__"]
+FORBIDDEN = [
+    "os.system",
+    "os.exec",
+    "os.spawn",
+    "os.startfile",
+    "os.fork",
+    "os.forkpty",
+    "pty.spawn",
+    "socket.",
+    "urllib.",
+    "http.",
+    "ftplib.",
+    "smtplib.",
+    "imaplib.",
+    "poplib.",
+    "telnetlib.",
+    "webbrowser.",
+    "pickle.",
+    "ctypes.",
+    "sys.addaudithook",
+    "sys.setprofile",
+    "sys.settrace",
+    "os.setxattr",
+    "os.chflags",
+    "os.chroot",
+    "os.kill",
+    "os.killpg",
+    "resource.",
+    "syslog.",
+    "sqlite3.",
+    "fcntl.",
+    "mmap.",
+    "gc.get_objects",
+    "code.__new__",
+]
 #: Events whose first arguments are paths that the case changes.
 CHANGES = {
-    "os.remove": 1, "os.rename": 2, "os.mkdir": 1, "os.rmdir": 1, "os.chmod": 1, "os.chown": 1, "os.link": 2,
-    "os.symlink": 2, "os.truncate": 1, "os.utime": 1, "os.removexattr": 1, "shutil.rmtree": 1, "shutil.move": 2,
-    "tempfile.mkstemp": 1, "tempfile.mkdtemp": 1, "shutil.chown": 1, "shutil.make_archive": 1, "shutil.unpack_archive": 2,
-}  # fmt: skip
+    "os.remove": 1,
+    "os.rename": 2,
+    "os.mkdir": 1,
+    "os.rmdir": 1,
+    "os.chmod": 1,
+    "os.chown": 1,
+    "os.link": 2,
+    "os.symlink": 2,
+    "os.truncate": 1,
+    "os.utime": 1,
+    "os.removexattr": 1,
+    "shutil.rmtree": 1,
+    "shutil.move": 2,
+    "tempfile.mkstemp": 1,
+    "tempfile.mkdtemp": 1,
+    "shutil.chown": 1,
+    "shutil.make_archive": 1,
+    "shutil.unpack_archive": 2,
+}
 LOOKS = ("os.listdir", "os.scandir", "os.walk", "os.chdir", "glob.glob", "os.getxattr", "os.listxattr")
 #: Python's own makers of classes, which run a text they wrote themselves.
-MAKERS = tuple(
-    os.path.join(sysconfig.get_paths()["stdlib"], name)
-    for name in ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")
+_STANDARD = ("dataclasses.py", "collections/__init__.py", "enum.py", "functools.py", "typing.py", "inspect.py")
+MAKERS = (
+    *(os.path.join(sysconfig.get_paths()["stdlib"], name) for name in _STANDARD),
+    os.path.join(os.path.dirname(sympy.__file__), "polys", "monomials.py"),  # a function for each number of symbols
 )
 
 
@@ -87,7 +139,10 @@ class Guard:
         if event in CHANGES:
             return next((f"{event} {p!r}" for p in args[: CHANGES[event]] if not self._own(p)), None)
         if event in LOOKS:
-            if event == "os.listdir" and sys._getframe(2).f_code.co_filename == "<frozen importlib._bootstrap_external>":
+            if (
+                event == "os.listdir"
+                and sys._getframe(2).f_code.co_filename == "<frozen importlib._bootstrap_external>"
+            ):
                 return None  # an import looks through the path
             return self._read(args[0], event)
         if event in ("subprocess.Popen", "os.posix_spawn"):
@@ -99,7 +154,7 @@ class Guard:
             return None
         writes = isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND)
         if writes:
-            return None if self._own(path) or os.fspath(path) in DEVICES else f"open for writing {path!r}"
+            return None if self._own(path) or self._real(path) in DEVICES else f"open for writing {path!r}"
         return self._read(path, "open")
 
     def _real(self, path: Any) -> str:

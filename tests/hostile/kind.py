@@ -33,6 +33,8 @@ class Kind(Protocol):
     programs: frozenset[str]
     #: Exceptions that refuse an argument by Python's own convention (TypeError and ValueError of calls); none for files.
     refusals: tuple[type[Exception], ...]
+    #: Warnings that speak of what was built, not of what the package did with it.
+    unjudged: tuple[type[Warning], ...]
 
     def prepare(self, folder: Path) -> None:
         """Import and compile what the cases need, once in each process, before the guard is armed."""
@@ -40,8 +42,11 @@ class Kind(Protocol):
     def make(self, r: random.Random) -> Any:
         """A case; the same one for the same state of ``r``."""
 
-    def run(self, case: Any, folder: Path) -> str:
-        """Give the case to the package, in ``folder``, the working directory, where all its files have to stay.
+    def build(self, case: Any) -> Any:
+        """What is given to the package: most often the case itself.  What fails here is not the package's."""
+
+    def run(self, given: Any, folder: Path) -> str:
+        """Give what was built to the package, in ``folder``, the working directory, where all its files have to stay.
 
         Returns a word or two on what came out (``fine``, ``exit 1``), which is counted.  An EomgenError is a named
         error; raise :class:`Wrong` for an answer that is no exception and yet wrong.  Anything else is a finding.

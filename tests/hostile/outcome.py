@@ -9,6 +9,7 @@ import resource
 import shutil
 import signal
 import sys
+import tempfile
 import time
 import traceback
 import warnings
@@ -22,6 +23,7 @@ from .guard import PACKAGE, Escape, Guard
 from .kind import Kind, Wrong
 
 SECONDS = 20.0  #: wall time of one case
+BUILDING = 1.0  #: wall time for making the object that is given
 MEMORY = 2 << 30  #: bytes that a process may hold
 #: Outcomes that are findings; fine, named error and refused are not.
 FINDINGS = ("escape", "traceback", "hang", "memory", "crash", "warning", "wrong")
@@ -49,6 +51,7 @@ class Runner:
         self.folder = folder / "case"
         self.folder.mkdir(parents=True, exist_ok=True)
         os.environ.update(EOMGEN_CACHE_DIR=str(cache), TMPDIR=str(self.folder), HOME=str(self.folder))
+        tempfile.tempdir = str(self.folder)
         self.guard = Guard(str(self.folder), str(cache))
         self.warned: list[str] = []
         self.prepared: set[str] = set()
@@ -72,6 +75,8 @@ class Runner:
         # for each kind again: libraries that load late change the filters
         warnings.resetwarnings()
         warnings.simplefilter("always")
+        for category in kind.unjudged:
+            warnings.simplefilter("ignore", category)
         warnings.showwarning = lambda message, category, *_: self.warned.append(f"{category.__name__}: {message}")
 
     def run(self, kind: Kind, case: Any) -> Outcome:
@@ -81,20 +86,15 @@ class Runner:
         guard.escapes.clear()
         guard.programs = kind.programs
         start = time.perf_counter()
-        signal.setitimer(signal.ITIMER_REAL, SECONDS, 1.0)  # again each second, in case a handler swallows it
+        signal.setitimer(signal.ITIMER_REAL, BUILDING, 1.0)
         try:
-            guard.armed = True
-            try:
-                word = kind.run(case, self.folder)
-            finally:
-                guard.armed = False
-                signal.setitimer(signal.ITIMER_REAL, 0)
+            found = self._given(kind, case)
         except EomgenError as error:
             found = Outcome("named error", type(error).__name__)
         except BaseException as error:
             found = judge(error, kind.refusals)
-        else:
-            found = Outcome("fine", word)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
         seconds = time.perf_counter() - start
         if guard.escapes:  # also where a handler swallowed it
             found = Outcome("escape", guard.escapes[0], f"escape {_plain(guard.escapes[0])}", found.text)
@@ -102,6 +102,20 @@ class Runner:
             found = Outcome("warning", self.warned[0], f"warning {_plain(self.warned[0])}", self.warned[0])
         self.tidy()
         return found._replace(seconds=seconds)
+
+    def _given(self, kind: Kind, case: Any) -> Outcome:
+        """What the package answers."""
+        try:
+            given = kind.build(case)
+        except (Exception, Hang):
+            return Outcome("refused", "not built")
+        self.warned.clear()
+        signal.setitimer(signal.ITIMER_REAL, SECONDS, 1.0)  # again each second, in case a handler swallows it
+        try:
+            self.guard.armed = True
+            return Outcome("fine", kind.run(given, self.folder))
+        finally:
+            self.guard.armed = False
 
     def tidy(self) -> None:
         """Empty the folder of the case."""
@@ -129,11 +143,13 @@ def judge(error: BaseException, refusals: tuple[type[Exception], ...] = ()) -> O
     if isinstance(error, Escape):
         return Outcome("escape", str(error), f"escape {_plain(str(error))}", text)
     name = type(error).__name__
-    place = f"{Path(own[-1].filename).relative_to(PACKAGE)}:{own[-1].name}" if own else "outside"
+    place = f"{Path(own[-1].filename).relative_to(PACKAGE)}:{own[-1].name}" if own else "outside the package"
     if isinstance(error, Hang):
         return Outcome("hang", place, f"hang {place}", text)
     if isinstance(error, MemoryError):
         return Outcome("memory", place, f"memory {place}", text)
+    if not own:
+        return Outcome("refused", name)  # by Python, NumPy or SymPy before the package was asked
     too_large = isinstance(error, OverflowError) and str(error) == "int too large to convert to float"
     if isinstance(error, refusals) or (refusals and too_large):
         return Outcome("refused", name)

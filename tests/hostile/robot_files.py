@@ -46,6 +46,7 @@ class Robots:
     """
 
     refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
 
     def __init__(self, name: str, suffix: str, programs: frozenset[str]) -> None:
         self.name, self.suffix, self.programs = name, suffix, programs
@@ -75,11 +76,14 @@ class Robots:
             options.pop("floating", None)
         return {"files": files, "main": main, "options": options, "stage": r.choice(("load", "load", "load", "check"))}
 
-    def run(self, case: Any, folder: Path) -> str:
+    def build(self, case: Any) -> Any:
         for name, data in case["files"].items():
-            path = folder / name
+            path = Path(name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(decoded(data))
+        return case
+
+    def run(self, case: Any, folder: Path) -> str:
         try:
             if case["stage"] == "check":
                 return command(["check", case["main"]], (0, 1))

@@ -72,8 +72,13 @@ MESHES = {
     "e.png": "\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x06",
 }  # fmt: skip
 TAGS = {
-    "urdf": sorted({tag for path in URDF for tag in path.split("/")} | {"xacro:macro", "a:b", "mujoco", "robot", "geometry", "mesh", "box"}),
-    "mjcf": sorted({tag for path in MJCF for tag in path.split("/")} | {"Include", "Compiler", "INCLUDE", "a:b", "robot", "mujoco"}),
+    "urdf": sorted(
+        {tag for path in URDF for tag in path.split("/")}
+        | {"xacro:macro", "a:b", "mujoco", "robot", "geometry", "mesh", "box"}
+    ),
+    "mjcf": sorted(
+        {tag for path in MJCF for tag in path.split("/")} | {"Include", "Compiler", "INCLUDE", "a:b", "robot", "mujoco"}
+    ),
 }
 #: Numbers as they stand in attributes.
 NUMBERS = (
@@ -132,5 +137,24 @@ def attributes(dialect: str) -> tuple[str, ...]:
     """Every attribute that a dialect knows, and some that belong to other elements."""
     table = URDF if dialect == "urdf" else MJCF
     known = {name for rows in table.values() for row in rows for name in row.attributes if name.isidentifier()}
-    more = ("fileup", "fileback", "nrow", "ncol", "width", "height", "content_type", "user", "nuser_body", "nkey", "class", "name", "plugin", "instance", "key", "value", "radius", "length")
+    more = (
+        "fileup",
+        "fileback",
+        "nrow",
+        "ncol",
+        "width",
+        "height",
+        "content_type",
+        "user",
+        "nuser_body",
+        "nkey",
+        "class",
+        "name",
+        "plugin",
+        "instance",
+        "key",
+        "value",
+        "radius",
+        "length",
+    )
     return tuple(sorted(known | set(more)))

@@ -11,11 +11,67 @@ from typing import Any
 from .words import NUMBERS, TEXTS
 
 VALUES: tuple[Any, ...] = (
-    None, True, False, 0, -1, 1, -0.0, 1e308, -1e308, 1e-308, 5e-324, float("nan"), float("inf"), -float("inf"), 10**39, 10**50, 2**63, -(2**63), 10**9,
-    [], {}, [[]], [None], {"a": 1}, [1, 2, 3], [1, 2], [1, 2, 3, 4], [0, 0, 0], ["x", "y", "z"], [1e308] * 3, [float("nan")] * 3, [1e-320, 0, 0], {"zz": 0}, {"zz": -1}, {"zz": 1e-300}, {"xx": 1, "yy": 1, "zz": 100},
-    "ground", "x", "-x", "w", {"body": "ground"}, {"body": "nowhere"}, {"body": "ground", "at": [1, 2, 3], "rpy": [0, 0, 1e300]}, {"at": [0, 0, 0]}, [["ground"]], {"": 1},
-    "nan", "inf", "1e400", "0x10", "0o7", "1_0", "12:30:45", "2001-01-01", [[1, 2], [3, 4]], [[1, 0, 0], [0, 1, 0], [0, 0, 1]], ["ground", "ground"], "error", "note", "off",
-)  # fmt: skip
+    None,
+    True,
+    False,
+    0,
+    -1,
+    1,
+    -0.0,
+    1e308,
+    -1e308,
+    1e-308,
+    5e-324,
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+    10**39,
+    10**50,
+    2**63,
+    -(2**63),
+    10**9,
+    [],
+    {},
+    [[]],
+    [None],
+    {"a": 1},
+    [1, 2, 3],
+    [1, 2],
+    [1, 2, 3, 4],
+    [0, 0, 0],
+    ["x", "y", "z"],
+    [1e308] * 3,
+    [float("nan")] * 3,
+    [1e-320, 0, 0],
+    {"zz": 0},
+    {"zz": -1},
+    {"zz": 1e-300},
+    {"xx": 1, "yy": 1, "zz": 100},
+    "ground",
+    "x",
+    "-x",
+    "w",
+    {"body": "ground"},
+    {"body": "nowhere"},
+    {"body": "ground", "at": [1, 2, 3], "rpy": [0, 0, 1e300]},
+    {"at": [0, 0, 0]},
+    [["ground"]],
+    {"": 1},
+    "nan",
+    "inf",
+    "1e400",
+    "0x10",
+    "0o7",
+    "1_0",
+    "12:30:45",
+    "2001-01-01",
+    [[1, 2], [3, 4]],
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    ["ground", "ground"],
+    "error",
+    "note",
+    "off",
+)
 SIZES = (0, 1, 2, 3, 4, 6, 9, 40)
 KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*\Z")
 
@@ -59,7 +115,9 @@ def number(r: random.Random) -> Any:
     return r.choice(VALUES) if k == 3 else r.choice(NUMBERS)
 
 
-def change(tree: dict[str, Any], r: random.Random, others: list[dict[str, Any]], keys: list[str], types: list[str]) -> None:
+def change(
+    tree: dict[str, Any], r: random.Random, others: list[dict[str, Any]], keys: list[str], types: list[str]
+) -> None:
     """One place of a tree changed; ``others`` and ``keys`` are where parts and key names come from."""
     places = list(paths(tree))[1:]
     if not places:
@@ -127,7 +185,9 @@ class Schema:
             if name == "name":
                 return r.choice(self.POOLS)
             if name == "expression":
-                return r.choice((1, 0.5, "a", "b*c", "q", "q_dot", "sin(q)", "t", number(r), "a/(b-c)", "where(q<a,b,c)"))
+                return r.choice(
+                    (1, 0.5, "a", "b*c", "q", "q_dot", "sin(q)", "t", number(r), "a/(b-c)", "where(q<a,b,c)")
+                )
             if name in ("marker", "pair") or "marker" in name:
                 one = lambda: r.choice(("ground", *self.POOLS, "rod.a", {"body": "arm", "at": [1, 0, 0]}))  # noqa: E731
                 return [one(), one()] if name == "pair" else one()

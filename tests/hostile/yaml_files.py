@@ -27,9 +27,47 @@ from .words import TEXTS
 #: What is done with a text -> of 1000 texts, how many.  Each does what those before it do.
 STAGES = {"build": 940, "check": 50, "compile": 10}
 PUNCTUATION = (
-    "{", "}", "[", "]", ":", ",", "#", "&a ", "*a", "!x ", "!!python/object/apply:os.system [\"touch CANARY\"]", "!!binary ", "|", ">", "\t", "\x00", "\ufeff", "\x85", "\u2028",
-    "---\n", "...\n", "%YAML 1.1\n", "%TAG ! x\n", "\"", "'", "? ", "- ", "<<: ", "\r", "\x0b", "@", "`", "|+9\n", ">-0\n", "\\", "? [a, b]\n: c\n", "!<tag:yaml.org,2002:float> ", "\"\\ud83d\\ude00\"", "\"\\x00\"", "\"\\N\"",
-)  # fmt: skip
+    "{",
+    "}",
+    "[",
+    "]",
+    ":",
+    ",",
+    "#",
+    "&a ",
+    "*a",
+    "!x ",
+    '!!python/object/apply:os.system ["touch CANARY"]',
+    "!!binary ",
+    "|",
+    ">",
+    "\t",
+    "\x00",
+    "\ufeff",
+    "\x85",
+    "\u2028",
+    "---\n",
+    "...\n",
+    "%YAML 1.1\n",
+    "%TAG ! x\n",
+    '"',
+    "'",
+    "? ",
+    "- ",
+    "<<: ",
+    "\r",
+    "\x0b",
+    "@",
+    "`",
+    "|+9\n",
+    ">-0\n",
+    "\\",
+    "? [a, b]\n: c\n",
+    "!<tag:yaml.org,2002:float> ",
+    '"\\ud83d\\ude00"',
+    '"\\x00"',
+    '"\\N"',
+)
 SUMMARY = re.compile(r"Traceback|(?:Runtime|Syntax|Deprecation|User|Future)Warning: ")
 
 
@@ -39,6 +77,7 @@ class YamlFiles:
     name = "yaml"
     programs: frozenset[str] = frozenset()
     refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
         self.texts = [path.read_text() for path in sorted((PACKAGE.parent / "examples").glob("*.yaml"))]
@@ -50,7 +89,9 @@ class YamlFiles:
         self.weights = [1.0 / len(text) for text in self.texts]
         schema = model_schema()
         self.schema = Schema(schema)
-        self.keys = sorted({key for tree in self.trees for place in paths(tree) for key in place if isinstance(key, str)})
+        self.keys = sorted(
+            {key for tree in self.trees for place in paths(tree) for key in place if isinstance(key, str)}
+        )
         self.types = sorted(set(_constants(schema)))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -73,6 +114,9 @@ class YamlFiles:
             with contextlib.suppress(KeyError, TypeError, IndexError):
                 change(tree, r, self.trees, self.keys, self.types)
         return {"stage": stage, "text": yaml_text(tree, r)}
+
+    def build(self, case: Any) -> Any:
+        return case
 
     def run(self, case: Any, folder: Path) -> str:
         text, stage = case["text"], case["stage"]
@@ -148,7 +192,9 @@ def broken(text: str, r: random.Random) -> str:
     elif k == 4:
         return text[:at] + text[at + r.choice((1, 2, 5, 50, 500)) :]
     elif k == 5:
-        sign = chr(r.choice((r.randrange(32, 127), r.randrange(32), r.randrange(0x80, 0x3000), 0x1F600, 0xFFFE, 0xD800)))
+        sign = chr(
+            r.choice((r.randrange(32, 127), r.randrange(32), r.randrange(0x80, 0x3000), 0x1F600, 0xFFFE, 0xD800))
+        )
         return text[:at] + sign + text[at + 1 :]
     elif k == 6:
         return text[:at]
@@ -160,7 +206,7 @@ def broken(text: str, r: random.Random) -> str:
             bomb += f"{this}: &{this} [{','.join(['*' + last] * 9)}]\n"
         return bomb + text if r.random() < 0.5 else f"{text}\n{bomb}"
     elif k == 9:
-        return f"{text}\nx: " + r.choice("[{-\"") * r.choice((5, 20, 500, 5000))
+        return f"{text}\nx: " + r.choice('[{-"') * r.choice((5, 20, 500, 5000))
     elif k == 10:
         return text[:at] + r.choice(TEXTS) + text[at:]
     else:
@@ -172,11 +218,37 @@ def broken(text: str, r: random.Random) -> str:
 
 #: Models of few lines, so that most of the time goes into what is hostile about a case.
 SMALL = {
-    "lagrangian": "name: made\nparameters: {m: 1, k: 2}\nlagrangian: {coordinates: [q], expression: m*q_dot**2/2 - k*q**2/2}\ninitial: {q: 1}\n",
-    "pendulum": "name: made\ngravity: [0, -9.81, 0]\nbodies: {bob: {mass: 1, com: [0, -0.5, 0]}}\njoints: {hinge: {type: revolute, between: [ground, bob], coordinate: q}}\noutputs: {h: y(bob)}\n",
-    "spring": "name: made\nparameters: {k: 3, c: 0.1}\ninputs: {u: 0}\nbodies: {bob: {mass: 2}}\njoints: {slide: {type: prismatic, between: [ground, bob], axis: x, coordinate: q}}\n"
-    "forces: {s: {type: spring, between: [{body: ground, at: [0, 1, 0]}, bob], stiffness: k, length: 0.5}, d: {type: torque, joint: slide, value: u - c*q_dot}}\nevents: {e: {expression: q - 1, terminal: true}}\n",
-    "equations": "name: made\nparameters: {m: 1}\nequations: {coordinates: [q], mass_matrix: [[m]], forcing: [-q]}\ninitial: {q: 1}\n",
-    "table": "name: made\nfunctions: {f: {type: table, x: [0, 1, 2], y: [0, 1, 0]}}\nbodies: {bob: {mass: 1}}\njoints: {slide: {type: prismatic, between: [ground, bob], coordinate: q}}\nforces: {d: {type: torque, joint: slide, value: f(q)}}\n",
-}  # fmt: skip
+    "lagrangian": """name: made
+parameters: {m: 1, k: 2}
+lagrangian: {coordinates: [q], expression: m*q_dot**2/2 - k*q**2/2}
+initial: {q: 1}
+""",
+    "pendulum": """name: made
+gravity: [0, -9.81, 0]
+bodies: {bob: {mass: 1, com: [0, -0.5, 0]}}
+joints: {hinge: {type: revolute, between: [ground, bob], coordinate: q}}
+outputs: {h: y(bob)}
+""",
+    "spring": """name: made
+parameters: {k: 3, c: 0.1}
+inputs: {u: 0}
+bodies: {bob: {mass: 2}}
+joints: {slide: {type: prismatic, between: [ground, bob], axis: x, coordinate: q}}
+forces:
+  s: {type: spring, between: [{body: ground, at: [0, 1, 0]}, bob], stiffness: k, length: 0.5}
+  d: {type: torque, joint: slide, value: u - c*q_dot}
+events: {e: {expression: q - 1, terminal: true}}
+""",
+    "equations": """name: made
+parameters: {m: 1}
+equations: {coordinates: [q], mass_matrix: [[m]], forcing: [-q]}
+initial: {q: 1}
+""",
+    "table": """name: made
+functions: {f: {type: table, x: [0, 1, 2], y: [0, 1, 0]}}
+bodies: {bob: {mass: 1}}
+joints: {slide: {type: prismatic, between: [ground, bob], coordinate: q}}
+forces: {d: {type: torque, joint: slide, value: f(q)}}
+""",
+}
 KIND = YamlFiles()

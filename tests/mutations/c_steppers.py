@@ -84,8 +84,8 @@ FAULTS = (
     ),
     Fault(
         "radau-halved", "templates/c/steppers/newton.c",
-        "real[k] = -D - K / g;",
-        "real[k] = -D + K / g;",
+        "plain[k] = -D - K / g;",
+        "plain[k] = -D + K / g;",
         "systems of second order: stiffness has the wrong sign",
         ("tests/emit/test_radau_in_c.py",),
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, runtime
+from mutations import c_drivers, c_steppers, derivation, elements, emitters, numerics, runtime, written
 
 FAULTS = (
     *derivation.FAULTS,
@@ -12,4 +12,5 @@ FAULTS = (
     *c_drivers.FAULTS,
     *c_steppers.FAULTS,
     *runtime.FAULTS,
+    *written.FAULTS,
 )

@@ -1,5 +1,5 @@
-"""The same events through every loop find the same times, states and ends: compiled steppers, SciPy's methods, the NumPy
-target, an exported package, IDA, ensembles, sensitivities; and no loop ends early in silence."""
+"""The same events through every loop find the same times, states and ends: compiled steppers, SciPy's methods, the
+NumPy target, an exported package, IDA, ensembles, sensitivities; and no loop ends early in silence."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from ... import pipeline
 from ...describe.model import Model
 from ...equations import METHODS
 from ...errors import EomgenError, ToolchainError, UsageError
+from ...numeric import algebra
 from ..finding import Finding
 from .compare import Worst, compare_module, refused, states_of
 from .frames import values_of
@@ -63,13 +64,13 @@ def _independent(check: str, model: Model, original: Original, random: Any) -> F
     if not own.n_rows or not own.n_dof or own.n_q != own.n_v:
         return Finding.skipped(check, "there is no choice of independent coordinates")
     rows = np.atleast_2d(own.constraint_jacobian(original.states[: own.n_q, 0], rows="all"))
-    basis = np.linalg.svd(rows)[2][-own.n_dof :].T
+    basis = algebra.svd(rows)[2][-own.n_dof :].T
     best, chosen = 0.0, tuple[int, ...]()
     for _ in range(20):
         picked = tuple(sorted(random.permutation(own.n_q)[: own.n_dof].tolist()))
         if picked == tuple(own.layout.independent.tolist()):
             continue
-        least = float(np.linalg.svd(basis[list(picked)], compute_uv=False).min())
+        least = float(algebra.singular_values(basis[list(picked)]).min())
         if least > best:
             best, chosen = least, picked
     if best < 1e-3:

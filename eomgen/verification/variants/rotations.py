@@ -9,6 +9,7 @@ import numpy as np
 
 from ...describe.description import Description, Entry
 from ...describe.fields import SEQUENCES
+from ...numeric import algebra
 from .turns import matrix_of
 from .variant import NotApplicable, References, States, Variant, coordinates_of, drop
 from .visit import copied
@@ -125,7 +126,7 @@ def _change(made: Description, entry: Entry, names: Sequence[str], place: int, r
         if not after:
             return dict(zip([*new, *spins], [*parameters_of(turn), *spin], strict=True))
         angles = angles_of(after, turn)
-        rates = np.linalg.solve(of_angles(after, angles)[1], spin)
+        rates = algebra.solve(of_angles(after, angles)[1], spin)
         return dict(zip([*new, *(name + "_dot" for name in new)], [*angles, *rates], strict=True))
 
     rough = {name: float(x) for name, x in follow(start).items() if name in new} if known else {}

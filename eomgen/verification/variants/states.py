@@ -18,6 +18,7 @@ from ...describe.description import Description
 from ...describe.model import Model
 from ...errors import EomgenError
 from ...limits.rounding import EPS
+from ...numeric import algebra
 from ...numeric.scales import Array
 from ...records import dataclass
 from .frames import length_of
@@ -178,7 +179,7 @@ def relative_limit(module: Any, x: Array, description: Description, length: floa
     if module.n_rows:
         rows = np.atleast_2d(module.constraint_jacobian(q, rows="all")) * s_v
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
-        singular = np.linalg.svd(rows / np.where(lengths > 0, lengths, 1.0), compute_uv=False)
+        singular = algebra.singular_values(rows / np.where(lengths > 0, lengths, 1.0))
         kept = singular[singular > 1e-9 * singular.max(initial=0.0)]
         condition *= float(kept.max() / kept.min()) if kept.size else 1.0
     slopes = np.abs(J[module.n_q : module.n_q + module.n_v])
@@ -194,5 +195,5 @@ def _condition(matrix: Array) -> float:
     """Condition of a symmetric matrix after its diagonal is scaled to 1."""
     root = np.sqrt(np.abs(np.diag(matrix)))
     scaled = matrix / np.where(root > 0, root, 1.0) / np.where(root > 0, root, 1.0)[:, None]
-    values = np.abs(np.linalg.eigvalsh(scaled))
+    values = np.abs(algebra.eigvalsh(scaled))
     return float(values.max() / values.min()) if values.min() > 0 else np.inf

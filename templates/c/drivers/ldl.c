@@ -31,7 +31,7 @@ static int pivot_lost(double d, double size, double largest)
    or of a zero beside the largest. */
 static int ldl_factor(const double *restrict B, const double *restrict mass, double *restrict a)
 {
-    double sizes[F + !F];
+    double sizes[F + 1]; /* of none too */
     const double largest = embedded_sizes(B, mass, sizes);
     for (int j = 0; j < F; j++) {
         double d = a[j * F + j];

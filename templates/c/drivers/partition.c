@@ -1,8 +1,8 @@
 /* Which coordinates follow from which: dependent[j] from row[j] of the constraints; the others are independent. */
 typedef struct {
-    int dependent[N + !N];
-    int row[N + !N];
-    int independent[N + !N];
+    int dependent[N + 1];
+    int row[N + 1];
+    int independent[N + 1];
     double weakest; /* smallest of the best pivots, relative to the first: of the size of the smallest singular value */
 } partition;
 
@@ -27,7 +27,7 @@ static void form_rows(const double *restrict J, const double *restrict column, i
 static int split(int width, int strict, partition *restrict parts, double *restrict w)
 {
     double *const a = w + AT_ROWS;
-    int spent[M] = {0}, taken[N + !N] = {0}, best[M][2], changed[M], count = 0;
+    int spent[M + 1] = {0}, taken[N + 1] = {0}, best[M + 1][2], changed[M + 1], count = 0;
     double size = 0.0;
     for (int i = 0; i < M; i++) {
         changed[i] = 1;

@@ -3,7 +3,7 @@
    rounding of its own entry, or is what rounding leaves of a zero. */
 static int tree_factor(double *restrict H, const double *restrict s)
 {
-    double largest = 0.0, own[N + !N];
+    double largest = 0.0, own[N + 1];
     for (int k = 0; k < N; k++) {
         own[k] = fabs(H[k * (k + 1) / 2 + k]);
         const double entry = own[k] * s[k] * s[k];

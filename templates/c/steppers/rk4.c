@@ -62,5 +62,5 @@ const eomgen_method eomgen_rk4 = {"RK4", 4, 3, 4, rk4_attempt, rk4_error, rk4_pr
 int eomgen_march(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
     double *out, double *w, double *k)
 {
-    return rk4_step(rhs, n, t, h, x, u, c, out, w, k);
+    return step_by_rk4(rhs, n, t, h, x, u, c, out, w, k);
 }

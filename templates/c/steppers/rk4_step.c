@@ -1,6 +1,6 @@
 /* One classical Runge-Kutta step of size h from x at time t into out, which may be x: for real time, where each step must
    cost the same. k: 5 n doubles of work. Nothing is allocated; the status of the first evaluation that fails. */
-static int rk4_step(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
+static int step_by_rk4(eomgen_function rhs, int n, double t, double h, const double *x, const double *u, const double *c,
     double *out, double *w, double *k)
 {
     static const double at[4] = {0.0, 0.5, 0.5, 1.0};

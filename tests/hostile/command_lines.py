@@ -1,0 +1,227 @@
+"""Hostile command lines: every verb of ``eomgen`` with odd options, values and files, run in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from eomgen.cli.command import VERBS, run_command
+from eomgen.cli.command import eomgen as group
+
+from .kind import Wrong, fewer
+from .words import NUMBERS, TEXTS
+from .yaml_files import SMALL
+
+#: Not attacked here: the doctor compiles, a cluster starts processes, compiled targets take half a minute.
+NO_VERBS, NO_OPTIONS = ("doctor",), ("--cluster", "--target", "--help", "-h")
+#: Files that every case finds in its folder.
+FILES = {
+    "model.yaml": SMALL["pendulum"],
+    "spring.yaml": SMALL["spring"],
+    "broken.yaml": "name: [",
+    "empty.yaml": "",
+    "odd.yaml": "name: odd\nbodies: {b: {mass: x}}\n",
+    "cases.csv": "q,q_dot\n0.1,0\n0.2,x\n",
+    "binary.yaml": "\x00\x01\x02",
+    "robot.urdf": "<robot name='r'><link name='a'/></robot>",
+    "other.txt": "text",
+}
+PATHS = (
+    *FILES,
+    "none.yaml",
+    "out.npz",
+    "out.csv",
+    "full.csv",
+    "out.yaml",
+    "out.png",
+    "out",
+    ".",
+    "..",
+    "",
+    "sub/none/out.csv",
+    "a" * 300 + ".csv",
+    "\x00",
+    "é.csv",
+    "-",
+    "--json",
+    "\ud800.csv",
+    "\udc80.csv",
+)
+WORDS = (
+    *(
+        "q",
+        "q_dot",
+        "u",
+        "k",
+        "h",
+        "t",
+        "x",
+        "nothing",
+        "q=1",
+        "q=",
+        "=1",
+        "q=nan",
+        "q=1e400",
+        "q=1=2",
+        "k=-1",
+        "k=0",
+        "u=sin(t)",
+        "u=9**9**9",
+    ),
+    *(
+        "q=0:1:3",
+        "q=1:0",
+        "q=0:1:0",
+        "q=0:1:-1",
+        "q=0:0:2",
+        "q=nan:1:2",
+        "q=0:inf:2",
+        "q=a:b:c",
+        "t=0:0.1:3",
+        "0,0",
+        "1,2",
+        "-1,1",
+        "a,b",
+        "1",
+    ),
+    *(
+        "embedding",
+        "lagrange",
+        "hamilton",
+        "augmented",
+        "recursive",
+        "auto",
+        "DOP853",
+        "RK4",
+        "Radau",
+        "LSODA",
+        "BDF",
+        "Taylor",
+        "foo",
+    ),
+)
+#: Large numbers rightly take long where they count; these do not.
+COUNTS = ("0", "-1", "1", "2", "3", "1.5", "nan", "inf", "", "x", "1e3", "٣", "1_0")
+TIMES = ("0.01", "0.02", "0", "-1", "nan", "inf", "1e-300", "5e-324", "", "x", "0x1", "1e400")
+NUMERIC = re.compile(r"end|step|rtol|atol|count|samples|states|seed|seconds|threads|time")
+TRACE = re.compile(r"Traceback|(?:Runtime|Syntax|Deprecation|User|Future)Warning: ")
+
+
+class CommandLines:
+    """A verb, a file, options."""
+
+    name = "command_lines"
+    programs: frozenset[str] = frozenset()
+    refusals: tuple[type[Exception], ...] = ()
+    unjudged: tuple[type[Warning], ...] = ()
+
+    def prepare(self, folder: Path) -> None:
+        os.environ["MPLCONFIGDIR"] = str(folder)
+        self.options: dict[str, list[click.Option]] = {}
+        for verb in VERBS:
+            command = group.get_command(click.Context(group), verb)
+            assert command is not None
+            self.options[verb] = [p for p in command.params if isinstance(p, click.Option)]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for words in (
+                ["run", "model.yaml", "--plot", "a.png"],
+                ["run", "model.yaml", "--out", "a.csv"],
+                ["verify", "model.yaml", "--seconds", "1"],
+                ["modes", "model.yaml"],
+                ["check", "model.yaml", "--graph", "b.png"],
+            ):
+                files(Path.cwd())
+                self.answer([*words, "--target", "numpy"] if words[0] != "check" else words, Path.cwd())
+
+    def make(self, r: random.Random) -> dict[str, Any]:
+        if r.random() < 0.03:
+            return {"words": [r.choice((*TEXTS, *VERBS, "--help", "--version", "-x")) for _ in range(r.randint(0, 4))]}
+        verb = r.choice([v for v in VERBS if v not in NO_VERBS])
+        words = [verb]
+        if r.random() < 0.95:
+            words.append(r.choice(("model.yaml", "model.yaml", "spring.yaml", "spring.yaml", r.choice(PATHS))))
+        known = [o for o in self.options[verb] if not set(o.opts) & set(NO_OPTIONS)]
+        for option in r.choices(known, k=r.choice((0, 1, 1, 2, 2, 3, 5))) if known else ():
+            words.append(r.choice(option.opts))
+            if not option.is_flag or r.random() < 0.02:
+                words += [value(option, r) for _ in range(option.nargs)]
+        for _ in range(r.choice((0, 0, 0, 1))):
+            words.insert(r.randint(1, len(words)), r.choice((*TEXTS, *PATHS, *WORDS, "--json", "--set", "--")))
+        has = {name for o in self.options[verb] for name in o.opts}
+        if "--target" in has:
+            words[1:1] = ["--target", "numpy"]
+        if "--seconds" in has:
+            words[1:1] = ["--seconds", "0.5"]
+        if "--end" in has and r.random() < 0.9:
+            words += ["--end", "0.02"]
+        # what lies elsewhere is the user's own business
+        return {"words": [word for word in words if not word.startswith("/") and ".." not in word]}
+
+    def build(self, case: Any) -> Any:
+        files(Path.cwd())
+        return case["words"]
+
+    def run(self, given: Any, folder: Path) -> str:
+        return self.answer(given, folder)
+
+    def answer(self, words: list[str], folder: Path) -> str:
+        """Run it with a cache of its own."""
+        kept = os.environ["EOMGEN_CACHE_DIR"]
+        os.environ["EOMGEN_CACHE_DIR"] = str(Path(kept) / "lines")
+        out, err = io.StringIO(), io.StringIO()
+        try:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                code: Any = run_command(words)
+        except SystemExit as end:
+            code = end.code
+        finally:
+            os.environ["EOMGEN_CACHE_DIR"] = kept
+        if code not in (0, 1, 2, 3, 4, 5):
+            raise Wrong(f"exit code {code}: {err.getvalue()[-300:]}")
+        if code and not err.getvalue().strip():
+            raise Wrong(f"exit code {code} without a message")
+        if TRACE.search(err.getvalue()):
+            raise Wrong(f"stderr holds a traceback or a warning: {err.getvalue()[-300:]}")
+        if code == 0 and words[-1:] == ["--json"] and "--help" not in words and "-h" not in words:
+            try:
+                json.loads(out.getvalue())
+            except ValueError as error:
+                raise Wrong(f"--json prints no JSON: {error}") from None
+        return f"exit {code}"
+
+    def smaller(self, case: Any) -> Iterator[Any]:
+        yield from ({"words": words} for words in fewer(case["words"]))
+
+
+def files(folder: Path) -> None:
+    """Make the files that every case finds; one is a full disk."""
+    for name, text in FILES.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    (folder / "sub").mkdir(exist_ok=True)
+    if not os.path.lexists(folder / "full.csv"):
+        (folder / "full.csv").symlink_to("/dev/full")
+
+
+def value(option: click.Option, r: random.Random) -> str:
+    """A value of an option: of its choices, its kind, or anything."""
+    if isinstance(option.type, click.Choice) and r.random() < 0.8:
+        return str(r.choice(list(option.type.choices)))
+    if isinstance(option.type, click.Path) or option.name in ("out", "plot", "cases", "store"):
+        return r.choice(PATHS)
+    if NUMERIC.search(str(option.name)):
+        return r.choice(TIMES if option.name in ("end", "time", "step", "rtol", "atol") else COUNTS)
+    return r.choice((*WORDS, *WORDS, *NUMBERS, *TEXTS))
+
+
+KIND = CommandLines()

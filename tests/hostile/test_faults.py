@@ -1,0 +1,25 @@
+"""A few faults of every kind; ``python -m hostile.faults`` tries all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hostile.fault_work import Work
+from hostile.faults import FAULTS
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> Iterator[Work]:
+    from conftest import CACHE
+
+    return Work(tmp_path_factory.mktemp("faults"), Path(pytestconfig.stash[CACHE]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in FAULTS if name != "damaged Cython layer"])
+def test_every_fault_is_survived(work: Work, name: str) -> None:
+    results = list(FAULTS[name](work, True))
+    assert results
+    assert [result for result in results if not result.survived] == []

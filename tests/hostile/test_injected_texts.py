@@ -1,0 +1,258 @@
+"""Every nasty text in every text field of a model, written in every language: it stays a text, and stays the same."""
+
+from __future__ import annotations
+
+import ast
+import html.parser
+import json
+import re
+import subprocess
+import tomllib
+from typing import Any
+
+import pytest
+from hostile.held_texts import PLACES, assert_held, described, equations_of, files_of, model_of, text_fields
+from hostile.nasty_texts import CLOSERS, NASTY
+from ruamel.yaml import YAML
+
+import eomgen as eg
+from eomgen import pipeline, texts
+from eomgen.describe.yaml_file import describe_yaml
+from eomgen.emit import emit_package
+
+
+def test_every_text_field_is_among_those_that_are_filled() -> None:
+    assert len(NASTY) >= 60
+    assert set(text_fields()) == set(PLACES)
+    filled = json.dumps(described("nasty"))
+    assert filled.count('"nasty"') == sum(place is not None for place in PLACES.values())
+
+
+# -- C ----------------------------------------------------------------------------------------------------------------
+#: The characters of the metadata, numbers alone.
+METADATA = re.compile(r"metadata_text\[\] = \{([0-9,\s]*)\};")
+
+
+def code_of(text: str) -> str:
+    """What is left of C after trigraphs, joined lines, comments and literals are gone."""
+    for pair in ("=#", "/\\", "'^", "([", ")]", "!|", "<{", ">}", "-~"):
+        text = text.replace(f"??{pair[0]}", pair[1])
+    text = re.sub(r"\\[ \t\v\f]*(\r\n|\n|\r)", "", text)
+    return re.sub(r"/\*.*?\*/|//[^\n]*|\"(\\.|[^\"\\\n])*\"|'(\\.|[^'\\\n])+'", " ", text, flags=re.DOTALL)
+
+
+@pytest.mark.parametrize("key", NASTY)
+def test_c_holds_the_text_as_comment_and_data_only(key: str) -> None:
+    name = f"m{list(NASTY).index(key)}"
+    reference = dict(emit_package(pipeline.build(model_of(described("", name)).derive(), "c"), "c"))
+    for file, text in files_of(key, "c").items():
+        if file.endswith((".c", ".h")):
+            assert text.isascii(), file
+            assert text.replace("\n", "").isprintable(), file
+            assert code_of(METADATA.sub("", text)).split() == code_of(METADATA.sub("", reference[file])).split(), file
+        elif file == "Makefile":
+            assert text == reference[file]
+        elif file == "README.md":
+            assert texts.visible(text) == text
+            assert not re.search(r"<(?!stdio\.h>|U\+)[a-zA-Z/!?]", text)
+    data = METADATA.search(files_of(key, "c")[f"{name}.c"])
+    assert data is not None
+    assert_held(json.loads(bytes(map(int, data[1].replace("\n", "").strip(" ,").split(",")[:-1]))), NASTY[key])
+
+
+def test_a_compiler_takes_every_header_without_a_warning(tmp_path: Any) -> None:
+    lines = []
+    for k, key in enumerate(NASTY):
+        for file in (f"m{k}.h", "eomgen.h"):
+            (tmp_path / file).write_text(files_of(key, "c")[file], encoding="utf-8")
+        lines.append(f'#include "m{k}.h"\n')
+    (tmp_path / "all.c").write_text("".join(lines) + "int done;\n")
+    for standard in ("-std=c99", "-std=gnu17"):
+        words = [
+            standard,
+            "-trigraphs",
+            "-Wall",
+            "-Wextra",
+            "-Wcomment",
+            "-Wpedantic",
+            "-Werror",
+            "-fsyntax-only",
+            "all.c",
+        ]
+        done = subprocess.run(["gcc", *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr[:1000]
+
+
+def test_a_compiler_takes_whole_libraries_without_a_warning(tmp_path: Any) -> None:
+    keys = [key for key in CLOSERS if "end" in key][::3]
+    for key in keys:
+        for file, text in files_of(key, "c").items():
+            (tmp_path / file).write_text(text, encoding="utf-8")
+    sources = [f"m{list(NASTY).index(key)}.c" for key in keys]
+    words = ["-std=c99", "-trigraphs", "-Wall", "-Wextra", "-Wcomment", "-Werror", "-fsyntax-only"]
+    done = subprocess.run(["gcc", *words, *sources], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:1000]
+
+
+# -- Python packages --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("key", NASTY)
+def test_packages_hold_the_text_as_strings_only(key: str, target: str) -> None:
+    text, found = NASTY[key], files_of(key, target)
+    for file in (
+        "__init__.py",
+        "__init__.pyi",
+        "selftest.py",
+        *(("setup.py",) if target == "cython" else ("_core.py",)),
+    ):
+        assert found[file].isascii()
+        assert found[file].replace("\n", "").isprintable()
+        tree = ast.parse(found[file], file)
+        calls = [ast.unparse(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        assert not any("import" in call or "abort" in call for call in calls)
+        if file == "__init__.py":
+            assert text.strip() in (ast.get_docstring(tree, clean=False) or "")
+    assert_held(json.loads(found["model.json"]), text)
+    if target == "numpy":
+        namespace = next(n for n in ast.parse(found["_core.py"]).body if isinstance(n, ast.Assign))
+        assert_held(json.loads(ast.literal_eval(namespace.value)), text)
+    project = tomllib.loads(found["pyproject.toml"])
+    assert set(project) == {"build-system", "project", "tool"}
+    assert project["project"]["description"].isprintable()
+    assert len(project["project"]["description"]) <= 500
+    assert not {"scripts", "entry-points"} & set(project["project"])
+    readme = found["README.md"]
+    assert texts.visible(readme) == readme
+    assert not re.search(r"<(script|img|svg|b|!|/|\?)", re.sub(r"`[^`\n]*`", "", readme))
+
+
+def test_a_package_with_every_text_installs_and_runs(tmp_path: Any) -> None:
+    import sys
+
+    text = "\n".join(NASTY[key] for key in NASTY if not key.startswith("long"))
+    model = model_of(described(text, "everything"))
+    folder = pipeline.generate(model, tmp_path, target="numpy")
+    target = tmp_path / "installed"
+    words = ["pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(target), str(folder)]
+    done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    code = "import json, everything as m; m.rhs(0.0, m.x0()); print(json.dumps(m.metadata['doc']))"
+    run = subprocess.run([sys.executable, "-c", code], cwd=target, capture_output=True, text=True, check=True)
+    assert json.loads(run.stdout) == text
+    check = subprocess.run([sys.executable, "-m", "everything.selftest"], cwd=target, capture_output=True, check=False)
+    assert check.returncode == 0
+
+
+@pytest.mark.parametrize("key", ["joined end", "trigraph end", "NUL", "wide"])
+def test_a_compiled_module_holds_the_text(key: str) -> None:
+    module = equations_of(key).compile(kernels=["rhs", "energy"])
+    assert_held(module.metadata, NASTY[key])
+    assert module.doc == NASTY[key]
+    assert module.energy(module.x0()).shape == (2,)
+
+
+# -- pages, pictures, terminals ----------------------------------------------------------------------------------------
+class Tags(html.parser.HTMLParser):
+    """Names of all elements, comments and instructions of a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: set[str] = set()
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags |= {tag, *(name for name, _ in attrs if name not in ("style", "colspan"))}
+
+    def handle_comment(self, data: str) -> None:
+        self.tags.add("comment")
+
+    def handle_decl(self, decl: str) -> None:
+        self.tags.add("declaration")
+
+    handle_pi = unknown_decl = handle_decl
+
+
+@pytest.mark.parametrize("key", NASTY)
+def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str) -> None:
+    equations = equations_of(key)
+    module = equations.compile(target="numpy", kernels=["rhs"])
+    model = model_of(described(NASTY[key]))
+    for page in (model._repr_html_(), module._repr_html_(), equations._repr_html_(), equations.report._repr_html_()):
+        assert texts.visible(page) == page
+        assert Tags(page).tags <= {"table", "tr", "td", "th", "b", "p", "pre"}
+    for shown in (str(model), repr(model), str(module), repr(module), str(equations), str(equations.report)):
+        assert texts.visible(shown) == shown
+    assert_held(module.metadata, NASTY[key])
+
+
+@pytest.mark.parametrize("key", NASTY)
+def test_a_model_file_that_is_written_reads_back_the_text(key: str) -> None:
+    text = NASTY[key]
+    written = model_of(described(text)).to_yaml()
+    assert texts.visible(written) == written
+    data = YAML(typ="safe", pure=True).load(written)
+    assert data["doc"] == text if text else "doc" not in data
+    assert data["bodies"]["rod"]["display"][0]["file"] == text
+    again = eg.Model.from_description(describe_yaml(written))
+    assert again.to_yaml() == written
+    assert again.mechanism().doc == text
+
+
+def test_pictures_are_whole_and_hold_no_element_of_a_text(tmp_path: Any) -> None:
+    import xml.etree.ElementTree as ET
+
+    from matplotlib.figure import Figure
+
+    for key in (
+        "HTML",
+        "dollar",
+        "two dollars",
+        "dollars",
+        "LaTeX",
+        "XML",
+        "NUL",
+        "C1",
+        "colours",
+        "directions",
+        "HTML comment end",
+    ):
+        run = equations_of(key).compile(target="numpy", kernels=["rhs", "outputs", "events"]).simulate((0, 0.05))
+        axes = Figure().add_subplot()
+        run.plot("y", ax=axes)
+        label = axes.get_ylabel()
+        assert label == f"y ({texts.visible(NASTY[key], lines=False)})"
+        axes.figure.savefig(tmp_path / "y.svg")
+        found = {part.tag.rpartition("}")[2] for part in ET.parse(tmp_path / "y.svg").iter()}
+        assert not found & {"script", "img", "b", "foreignObject", "image"}
+
+
+def on_the_command_line(capfd: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    from eomgen.cli import main
+
+    with pytest.raises(SystemExit) as left:
+        main([str(word) for word in words])
+    captured = capfd.readouterr()
+    assert texts.visible(captured.out) == captured.out
+    assert texts.visible(captured.err) == captured.err
+    return int(left.value.code or 0), captured.out, captured.err
+
+
+def test_nothing_of_a_text_drives_the_terminal(
+    tmp_path: Any, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = "\n".join(NASTY[key] for key in NASTY if not key.startswith("long"))
+    (tmp_path / "held.yaml").write_text(json.dumps(described(text)))
+    for words in (["check"], ["derive"], ["run", "--target", "numpy", "--end", "0.01"], ["convert"]):
+        assert on_the_command_line(capfd, words[0], "held.yaml", *words[1:])[0] == 0
+    code, out, _ = on_the_command_line(capfd, "check", "held.yaml", "--json")
+    assert (code, json.loads(out)["name"]) == (0, "held")
+    assert on_the_command_line(capfd, "generate", "held.yaml", "--out", "made", "--target", "numpy")[0] == 0
+    assert not (tmp_path / "touch").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["held.yaml", "made"]
+    for name in ("colours", "directions", "C1"):
+        (tmp_path / "bad.yaml").write_text(json.dumps({**described(""), "name": NASTY[name]}))
+        assert on_the_command_line(capfd, "check", "bad.yaml")[0] == 1
+        assert on_the_command_line(capfd, "check", NASTY[name])[0] == 2
+        assert on_the_command_line(capfd, "run", "held.yaml", "--target", NASTY[name])[0] == 2
