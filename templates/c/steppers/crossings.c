@@ -48,7 +48,7 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 {
     const double a = ev->g[i], b = ev->g_new[i], h = fabs(run->step), s = a > 0.0 ? 1.0 : -1.0;
     const double da = run->direction * s * ev->slope[i] * h, db = run->direction * s * ev->slope_new[i] * h;
-    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= RESTING * RUNS_TOUCHED * ev->size[i]) {
+    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= (double)RESTING * RUNS_TOUCHED * ev->size[i]) {
         return 0;
     }
     const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
