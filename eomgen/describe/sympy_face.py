@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError
-from ..graph.shown import quoted
+from ..graph.shown import parts_of, quoted
 
 if TYPE_CHECKING:
     from ..graph.core import Expr, Graph
@@ -112,15 +112,10 @@ def lower_sympy(graph: Graph, expression: Any, resolve: Resolve) -> Expr:
 
 
 def _parts(expressions: list[Any]) -> Iterator[Any]:
-    """Every part of SymPy expressions, each object once, without recursion: expressions may be deep."""
-    seen: set[int] = set()
-    stack = [expression for expression in expressions if is_sympy(expression)]
-    while stack:
-        part = stack.pop()
-        if id(part) not in seen:  # the expressions keep their parts alive
-            seen.add(id(part))
-            stack += [x for x in part.args if is_sympy(x)]
-            yield part
+    """Every part of the SymPy expressions among the values."""
+    for expression in expressions:
+        if is_sympy(expression):
+            yield from parts_of(expression)
 
 
 def free_names(expressions: list[Any]) -> list[str]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 LONGEST = 120  #: characters of a value in a message
+EXPONENT = 10_000  #: of a number that SymPy may work out
 #: Begins the text of a value that has none: SymPy prints recursively, Python refuses whole numbers of 4300 digits.
 NO_TEXT = "<unprintable "
 
@@ -47,19 +49,31 @@ def _prints(value: Any) -> bool:
     sympy = sys.modules.get("sympy")
     if sympy is None or not isinstance(value, sympy.Basic):
         return not isinstance(value, type)
-    plain = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
+    plain: tuple[Any, ...] = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
     plain += (sympy.Function, sympy.core.relational.Relational, sympy.logic.boolalg.Boolean, sympy.Tuple)
     plain += (sympy.functions.elementary.piecewise.ExprCondPair, sympy.core.symbol.Str)
+    return all(isinstance(part, plain) and not is_tower(part) for part in parts_of(value))
+
+
+def parts_of(value: Any) -> Iterator[Any]:
+    """Every part of a SymPy expression, each object once, without recursion: expressions may be deep."""
     stack: list[Any] = [value]
     seen: set[int] = set()
     while stack:
         part = stack.pop()
-        if id(part) in seen:
+        if id(part) in seen:  # the expression keeps its parts alive
             continue
         seen.add(id(part))
-        if not isinstance(part, plain):
-            return False
-        if isinstance(part, sympy.Pow) and part.exp.is_number and not part.exp.is_Number:
-            return False
-        stack += part.args
-    return True
+        yield part
+        arguments = getattr(part, "args", ())
+        stack += arguments if isinstance(arguments, tuple) else ()  # those of a class are no tuple
+
+
+def is_tower(part: Any) -> bool:
+    """Whether a part of a SymPy expression is a power of numbers too large to work out, such as 9**(9**9)."""
+    sympy = sys.modules["sympy"]
+    if not isinstance(part, sympy.Pow):
+        return False
+    if part.exp.is_Number:
+        return bool(part.base.is_Number and abs(part.exp) > EXPONENT)
+    return bool(part.exp.args) and not any(isinstance(x, sympy.Symbol | sympy.Function) for x in parts_of(part.exp))

@@ -8,7 +8,7 @@ sinh cosh tanh sech csch coth exp log sqrt; Abs sign Min Max Heaviside re im con
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from functools import reduce
 from typing import Any
@@ -21,7 +21,7 @@ from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
 from .core import Expr, Graph
-from .shown import shortened
+from .shown import is_tower, parts_of, shortened
 
 Resolve = Callable[[sympy.Basic], Expr | None]
 Build = Callable[[Graph, Sequence[int]], int]
@@ -226,11 +226,13 @@ def _worked_out(part: Any) -> Any:
 
     Of others (sums, integrals, limits) SymPy searches for a closed form, for any time, and runs texts as code.
     """
-    for inner in _inside(part):
+    for inner in parts_of(part):
         if not isinstance(inner, sympy.Basic):
             raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
         if not (inner.func in BUILD or isinstance(inner, DIFFERENTIABLE)):
             raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {KNOWN}")
+        if is_tower(inner):
+            raise _Fault("the power of numbers is too large")
         orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
         if not all(n.is_Integer for n in orders) or sum(orders) > ORDER:
             raise _Fault(f"derivatives go up to order {ORDER}, a plain number")
@@ -238,17 +240,6 @@ def _worked_out(part: Any) -> Any:
         return part.doit()
     except Exception as error:  # of many classes: the part may be odd in any way
         raise _Fault(f"SymPy cannot work it out ({type(error).__name__})") from None
-
-
-def _inside(part: Any) -> Iterator[Any]:
-    """Every part of an expression, without recursion."""
-    stack, seen = [part], set()
-    while stack:
-        inner = stack.pop()
-        if id(inner) not in seen:
-            seen.add(id(inner))
-            yield inner
-            stack += inner.args if isinstance(inner, sympy.Basic) else ()
 
 
 def _evaluated(part: Any) -> Any:

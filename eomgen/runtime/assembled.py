@@ -22,6 +22,7 @@ class Assembled:
 
     layout: Layout
     n_q: int
+    n_x: int
 
     @np.errstate(all="ignore")
     def x0(

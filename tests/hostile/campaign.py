@@ -20,7 +20,7 @@ from .worker import BEAT, IDLE
 
 BATCH_SECONDS = 5.0  #: aimed at for one batch
 GRACE = 10.0  #: seconds after which a case that outlived its alarm is killed with its process
-SILENCE = 300.0  #: seconds a worker may take to prepare
+SILENCE = 900.0  #: seconds a worker may take to prepare
 RENEWAL = 1 << 30  #: a worker that holds more (bytes) is replaced after its batch
 EACH = 20  #: most findings of one key that are kept as files
 
@@ -98,7 +98,7 @@ class Campaign:
                 return None
             name = min(open_kinds, key=lambda n: (self.next[n] - self.first) / self.parts[n])
             record = self.records[name]
-            rate = record.cases / record.seconds if record.seconds > 0.5 else 20.0
+            rate = record.cases / record.seconds if record.seconds > 0.5 else 4.0
             first, count = self.next[name], max(1, min(left[name], int(rate * BATCH_SECONDS), 50_000))
             self.next[name] += count
             return name, first, count

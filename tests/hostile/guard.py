@@ -65,7 +65,7 @@ FORBIDDEN = [
     "resource.",
     "syslog.",
     "sqlite3.",
-    "fcntl.",
+    "fcntl.ioctl",
     "mmap.",
     "gc.get_objects",
     "code.__new__",

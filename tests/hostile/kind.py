@@ -25,13 +25,13 @@ MODULES = {
 class Kind(Protocol):
     """One kind of attack.
 
-    A case is a text, or a tree of dicts, lists, texts and numbers that JSON can write, so that it can be kept as a file.
+    A case is a text, or a tree of dicts, lists, texts and numbers that JSON can write: it can be kept as a file.
     """
 
     name: str
     #: Programs that the package may start for such a case, by the last part of their path; none for most kinds.
     programs: frozenset[str]
-    #: Exceptions that refuse an argument by Python's own convention (TypeError and ValueError of calls); none for files.
+    #: Exceptions that refuse an argument by Python's own convention: TypeError, ValueError of calls; none for files.
     refusals: tuple[type[Exception], ...]
     #: Warnings that speak of what was built, not of what the package did with it.
     unjudged: tuple[type[Warning], ...]

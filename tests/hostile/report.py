@@ -26,15 +26,16 @@ def progress(campaign: Campaign) -> None:
 
 def summary(campaign: Campaign) -> str:
     """The table, in Markdown; without dates, so that two runs of the same seeds can be compared."""
+    head = ["kind", "cases", *CALM, *FINDINGS, "s in all", "ms each", "worst s (seed)", "most memory (MB)"]
+    how = f"Python {platform.python_version()}, {campaign.jobs} process(es), {campaign.seconds:,.0f} s"
     lines = [
         "# What was attacked, and what came of it",
         "",
-        f"Written by `make fuzz RESULTS=1`: {campaign.cases:,} cases, seeds from {campaign.first}, Python {platform.python_version()}, "
-        f"{campaign.jobs} process(es), {campaign.seconds:,.0f} s.",
-        "A named error is a refusal that says what is wrong; refused means by Python itself, for the arguments of a call.",
+        f"Written by `make fuzz RESULTS=1`: {campaign.cases:,} cases, seeds from {campaign.first}, {how}.",
+        "A named error is a refusal that says what is wrong; refused means by Python, NumPy or SymPy themselves.",
         "",
-        f"| kind | cases | {' | '.join((*CALM, *FINDINGS))} | s in all | ms each | worst s (seed) | most memory (MB) |",
-        f"|---|{'---|' * (5 + len(CALM) + len(FINDINGS))}",
+        f"| {' | '.join(head)} |",
+        f"|{'---|' * len(head)}",
     ]
     lines += [_row(name, record) for name, record in campaign.records.items()]
     if not campaign.findings:
@@ -48,5 +49,6 @@ def summary(campaign: Campaign) -> str:
 def _row(name: str, record: Record) -> str:
     counts = " | ".join(f"{record.outcomes[word]:,}" for word in (*CALM, *FINDINGS))
     each = 1e3 * record.seconds / max(record.cases, 1)
-    worst = f"{record.worst:.2f} ({record.worst_seed})"
-    return f"| {name} | {record.cases:,} | {counts} | {record.seconds:,.0f} | {each:.2f} | {worst} | {record.memory / 2**20:,.0f} |"
+    worst, memory = f"{record.worst:.2f} ({record.worst_seed})", record.memory / 2**20
+    cells = [name, f"{record.cases:,}", counts, f"{record.seconds:,.0f}", f"{each:.2f}", worst, f"{memory:,.0f}"]
+    return f"| {' | '.join(cells)} |"

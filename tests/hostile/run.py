@@ -24,7 +24,7 @@ from .report import RESULTS, progress, summary
 MIX = {
     "expressions": 0.595,
     "yaml": 0.20,
-    "urdf": 0.07,
+    "urdf": 0.085,
     "mjcf": 0.02,
     "meshes": 0.01,
     "calls": 0.06,

@@ -8,6 +8,7 @@ import random
 import re
 import warnings
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +96,12 @@ class YamlFiles:
         self.types = sorted(set(_constants(schema)))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            for library in ("integrate", "interpolate", "linalg", "optimize", "special", "spatial"):
+                import_module(f"scipy.{library}")  # which run texts of their own as they load
             for tree in self.trees[:4]:  # imports whatever deriving and compiling need
-                Model.from_description(describe_yaml(yaml_text(tree, random.Random(0)))).compile(target="numpy")
+                text = yaml_text(tree, random.Random(0))
+                module = Model.from_description(describe_yaml(text)).compile(target="numpy")
+                module.simulate((0.0, 0.01), t_eval=[0.0, 0.01])
 
     def make(self, r: random.Random) -> dict[str, Any]:
         stage = r.choices(list(STAGES), list(STAGES.values()))[0]
