@@ -119,11 +119,12 @@ def fault_of_inertia(
         if moment < -max(DIGITS * size, computed):
             return f"the moment about the centre of mass is {moment:.6g}", SHIFTED
         return None
-    largest = float(np.abs(full).max()) or 1.0
-    a, b, c = algebra.eigvalsh(full / largest) * largest
-    size = max(abs(a), abs(c))
+    unit = float(np.abs(full).max()) or 1.0  # sums of what is large overflow
+    a, b, c = (float(x) for x in algebra.eigvalsh(full / unit))
+    size, computed = max(abs(a), abs(c)), computed / unit
     if a < -max(DIGITS * size, computed):
-        return f"has a negative principal moment {a:.6g}", NEGATIVE
+        return f"has a negative principal moment {a * unit:.6g}", NEGATIVE
     if b > max(MOMENT * size, computed) and c > (1 + TRIANGLE) * (a + b) + computed:
-        return f"principal moments {a:.6g}, {b:.6g}, {c:.6g}: one exceeds the sum of the others", EXCESS
+        shown = ", ".join(f"{x * unit:.6g}" for x in (a, b, c))
+        return f"principal moments {shown}: one exceeds the sum of the others", EXCESS
     return None

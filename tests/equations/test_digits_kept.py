@@ -1,4 +1,4 @@
-"""Masses and lengths that are far apart: what rounding leaves of the accelerations, beside 60 digits, and what is said."""
+"""Masses and lengths that are far apart: what is left of the accelerations, beside 60 digits."""
 
 from __future__ import annotations
 
