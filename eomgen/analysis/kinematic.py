@@ -17,6 +17,7 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
+from ..runtime.room import read_numbers
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -152,7 +153,7 @@ def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, 
         if given.rates:
             raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)
-    q = np.array(initial, dtype=float)
+    q = np.array(read_numbers("initial", initial))
     if q.shape == (layout.n_x,):
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):

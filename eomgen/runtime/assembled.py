@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
 from .layout import Layout, number
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .initial import Initial
@@ -133,7 +134,7 @@ class Assembled:
             coordinates.
         """
         initial = self._initial(t, None, None)
-        here = initial.side(np.asarray(x, dtype=float)[: self.n_q])
+        here = initial.side(read_numbers("x", x)[: self.n_q])
         there = initial.side(initial.reference())
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 
