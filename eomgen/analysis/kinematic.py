@@ -17,7 +17,7 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.room import read_numbers
+from ..runtime.room import read_numbers, require_room
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -50,7 +50,6 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
     UsageError
     """
     from ..runtime.names import unknown
-    from ..runtime.room import require_room
 
     layout = module.layout
     coordinates = layout.q + layout.loops
@@ -93,6 +92,7 @@ def _column(name: str, value: Any) -> Array:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None
+    require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
     return array

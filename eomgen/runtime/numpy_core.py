@@ -259,8 +259,8 @@ def _real(value: object, label: str, error: Any) -> Array:
     if isinstance(value, Mapping):
         raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
     array = np.asarray(value)
-    if array.dtype.kind not in "biufO":
-        raise error(f"{label} must hold real numbers, not {array.dtype}")
+    if array.dtype.kind not in "biufO" or value is None:
+        raise error(f"{label} must hold real numbers, not {array.dtype if value is not None else None}")
     try:
         return array.astype(float, copy=False)
     except (TypeError, ValueError):
