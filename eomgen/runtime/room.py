@@ -21,8 +21,8 @@ def require_room(what: str, numbers: float, remedy: str) -> None:
     """
     if numbers > MOST_NUMBERS:
         raise UsageError(
-            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call keeps {MOST_NUMBERS:.3g} "
-            f"at most; {remedy}"
+            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call keeps "
+            f"{MOST_NUMBERS:.3g} at most; {remedy}"
         )
 
 

@@ -1,4 +1,4 @@
-"""What a call cannot take, keep or end is a named error at once: nothing hangs, fills the memory or ends in a traceback."""
+"""What a call cannot take, keep or end is a named error at once: nothing hangs or fills the memory."""
 
 from __future__ import annotations
 
