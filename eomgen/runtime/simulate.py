@@ -24,7 +24,7 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import read_times, require_room, require_steps
+from .room import read_numbers, read_times, require_room, require_steps
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -388,7 +388,7 @@ def find_state(
         return module.x0(t=t)
     if isinstance(initial, Mapping):
         return module.x0(initial, t=t)
-    x = np.array(initial, dtype=float)
+    x = np.array(read_numbers("initial", initial))
     if x.shape != (module.n_x,):
         names = ", ".join(module.x_names)
         raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")

@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import Named
 from .names import require, unknown
+from .room import read_numbers
 
 if TYPE_CHECKING:
     import pandas
@@ -155,7 +156,7 @@ class Trajectory:
         """
         if self._sample is None:
             raise UsageError("no dense output was kept: simulate with dense_output=True")
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
             raise UsageError(f"times must lie within the run, {low:.6g} .. {high:.6g} s")

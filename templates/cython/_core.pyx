@@ -107,6 +107,16 @@ cdef cnp.ndarray doubles(object value, str label, object error):
     return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)
 
 
+cdef inline double moment(object t, object error) except? -7.0:
+    """The time of a call."""
+    if isinstance(t, float):
+        return t
+    try:
+        return t
+    except TypeError:
+        raise error(f"t must be a real number, not {t!r}") from None
+
+
 cdef cnp.ndarray vector(object value, int n, str label, object error):
     """The value as a contiguous float64 vector of n numbers."""
     cdef cnp.ndarray array = cnp.PyArray_GETCONTIGUOUS(doubles(value, label, error))
@@ -255,7 +265,7 @@ cdef class Kernel:
                 or cnp.PyArray_TYPE(<cnp.ndarray>x) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(<cnp.ndarray>x) != 1
                 or cnp.PyArray_DIM(<cnp.ndarray>x, 0) != self.n_in or not cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x)):
             return self.general(t, [("x", self.n_in, x)], p, u, out)
-        now = t
+        now = moment(t, self.error)
         state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
         if out is None:
             out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
@@ -301,7 +311,7 @@ cdef class Kernel:
         if isinstance(t, (np.ndarray, list, tuple)) and np.ndim(t) > 0:
             held.append(self.read(np.expand_dims(t, 0), 1, "t", &batch.time, &columns))
         else:
-            now = t
+            now = moment(t, self.error)
         batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)
         if u is not None:
             held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))
