@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from . import __version__
 from .derivation import Equations
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
@@ -178,6 +179,7 @@ def check(model: Model) -> MechanismReport:
 @np.errstate(all="ignore")
 def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
+    from .describe.digest import model_digest
     from .program import Limits
     from .program.build import build_program
     from .program.collect import collect_metadata, collect_terms
@@ -190,7 +192,8 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
     strange = bool(idle or kinematics.mechanism.negative)
     if strange and tree.accelerations is not None:
         tree = tree.without_accelerations()  # which divide by pivots before they are looked at
-    metadata = collect_metadata(kinematics, mobility, tree) | {"target": target}
+    made = {"target": target, "model_digest": model_digest(kinematics.mechanism), "eomgen": __version__}
+    metadata = collect_metadata(kinematics, mobility, tree) | made
     limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
     if idle:
         metadata["no_inertia"] = idle

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from html import escape
 
 #: Characters of the generated lines that hold a comment or a literal.
 WIDTH = 114
 #: What Python's docstrings and TOML's strings cannot hold as it is.
-_ESCAPED = re.compile(r'[^ !#-\[\]-~]')
+_ESCAPED = re.compile(r"[^ !#-\[\]-~]")
 #: What a comment cannot hold: all but printable ASCII, and the backslash, which joins lines.
 _OUTSIDE = re.compile(r"[^ -\[\]-~]")
 #: Beginnings and ends of comments, and of trigraphs.
@@ -120,6 +119,8 @@ def markdown_code(text: str) -> str:
 
 def html_text(text: str) -> str:
     """The inside of an element or of an attribute in quotes, of HTML, XML and SVG."""
+    from html import escape  # slow to import
+
     return escape(visible(text), quote=True)
 
 

@@ -23,6 +23,7 @@ from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
+from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -46,7 +47,7 @@ def find_consistent(
     """See :meth:`~..runtime.force_analyses.ForceAnalyses.consistent`."""
     module = module if p is None and u is None else module.bind(p, u)
     layout, t = module.layout, number("t", t)
-    state = np.array(x, dtype=float)
+    state = np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     if layout.given_rates:

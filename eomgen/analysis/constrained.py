@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array, Scales
+from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
     from ..runtime.module import Module
@@ -83,7 +84,7 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         p = layout.values("parameter", layout.p, p, module.p)
     if isinstance(u, Mapping):
         u = layout.values("input", layout.u, u, module.u)
-    state = np.asarray(x, dtype=float)
+    state = read_numbers("x", x)
     if state.shape[:1] != (layout.n_x,) or state.ndim > 2:
         raise UsageError(
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
@@ -91,7 +92,7 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
     single = state.ndim == 1
     columns = state[:, None] if single else state
     try:
-        time = np.asarray(t, dtype=float)
+        time = read_numbers("t", t)
     except (TypeError, ValueError):
         raise UsageError(f"t must be a number or an array of them, not {t!r}") from None
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
@@ -152,7 +153,7 @@ def evaluate(
     states = prepare(module, t, x, p, None if np.ndim(u) == 2 else u)
     if np.ndim(u) != 2:
         return states.shaped(find(states), out)
-    inputs = np.asarray(u, dtype=float)
+    inputs = read_numbers("u", u)
     if states.single or inputs.shape != (module.n_u, len(states.t)):
         raise UsageError(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
     parts = [

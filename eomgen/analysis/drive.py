@@ -24,6 +24,7 @@ from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
+from ..runtime.room import read_numbers
 from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
@@ -227,7 +228,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
                 )
         values = np.zeros((layout.n_v, count))
         for name, value in given.items():
-            values[keys[name]] = np.broadcast_to(np.asarray(value, dtype=float), (count,))
+            values[keys[name]] = np.broadcast_to(read_numbers(name, value), (count,))
         chosen = list(layout.independent)
         result = np.array(free)
         for k, B in enumerate(bases):
@@ -241,7 +242,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
                 )
             result[:, k] += B @ algebra.solve(part, values[chosen, k] - free[chosen, k])
         return result
-    array = np.asarray(a, dtype=float)
+    array = read_numbers("a", a)
     wanted = (layout.n_v,) if states.single else (layout.n_v, count)
     if array.shape != wanted:
         raise UsageError(f"a must have shape {wanted} [{', '.join(layout.a)}], not {array.shape}")

@@ -14,6 +14,7 @@ from ..runtime.analyses import require_velocities
 from ..runtime.initial import Initial
 from ..runtime.layout import number
 from ..runtime.names import unknown
+from ..runtime.room import read_numbers
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
 
@@ -64,13 +65,13 @@ def _start(module: Module, guess: Any, held: Mapping[str, float], t: float) -> A
     """A closed position near the guess that has the held values."""
     initial = Initial(module.kernels, t)
     if guess is None or isinstance(guess, Mapping):
-        values = {name: float(value) for name, value in (guess or {}).items()}
+        values = {name: number(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:
             raise UsageError("a guess is a position: name coordinates, not rates")
         loose = {name: value for name, value in values.items() if name not in held}
         q = initial.from_guess(loose) if loose else initial.assembled({})
     else:
-        q = np.array(guess, dtype=float)
+        q = np.array(read_numbers("guess", guess))
         if q.shape not in ((module.n_q,), (module.n_x,)):
             raise UsageError(f"guess must name coordinates or have shape ({module.n_q},), not {q.shape}")
         q = q[: module.n_q]

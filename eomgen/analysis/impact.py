@@ -20,6 +20,7 @@ from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.layout import Layout, number
+from ..runtime.room import read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import States, conditioned_motions, prepare, solve_multipliers
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
@@ -212,7 +213,7 @@ def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[
     C_q = states.jacobian()
     M = states.evaluate(states.module.mass_matrix, states.q)[..., 0]
     B, condition = conditioned_motions(C_q[0], layout.scales)
-    rows, rates = rows.reshape(-1, layout.n_v), np.asarray(rates, dtype=float)
+    rows, rates = rows.reshape(-1, layout.n_v), read_numbers("rates", rates)
     rest, fixed = _rounding(rows, v, B, condition, layout)
     for i in np.flatnonzero(fixed).tolist():
         if rates[i] < -rest[i] or (i >= len(e) and rates[i] > rest[i]):

@@ -17,6 +17,7 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
+from ..runtime.room import read_numbers, require_room
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -49,7 +50,6 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
     UsageError
     """
     from ..runtime.names import unknown
-    from ..runtime.room import require_room
 
     layout = module.layout
     coordinates = layout.q + layout.loops
@@ -92,6 +92,7 @@ def _column(name: str, value: Any) -> Array:
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None
+    require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
         raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
     return array
@@ -152,7 +153,7 @@ def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, 
         if given.rates:
             raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)
-    q = np.array(initial, dtype=float)
+    q = np.array(read_numbers("initial", initial))
     if q.shape == (layout.n_x,):
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):

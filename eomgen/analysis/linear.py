@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.layout import number
+from ..runtime.room import read_numbers
 from .linear_given import find_given_tangent, refuse_inputs
 from .linearisation import Linearisation
 from .rounding import own_accelerations
@@ -39,7 +40,7 @@ def linearise(
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
     layout, time = module.layout, number("t", t)
-    state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(x, dtype=float)
+    state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
     state = module.project(state, t=time)

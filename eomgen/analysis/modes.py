@@ -19,6 +19,7 @@ from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
+from ..runtime.room import read_numbers
 from .linearisation import Linearisation
 from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
@@ -161,7 +162,7 @@ def find_modes(
     if isinstance(x, Mapping):
         at_rest = not Initial(module.kernels, t).sort(x).rates
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
-    state = np.array(x, dtype=float)
+    state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
         state = np.concatenate([state, np.zeros(module.n_v)])
     linear = module.linearise(state, t, independent=independent)

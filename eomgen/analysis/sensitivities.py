@@ -6,13 +6,13 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import NoDerivativeError, SimulationError
+from ..errors import NoDerivativeError, SimulationError, UsageError
 from ..limits.motions import SINGULAR
 from ..numeric.scales import Array, Indices
 from ..runtime.analyses import require_projection, require_velocities
@@ -70,6 +70,8 @@ def differentiate_run(
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
     given = initial if isinstance(initial, Mapping) else None
+    if not isinstance(names, Iterable):
+        raise UsageError(f"names must be one name or several of what to differentiate by, not {names!r}")
     held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
     run = Variational(bound, forcing, columns)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from ..runtime.origin import origin
 from .failures import reports_failures
 from .options import (
     blaming_option,
@@ -41,7 +42,7 @@ class Prepared(NamedTuple):
 
     def heading(self, t: float) -> dict[str, Any]:
         """What every result of --json begins with."""
-        return {"name": self.equations.name, "method": self.equations.method, "t": t}
+        return {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
 
 
 time_option = click.option("--time", "t", type=float, default=0.0, show_default=True, metavar="T", help="Time in s.")

@@ -12,6 +12,7 @@ import click
 from ..errors import UsageError
 from ..files.writing import save_figure, write_whole
 from ..runtime.names import require
+from ..runtime.room import require_room
 from .analysis import Prepared, analysis_options
 from .options import require_folder
 from .screen import finite, print_heading, print_json, print_table, say, stage
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
 
 SHOWN = 10  #: failures listed
+MOST_WORKERS = 4096  #: processes of a local cluster
 
 
 @click.command()
@@ -63,6 +65,10 @@ def ensemble(
     if cases is not None and count is not None:
         raise UsageError("--count is for values drawn by --vary; --cases has as many runs as rows")
     module = work.module
+    require_room(f"--count {count}", float(count or 0) * max(len(vary) + 2 * module.n_x, 1), "draw fewer runs")
+    require_room(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
+    if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
+        raise UsageError(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
     values = _read(cases) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
     if not values:

@@ -58,6 +58,23 @@ POINTS = 5  #: change points listed
 )
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
+@click.option(
+    "--checkpoint",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Keep the run in FILE while it goes on; the same command again goes on from there, to the last bit.",
+)
+@click.option(
+    "--checkpoint-every",
+    type=click.FloatRange(min=0),
+    metavar="SECONDS",
+    help="Write that file so often; 60 s by default.",
+)
+@click.option(
+    "--resume/--no-resume",
+    default=None,
+    help="The checkpoint must be there / begin anew; by default go on if it is there.",
+)
 @json_option
 @solver_options
 @robot_options
@@ -73,6 +90,9 @@ def run(
     settings: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    checkpoint: Path | None,
+    checkpoint_every: float | None,
+    resume: bool | None,
     as_json: bool,
     robot: dict[str, Any],
     solver: dict[str, Any],
@@ -90,6 +110,11 @@ def run(
         require_plotting(plot)
     require_folder("--out", out)
     require_folder("--plot", plot)
+    require_folder("--checkpoint", checkpoint)
+    kept = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
+    kept = {key: value for key, value in kept.items() if value is not None}
+    if kept and checkpoint is None:
+        raise UsageError("--checkpoint-every and --resume belong to --checkpoint FILE")
     from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
@@ -110,6 +135,7 @@ def run(
             parameters=parameters or None,
             inputs=inputs or None,
             dense_output=True,
+            **kept,
             **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
@@ -182,7 +208,11 @@ def to_dict(equations: Equations, trajectory: Trajectory, energy: EnergyBalance 
             "steps": len(trajectory) - 1,
             "calls": trajectory.nfev,
             "jacobians": trajectory.njev,
+            "options": header.get("options", {}),
         },
+        "origin": header["origin"],
+        "parameters": header["parameters"],
+        "inputs": header.get("inputs", {}),
         "loop_residual": {
             "raw": residuals.raw_position,
             "projected": residuals.position,

@@ -41,8 +41,7 @@ def find_lanes(file: Path) -> int:
         entry = _find_or_build(file)
         if entry is None:
             return 0
-        library = ctypes.CDLL(str(entry.product))
-        table = library.eomgen_late_lanes
+        library, table = _load(entry, file)
     except (ToolchainError, OSError, ValueError, AttributeError) as error:
         warnings.warn(
             f"batches of the model in {file} go one state after the other, as their lanes cannot be made: {error}",
@@ -53,6 +52,16 @@ def find_lanes(file: Path) -> int:
     table.restype = ctypes.c_void_p
     _loaded.append(library)
     return table() or 0
+
+
+def _load(entry: CacheEntry, file: Path) -> tuple[ctypes.CDLL, Any]:
+    """The library and its table; one that has none, or cannot be loaded, is not kept."""
+    try:
+        library = ctypes.CDLL(str(entry.product))
+        return library, library.eomgen_late_lanes
+    except (OSError, AttributeError):
+        Cache(file.parents[2]).discard(entry.key)
+        raise
 
 
 def _find_or_build(file: Path) -> CacheEntry | None:

@@ -52,6 +52,7 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
     expression = (
         reader.expression(f"{path}.expression", values["expression"], MOTION) if "expression" in values else zero
     )
+    _require_quadratic(reader, f"{path}.expression", expression, names)
     dissipation = reader.expression(f"{path}.dissipation", values.get("dissipation", 0), MOTION)
     constraints = items(values.get("constraints", ()))
     if constraints is None:
@@ -64,6 +65,23 @@ def build_lagrangian(reader: Reader, values: dict[str, Any] | None) -> Lagrangia
         dissipation,
         tuple(_constraint(reader, f"{path}.constraints[{k}]", c, names) for k, c in enumerate(constraints)),
     )
+
+
+def _require_quadratic(reader: Reader, path: str, expression: Expr, names: list[str]) -> None:
+    """Refuse a Lagrangian whose mass matrix d2L/(dq_dot dq_dot) depends on velocities: kernels take M(q, t)."""
+    rates = {name + "_dot": reader.graph.symbol(name + "_dot") for name in names}
+    momenta = list(jacobian([expression], list(rates.values())).values())
+    inertia = list(jacobian(momenta, list(rates.values())).values()) if momenta else []
+    found = [rate for rate in rates if rate in symbols_of(inertia)] if inertia else []
+    if found:
+        reader.faults.add(
+            path,
+            "is not quadratic in the velocities: the mass matrix, its second derivatives by them, depends on "
+            + ", ".join(found),
+            "write T as a sum of terms m(q, t)*a_dot*b_dot, b(q, t)*a_dot and c(q, t), products expanded; for another "
+            "Lagrangian give the equations of motion themselves: `equations:` of a model file, with mass_matrix 1 and "
+            "the accelerations as forcing",
+        )
 
 
 def _constraint(reader: Reader, path: str, given: Any, names: list[str]) -> Expr:

@@ -151,10 +151,7 @@ def _locate(reader: Reader, file: str) -> str:
     if not model:
         return file
     folder = os.path.realpath(os.path.dirname(os.path.abspath(model)))
-    try:
-        path = os.path.realpath(os.path.join(folder, file))
-    except ValueError as error:  # NUL, or half a surrogate pair
-        raise UsageError(f"{file!r} is not the name of a file: {error}") from None
+    path = os.path.realpath(os.path.join(folder, file))
     if os.path.isabs(file) or os.path.commonpath((folder, path)) != folder:
         raise UsageError(f"{file} lies outside the folder of the model file, which a model file cannot reach")
     return path

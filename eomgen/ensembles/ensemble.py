@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +12,8 @@ from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
-from .block import EVENT, MEANING, Plan, find_events
+from ..runtime.origin import origin, plain, spell_input
+from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .cases import Cases
 from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs
 
@@ -193,8 +195,26 @@ class Ensemble:
             columns |= dict(zip(self.names, end, strict=True))
         return pd.DataFrame(columns)
 
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What the runs have in common, as a trajectory's ``metadata`` has it; ``values`` is a digest of the others."""
+        plan, cases = self._plan, self._cases
+        shared = zip(self._module.p_names, np.reshape(cases.p, (self._module.n_p, -1)), strict=True)
+        return {
+            "name": self._module.name,
+            "model_method": self._module.metadata.get("method"),
+            "origin": origin(self._module),
+            "count": self.count,
+            "span": list(plan.span),
+            "method": plan.method,
+            "options": {name: plain(value) for name, value in plan.options.items()},
+            "inputs": {name: spell_input(value) for name, value in find_forcing(self._module, plan).values.items()},
+            "parameters": {name: float(row[0]) for name, row in shared if row.size and np.ptp(row) == 0.0},
+            "values": cases.digest(),
+        }
+
     def save(self, path: str | Path) -> Path:
-        """Write the arrays to an .npz file that NumPy alone reads."""
+        """Write the arrays to an .npz file that NumPy alone reads; ``header`` in it is ``metadata`` as JSON."""
         target = Path(path).with_suffix(".npz")
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)
@@ -203,8 +223,9 @@ class Ensemble:
             if getattr(self, name) is not None:
                 arrays[name] = getattr(self, name)
         runs = {name: getattr(self, name) for name in ("t", "t_end", "status", "steps", "rejected", "evaluations")}
+        header = np.array(json.dumps(self.metadata))
         with whole_file(target) as file:
-            np.savez_compressed(file, names=np.array(self.names), **runs, **arrays)
+            np.savez_compressed(file, names=np.array(self.names), header=header, **runs, **arrays)
         return target
 
     def plot(self, name: str, ax: Any = None, limit: int = 200) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -14,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..runtime.compiled import can_run
-from ..runtime.late import eager
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
 from ..runtime.room import require_room, require_steps
@@ -33,6 +31,8 @@ if TYPE_CHECKING:
     from ..runtime.layout import Layout
     from ..runtime.module import Module
 
+STORED = 64  #: blocks at least that a store keeps of a large ensemble
+WIDEST = 8  #: runs side by side in one thread, at most
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
 
 
@@ -144,14 +144,15 @@ def simulate_many(
             workers = count_workers(client)
         length = _positive("block", block, choose_size(cases.count, size, workers or 1))
         if store is not None and block is None:
-            length = stored_length(store) or length
+            lanes = WIDEST if module.layout.rank == 0 and not find_events(module, plan).names else 1
+            length = stored_length(store) or min(length, max(lanes * threads, -(-cases.count // STORED)))
         if reduce == "statistics":  # whole grains, so that rounding does not depend on blocks
             length = -(-length // GRAIN) * GRAIN
         parts = split(cases.count, length)
         store_of = None if store is None else _open_store(store, module, cases, plan, reduce, parts)
         kept: dict[int, Kept] = {}
         if store_of is not None:
-            found = {index: store_of.load(index) for index in range(len(parts))}
+            found = {index: store_of.load(index, stop - start) for index, (start, stop) in enumerate(parts)}
             kept = {index: value for index, value in found.items() if value is not None}
         missing = [index for index in range(len(parts)) if index not in kept]
         look = None if watch is None else watch.look
@@ -159,7 +160,12 @@ def simulate_many(
             kept[index] = value
             if store_of is not None and not (value[0]["runs_status"] == LOST).any():
                 store_of.save(index, *value)
-    return _gather(module, cases, plan, reduction, parts, kept)
+    try:
+        return _gather(module, cases, plan, reduction, parts, kept)
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        if store_of is None:
+            raise
+        raise UsageError(f"the blocks in store {store} do not fit each other: {error}; name another folder") from error
 
 
 def _run(
@@ -246,7 +252,7 @@ def _positive(what: str, given: Any, default: int) -> int:
 def _open_store(
     folder: str | Path, module: Module, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
 ) -> Any:
-    from .handle import digest
+    from ..runtime.identity import code_digest
     from .store import Store
 
     def _plain(x: Any) -> Any:
@@ -254,10 +260,9 @@ def _open_store(
             return [x.interpolation, x.corners, x.times.tolist(), x.values.tolist()]
         return x if isinstance(x, str) else np.asarray(x).tolist()
 
-    file = getattr(eager(module.core), "__file__", None)
-    code = digest(file) if file else hashlib.sha256(str(module.core.metadata).encode()).hexdigest()
     identity = {
-        "model": module.name, "code": code, "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
+        "model": module.name, "model_digest": module.metadata.get("model_digest"), "code": code_digest(module),
+        "runs": cases.count, "values": cases.digest(), "span": list(plan.span),
         "method": plan.method, "options": {name: np.asarray(x).tolist() for name, x in plan.options.items()},
         "max_steps": plan.max_steps, "t_eval": None if plan.t_eval is None else plan.t_eval.tolist(),
         "inputs": {name: _plain(x) for name, x in plan.inputs.items()}, "events": plan.events,
@@ -269,11 +274,6 @@ def _open_store(
 
 def _identify(reduce: Any) -> str:
     """Which reduction it is; of a function, what it does."""
-    if not callable(reduce):
-        return str(reduce or "states")
-    code = getattr(reduce, "__code__", None)
-    if code is None:
-        return repr(type(reduce)) + repr(getattr(reduce, "__dict__", {}))
-    held = [cell.cell_contents for cell in reduce.__closure__ or ()]
-    parts = (reduce.__module__, reduce.__qualname__, code.co_code, code.co_consts, code.co_names, held)
-    return hashlib.sha256(repr(parts).encode()).hexdigest()
+    from ..runtime.identity import digest
+
+    return digest(reduce) if callable(reduce) else str(reduce or "states")

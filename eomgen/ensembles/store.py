@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from ..errors import UsageError
-from ..files.writing import write_whole
+from ..files.writing import remove_parts, write_whole
+from ..runtime.arrays import BROKEN, read_arrays
+from .blocks import LARGEST, RUNS
 
 FORMAT = "eomgen ensemble 1"
+RUNS_KEPT = tuple(f"runs_{name}" for name in RUNS)
 
 
 class Store:
@@ -38,6 +40,7 @@ class Store:
         if manifest.is_file():
             self._compare(manifest, wanted)
             return
+        remove_parts(manifest)  # of a call that was killed before the manifest was there
         if self.folder.is_dir() and any(self.folder.iterdir()):
             raise UsageError(f"store {self.folder} is not empty and holds no ensemble; name another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -46,8 +49,9 @@ class Store:
     def _compare(self, manifest: Path, wanted: dict[str, Any]) -> None:
         try:
             found = json.loads(manifest.read_text(encoding="utf-8"))
-        except ValueError:
+        except (ValueError, RecursionError):
             found = {}
+        found = found if isinstance(found, dict) else {}
         differing = sorted(name for name in {*wanted, *found} if wanted.get(name) != found.get(name))
         if differing:
             raise UsageError(
@@ -66,22 +70,29 @@ class Store:
         np.savez(buffer, **arrays, words=np.array(json.dumps({str(k): text for k, text in words.items()})))
         write_whole(self._path(index), buffer.getvalue())
 
-    def load(self, index: int) -> tuple[dict[str, Any], dict[int, str]] | None:
-        """The arrays of a block, or None if it was not finished."""
+    def load(self, index: int, count: int) -> tuple[dict[str, Any], dict[int, str]] | None:
+        """The arrays of a block of so many runs, or None if it was not finished."""
+        remove_parts(self._path(index))
         try:
-            with self._path(index).open("rb") as file, np.load(file, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in data.files}
+            arrays = read_arrays(self._path(index), compressed=False)
+            words = json.loads(str(arrays.pop("words")))
+            if any(len(arrays[name]) != count for name in RUNS_KEPT):
+                raise ValueError("the numbers of another count of runs")
+            return arrays, {int(k): str(text) for k, text in words.items()}
         except FileNotFoundError:
             return None
-        except (ValueError, OSError, EOFError, KeyError, BadZipFile) as error:
-            raise UsageError(f"{self._path(index)} cannot be read: {error}; remove it to run its block again") from None
-        words = json.loads(str(arrays.pop("words")))
-        return arrays, {int(k): text for k, text in words.items()}
+        except (*BROKEN, RecursionError) as error:
+            raise self.damaged(index, error) from None
+
+    def damaged(self, index: int, why: object) -> UsageError:
+        """The error for a block that cannot be taken."""
+        return UsageError(f"{self._path(index)} cannot be read: {why}; remove it to run its block again")
 
 
 def stored_length(folder: str | Path) -> int | None:
     """Runs of a block of the ensemble that a folder holds; None if it holds none."""
     try:
-        return int(json.loads((Path(folder) / "manifest.json").read_text(encoding="utf-8"))["block"])
-    except (OSError, ValueError, KeyError, TypeError):
+        found = json.loads((Path(folder) / "manifest.json").read_text(encoding="utf-8"))["block"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
+    return found if type(found) is int and 0 < found <= LARGEST else None

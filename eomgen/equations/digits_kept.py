@@ -1,10 +1,10 @@
 """Stage equations: the mass matrix at configurations tried -> how many digits of the accelerations rounding leaves.
 
-With B the motions of the degrees of freedom, B^T M B is a sum of terms of the size of D, the sums of B_ik^2 M_ii.  What
-rounding leaves undetermined along a motion is eps over the smallest eigenvalue of D^-1/2 B^T M B D^-1/2 (A. van der
-Sluis, Numerische Mathematik 14, 1969; J. W. Demmel, K. Veselic, SIAM J. Matrix Anal. Appl. 13, 1992).  Masses or lengths
-that are far apart make it small: a heavy body moves little beside a light one in some motion, and the light one's inertia
-is lost in the sum.  Methods that solve for the motion of every free body never form that sum.
+With B the motions of the degrees of freedom, B^T M B is a sum of terms of the size of D, the sums of B_ik^2 M_ii.
+What rounding leaves undetermined along a motion is eps over the smallest eigenvalue of D^-1/2 B^T M B D^-1/2 (A. van
+der Sluis, Numerische Mathematik 14, 1969; J. W. Demmel, K. Veselic, SIAM J. Matrix Anal. Appl. 13, 1992).  Masses or
+lengths that are far apart make it small: in some motion a heavy body moves little beside a light one, whose inertia is
+lost in the sum.  Methods that solve for the motion of every free body never form that sum.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..numeric import algebra
 from ..numeric.partitions import partition
 from .equations import TreeEquations
 
-FREE = "newton_euler and amalgamated"  #: methods that never form the embedded mass matrix
+FREE = ("newton_euler", "amalgamated")  #: methods that never form the embedded mass matrix
 
 
 def note_lost_digits(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -> str:
@@ -30,7 +30,7 @@ def note_lost_digits(kinematics: Kinematics, mobility: Mobility, tree: TreeEquat
     if not least < WORTH_A_WORD:
         return ""
     kept = max(0, int(-np.log10(EPS / max(least, EPS))))
-    bodies = "" if kinematics.mechanism.lagrangian else f"; method {FREE} keep all, and check this"
+    bodies = "" if kinematics.mechanism.lagrangian else f"; method {' and '.join(FREE)} keep all of them"
     return (
         f"masses or lengths are so far apart that rounding leaves about {kept} of 16 digits of the accelerations "
         f"(smallest share of inertia {least:.1g}){bodies}"

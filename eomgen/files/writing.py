@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 
 from ..errors import UsageError
 
+TOKEN = 8  #: random digits at the end of a part's name
 PREFIX = 60  #: characters of a file's name in that of the part: names end at 255 bytes
 
 
@@ -43,7 +44,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """
     target = Path(path)
     refuse_link(target)
-    part = target.with_name(f".{target.name[:PREFIX]}.{secrets.token_hex(4)}")
+    part = target.with_name(f".{target.name[:PREFIX]}.{secrets.token_hex(TOKEN // 2)}")
     try:
         earlier = _status(target)
         if earlier is not None and not stat.S_ISREG(earlier.st_mode):
@@ -72,6 +73,17 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if error.errno is None or error.filename not in (None, str(part)):
             raise
         raise type(error)(error.errno, error.strerror or str(error), str(target)) from error
+
+
+def remove_parts(path: str | os.PathLike[str]) -> None:
+    """Remove what writers of a file that were killed have left beside it; nobody else may be writing it."""
+    target = Path(path)
+    begin = f".{target.name[:PREFIX]}."
+    for part in target.parent.iterdir() if target.parent.is_dir() else ():
+        token = part.name.removeprefix(begin)
+        if part.name.startswith(begin) and len(token) == TOKEN and set(token) <= set("0123456789abcdef"):
+            with suppress(OSError):
+                part.unlink()
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:

@@ -17,10 +17,14 @@ STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrat
 # -- size of a run ---------------------------------------------------------------------------------------------------
 MOST_STEPS = 10**8  #: steps of limited size
 MOST_NUMBERS = 5 * 10**7  #: kept by one call: 0.4 GB, of which results are copied two or three times
-ENOUGH, ENDLESS = 3000, 10**9  #: a run that has taken so many steps and needs so many more at their pace would not end
+ENOUGH, ENDLESS = 3000, 10**10  #: a run that has taken so many steps and needs so many more at their pace would not end
 
 # -- events ----------------------------------------------------------------------------------------------------------
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time
+TURNING = 1e-8  #: part of a step to which the place where a value turns is found: the root of its rounding
+ASIDE = 1e-5  #: part of a step, or of 1 s where there is none, over which the rate of a value is taken
+MOMENTARY = 1e-6  #: (s) stands for a step where none is chosen yet
+LATE = 1e-4  #: part of a step, before its end, in which the next step may look for the same zero
 TOUCHED = 1e-13  #: part of its largest size within which a value that comes to zero and back was there: 500 roundings
 TOUCHING = 1e-9  #: part of its size at which the value of an event counts as zero, and its rate as none
 INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end

@@ -27,15 +27,20 @@ def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
         U, sizes, Vt = np.linalg.svd(A, full_matrices=full_matrices)
     except np.linalg.LinAlgError:
         raise _failed("singular values cannot be found", A) from None
+    if not np.isfinite(sizes).all():
+        raise _failed("singular values cannot be found", A)
     return U, sizes, Vt
 
 
 def singular_values(A: Any) -> Array:
     """Singular values, the largest first."""
     try:
-        return np.asarray(np.linalg.svd(A, compute_uv=False))
+        sizes = np.asarray(np.linalg.svd(A, compute_uv=False))
     except np.linalg.LinAlgError:
         raise _failed("singular values cannot be found", A) from None
+    if not np.isfinite(sizes).all():
+        raise _failed("singular values cannot be found", A)
+    return sizes
 
 
 def eigh(A: Any) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Stage runtime: an .npz file from anywhere -> its arrays, or a refusal: no pickles, and no more memory than it may take.
+"""Stage runtime: an .npz file from anywhere -> its arrays, or a refusal: no pickles, bounded memory.
 
 Every member is read whole, so that its check sum is compared; the shape it claims is compared with its bytes before
 anything is made of that size.
@@ -60,7 +60,7 @@ def _array(archive: ZipFile, member: ZipInfo, compressed: bool) -> Any:
     if version != (1, 0):
         raise ValueError(f"{member.filename} has format {version}")
     shape, fortran, kind = npy.read_array_header_1_0(stream)
-    if kind.kind not in "biufU":
+    if kind.kind not in "biufcU":
         raise ValueError(f"{member.filename} holds {kind}, which are no numbers")
     count = 1
     for size in shape:
@@ -68,4 +68,4 @@ def _array(archive: ZipFile, member: ZipInfo, compressed: bool) -> Any:
     if min(shape, default=0) < 0 or count * kind.itemsize != len(data) - stream.tell():
         raise ValueError(f"{member.filename} has {len(data)} bytes, which are no array of shape {shape}")
     flat = np.frombuffer(data, dtype=kind, count=count, offset=stream.tell()) if count else np.empty(0, kind)
-    return flat.reshape(shape, order="F" if fortran else "C").copy()
+    return flat.reshape(shape, order="F" if fortran else "C").copy(order="K")

@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
 from .layout import Layout, number
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .initial import Initial
@@ -137,7 +138,7 @@ class Assembled:
             1 for the side of the declared initial position, -1 for the other, 0 at a dead centre of the independent
             coordinates.
         """
-        state = np.asarray(x, dtype=float)
+        state = read_numbers("x", x)
         if state.shape not in ((self.n_q,), (self.n_x,)):
             raise UsageError(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
         initial = self._initial(t, None, None)

@@ -15,6 +15,7 @@ from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.projection import correct_position
 from ..numeric.scales import Array
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .module import Module
@@ -73,7 +74,7 @@ class Canonical:
             A wrong shape.
         """
         module, layout = self._module, self._module.layout
-        z = np.asarray(z, dtype=float)
+        z = read_numbers("z", z)
         if z.shape != (self.n_z,):
             raise UsageError(f"z must have shape ({self.n_z},) [{', '.join(self.z_names)}], not {z.shape}")
         n, s = layout.n_q, layout.scales.q

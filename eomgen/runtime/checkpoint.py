@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.writing import whole_file
+from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .identity import code_digest, differences, digest
@@ -74,12 +74,13 @@ class Checkpoint:
             The file is of another run, is damaged, is missing where it must be there, or could not be written.
         """
         self.identity = json.loads(json.dumps({"format": FORMAT, **identity}))
+        remove_parts(self.file)
         if self.resume is False:
             return
         try:
             found = read_arrays(self.file, compressed=False)
             header = json.loads(found.pop("header").tobytes())
-            if header["format"] != FORMAT:
+            if header["format"] != FORMAT or any(array.dtype.kind == "U" for array in found.values()):
                 raise ValueError("another format")
         except FileNotFoundError:
             if self.resume:
@@ -138,7 +139,7 @@ def identify(
         "eomgen": module.metadata.get("eomgen"),
         "code": code_digest(module),
         "method": method,
-        "options": {name: digest(value) for name, value in options.items() if name != "jac"},
+        "options": {name: digest(value) for name, value in options.items()},
         "span": [nodes[0], nodes[-1]],
         "initial": digest(x0),
         "parameters": dict(zip(module.p_names, module.p.tolist(), strict=True)),

@@ -15,6 +15,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution
+from .integrate import MESSAGES as WORDS
 from .names import check_names
 from .signals import Forcing
 from .tolerances import check_tolerances
@@ -29,8 +30,8 @@ OPTIONS = ("rtol", "atol", "max_step", "first_step")
 ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
 TOO_SMALL = "Required step size is less than spacing between numbers."
 MESSAGES = {
-    ENDED: "The solver successfully reached the end of the integration interval.",
-    TERMINAL: "A termination event occurred.",
+    ENDED: WORDS[0],
+    TERMINAL: WORDS[1],
     STOPPED: "The run was interrupted.",
     RESET_FAILED: "The state after an event cannot be evaluated, or not be brought onto the constraints.",
 }

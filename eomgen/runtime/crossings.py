@@ -14,12 +14,11 @@ import numpy as np
 
 from ..errors import ZenoError
 from ..limits.rounding import EPS
-from ..limits.runs import CROWDED, INSTANT, TOUCHED, TOUCHING
+from ..limits.runs import ASIDE, CROWDED, INSTANT, LATE, MOMENTARY, TOUCHED, TOUCHING, TURNING
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, crowd_of
 
 SAMPLES, HALVINGS, RESTING = 16, 50, 1000  #: as in crossings.c
-AT_THE_END = 1e-4  #: part of a step, before its end, in which the next step may look for the same zero
 GOLDEN = 0.3819660112501051
 
 
@@ -78,7 +77,7 @@ class Crossings:
 
     def _slopes(self, t: float, x: Array, f: Array, g: Array, length: float, way: float = 1.0) -> Array:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
-        h = way * 1e-5 * (length or self.forward * 1e-6 * max(abs(t), 1.0))
+        h = way * ASIDE * (length or self.forward * max(abs(t), 1.0) * MOMENTARY)
         return (self._values(t + h, x + h * f) - g) / h
 
     def arm(self, t: float, x: Array, length: float = 0.0) -> None:
@@ -102,7 +101,7 @@ class Crossings:
             event = self.events[i]
             self.t[i].append(zero)
             self.x[i].append(self._state(step, zero))
-            late = abs(step.t - zero) <= AT_THE_END * abs(step.t - step.t_old)
+            late = abs(step.t - zero) <= LATE * abs(step.t - step.t_old)
             if self.touch[i] and (event.action != GO_ON or late):
                 self.leaving[i] = self.touch[i]  # so that it is not found again beside this zero
             if event.terminal and len(self.t[i]) >= event.terminal:
@@ -176,7 +175,7 @@ class Crossings:
                 best, at = value, t
         left, right = at - h, at + h
         for _ in range(60):  # golden section
-            if best <= 0.0 or abs(right - left) <= 1e-8 * abs(step.t - step.t_old):
+            if best <= 0.0 or abs(right - left) <= TURNING * abs(step.t - step.t_old):
                 break
             low = abs(at - left) > abs(right - at)
             t = at + GOLDEN * ((left if low else right) - at)

@@ -20,6 +20,7 @@ from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
 from ..numeric import algebra
 from ..numeric.scales import Array
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .module import Module
@@ -65,7 +66,7 @@ class Dae:
         """[y; y'] of all rows, the redundant ones 0."""
         result = np.zeros(2 * self._n_full + len(more))
         for start, part, label in ((0, y, "y"), (self._n_full, yp, "yp")):
-            given = np.asarray(part, dtype=float)
+            given = read_numbers(label, part)
             if given.shape != (self.n_y,):
                 raise UsageError(f"{label} must have shape ({self.n_y},), not {given.shape}")
             result[start + self._unknowns] = given

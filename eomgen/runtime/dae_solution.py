@@ -210,7 +210,10 @@ class _Run:
             chosen |= {"eventsfn": values, "num_events": len(listed)}
         make, atol = self.make, np.full(form.n_y, float(self.make.keywords["atol"]))
         atol[form.algebraic] = UNCONTROLLED
-        return make(residual, atol=atol, **chosen)
+        try:
+            return make(residual, atol=atol, **chosen)
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"IDA refuses an option of dae.solve: {error}") from None
 
     def _happen(self, t: float, x: Array, fired: list[int]) -> Array | None:
         """The state after events; None where it stays."""

@@ -59,7 +59,8 @@ def code_digest(module: Module) -> str:
     """SHA-256 of the file of a module's code, or of its metadata where it has no file."""
     core: Any = eager(module.core)
     file = getattr(core, "__file__", None)
-    data = Path(file).read_bytes() if file else str(core.metadata).encode()
+    path = Path(file or "")
+    data = path.read_bytes() if path.is_file() else str(core.metadata).encode()
     return hashlib.sha256(data).hexdigest()
 
 

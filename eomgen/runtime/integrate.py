@@ -7,7 +7,8 @@ reset; what happens after a step is what the compiled loop does (steppers/loop.c
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any, NamedTuple
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .crossings import Crossings, Step
 from .events import Event
 from .names import require, unknown
 from .pace import Pace
+
+if TYPE_CHECKING:
+    from .solver_state import Pause
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -129,6 +133,7 @@ def integrate(
     pace: Pace,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
+    pause: Pause | None = None,
 ) -> Solution:
     """Integrate over the parts between `nodes` (start, corners, end), and from each event that resets the state.
 
@@ -143,7 +148,7 @@ def integrate(
     """
     journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, pace)
     try:
-        journey.travel(reset, enter)
+        journey.travel(reset, enter, pause)
     except KeyboardInterrupt as interrupt:
         journey.status, journey.message = -1, MESSAGES[-1]
         raise Interrupted(journey.solution()) from interrupt
@@ -176,13 +181,30 @@ class _Journey:
         self.kept = True
 
     def travel(
-        self, reset: Callable[[float, Array, list[int]], Array] | None, enter: Callable[[float, float], None] | None
-    ) -> None:
-        """Go on to the end, a terminal event or a failure."""
-        self._keep()
-        if self.t_eval is not None and self.t_eval.size and self.t_eval[0] == self.t:
-            self.asked.append(self.x)
-        k, armed = 0, False
+        self, reset: Callable[[float, Array, list[int]], Array] | None, enter: Callable[[float, float], None] | None,
+        pause: Pause | None = None,
+    ) -> None:  # fmt: skip
+        """Go on to the end, a terminal event or a failure, from where a checkpoint was kept if there is one."""
+        corners, going_on = len(self.nodes) - 1, False
+        if pause is not None and pause.checkpoint.kept is not None:
+            k, self.status = pause.go_on(self, corners)
+            going_on = self.status == 2
+            self.status, self.message = (0, MESSAGES[0]) if going_on else (self.status, MESSAGES[self.status])
+            if not going_on:
+                return
+            self._go(k, going_on, reset, enter, pause)
+        else:
+            self._go(0, False, reset, enter, pause)
+        if pause is not None and self.status >= 0:
+            pause.save(self, corners - 1, ended=self.status)
+
+    def _go(
+        self, k: int, going_on: bool, reset: Callable[[float, Array, list[int]], Array] | None,
+        enter: Callable[[float, float], None] | None, pause: Pause | None,
+    ) -> None:  # fmt: skip
+        armed = going_on
+        if not going_on:
+            self._begin()
         while k < len(self.nodes) - 1:
             if enter is not None:
                 enter(self.nodes[k], self.nodes[k + 1])
@@ -190,6 +212,9 @@ class _Journey:
                 k += 1
                 continue
             solver = self._start(self.nodes[k + 1])
+            if going_on and pause is not None:
+                pause.thaw(solver)
+                going_on = False
             if self.crossings is not None and not armed:
                 self.crossings.arm(self.t, self.x, self._length(solver))
                 armed = True
@@ -203,6 +228,8 @@ class _Journey:
                     stop = self._settle(solver)
                     if stop is None and solver.status == "running":
                         self.pace.look(self.t, self.x)
+                        if pause is not None and perf_counter() >= pause.due:
+                            pause.save(self, k, solver)
             finally:
                 self._count(solver)
             if stop is None and self.t != self.nodes[k + 1]:
@@ -217,6 +244,11 @@ class _Journey:
                     self.x = np.array(reset(self.t, self.x, fired), dtype=float)
                 self._keep()
                 self.crossings.depart(self.t, self.x)
+
+    def _begin(self) -> None:
+        self._keep()
+        if self.t_eval is not None and self.t_eval.size and self.t_eval[0] == self.t:
+            self.asked.append(self.x)
 
     def _start(self, end: float) -> Any:
         options = dict(self.options)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
 from .paths import STEP, Path
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .module import Module
@@ -77,7 +78,7 @@ class Minimal:
         q : (n_q,) array, optional
             Position of the whole tree, closed or nearly; the assembled initial position by default.
         """
-        start = self._module.assemble() if q is None else np.array(q, dtype=float)
+        start = self._module.assemble() if q is None else np.array(read_numbers("q", q))
         if start.shape != (self._layout.n_q,):
             raise UsageError(f"q must have shape ({self._layout.n_q},), not {start.shape}")
         self._start[0] = self._memory.q = start
@@ -91,7 +92,7 @@ class Minimal:
 
     def reduce(self, x: ArrayLike) -> Array:
         """The independent part (n_x,) or (n_x, k) of full states (2 n,) or (2 n, k)."""
-        full = np.asarray(x, dtype=float)
+        full = read_numbers("x", x)
         layout = self._layout
         if full.ndim not in (1, 2) or len(full) != layout.n_x:
             raise UsageError(f"x must be of shape ({layout.n_x},) or ({layout.n_x}, k), not {full.shape}")
@@ -115,12 +116,12 @@ class Minimal:
         ProjectionError, PartitionError
             A position out of reach, or at a dead centre of the independent coordinates.
         """
-        x = np.asarray(x_min, dtype=float)
+        x = read_numbers("x", x_min, self._layout.n_x)
         if x.shape[:1] != (self.n_x,) or x.ndim > 2:
             raise UsageError(f"x must have shape ({self.n_x},) or ({self.n_x}, k), not {x.shape}")
         if x.ndim == 1:
-            return self._solve(float(np.asarray(t)), x)
-        times = np.broadcast_to(np.asarray(t, dtype=float), x.shape[1:])
+            return self._solve(float(read_numbers("t", t)), x)
+        times = np.broadcast_to(read_numbers("t", t), x.shape[1:])
         result = np.empty((self._layout.n_x, x.shape[1]))
         for j in range(x.shape[1]):
             result[:, j] = self._solve(float(times[j]), x[:, j])
@@ -148,7 +149,7 @@ class Minimal:
         """
         if p is not None:
             raise UsageError("the minimal form takes its parameters from its module: module.bind(p=...).minimal")
-        state = np.asarray(x, dtype=float)
+        state = read_numbers("x", x)
         if state.shape != (self.n_x,):
             raise UsageError(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
         memory = self._memory

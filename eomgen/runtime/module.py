@@ -18,6 +18,7 @@ from .kernels import Kernels, Projection, Rows
 from .kinematic_analyses import KinematicAnalyses
 from .layout import Layout
 from .momenta import Momenta
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -230,8 +231,8 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         from .paths import motions
 
         path, reference = self._path
-        start = None if guess is None else np.asarray(guess, dtype=float)
-        return motions(path, reference, (q_i, v_i, a_i), start, np.asarray(t, dtype=float))
+        start = None if guess is None else read_numbers("guess", guess)
+        return motions(path, reference, (q_i, v_i, a_i), start, read_numbers("t", t))
 
     @cached_property
     def minimal(self) -> Minimal:

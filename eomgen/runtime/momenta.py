@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .kernels import Kernels
@@ -57,7 +58,7 @@ class Part:
         layout = self.layout
         if layout.n_com == 0:
             raise UsageError(f"model {layout.name!r} has no {self.name}: no body of it has a mass")
-        state = np.asarray(x, dtype=float)
+        state = read_numbers("x", x)
         if state.shape[:1] != (self.n_in,) or state.ndim > 2:
             given = "q" if self.n_in == layout.n_q else "x"
             raise UsageError(f"{given} must have shape ({self.n_in},) or ({self.n_in}, k), not {state.shape}")

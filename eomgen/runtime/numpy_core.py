@@ -165,7 +165,7 @@ class NumpyKernel:
             raise self.error(
                 f"u of {self.name} must have shape ({layout.n_u},) or ({layout.n_u}, k), not {force.shape}"
             )
-        t = np.asarray(t, dtype=float)
+        t = _real(t, "t", self.error)
         if t.shape not in ((), x.shape[1:]):
             raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
         expected = (*self.shape, *x.shape[1:])
@@ -259,9 +259,12 @@ def _real(value: object, label: str, error: Any) -> Array:
     if isinstance(value, Mapping):
         raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
     array = np.asarray(value)
-    if array.dtype.kind not in "biufO":
-        raise error(f"{label} must hold real numbers, not {array.dtype}")
-    return array.astype(float, copy=False)
+    if array.dtype.kind not in "biufO" or value is None:
+        raise error(f"{label} must hold real numbers, not {array.dtype if value is not None else None}")
+    try:
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError):
+        raise error(f"{label} must hold real numbers, not {value!r}") from None
 
 
 def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) -> None:
@@ -270,6 +273,8 @@ def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) ->
         raise error(f"{wanted}, not a {type(out).__name__}")
     if out.shape != expected or out.dtype != np.float64:
         raise error(f"{wanted}, not {out.shape} of {out.dtype}")
+    if not out.flags.writeable:
+        raise error(f"out of {name} is read-only")
 
 
 def _vector(value: object, n: int, label: str, error: Any) -> Array:

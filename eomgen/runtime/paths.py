@@ -16,6 +16,7 @@ from ..limits.motions import WALKED
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
+from .room import read_numbers
 
 STEP = 0.1  #: largest scaled change of an independent coordinate in one step
 JUMP = 0.6  #: largest scaled change of any coordinate in one step; more may be another branch
@@ -156,10 +157,11 @@ def motions(
     """
     layout = path.layout
     n_q, n, size = layout.n_q, layout.n_v, layout.n_dof
-    arrays = [None if part is None else np.asarray(part, dtype=float) for part in given]
+    labels, width = ("q_i", "v_i", "a_i"), n_q + 2 * n
+    arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, given, strict=True)]
     columns = max((part.shape[1:] for part in arrays if part is not None), key=len)
     parts = []
-    for name, part in zip(("q_i", "v_i", "a_i"), arrays, strict=True):
+    for name, part in zip(labels, arrays, strict=True):
         full = np.zeros((size, *columns)) if part is None else part
         if full.shape not in ((size,), (size, *columns)) or full.ndim > 2:
             raise UsageError(f"{name} must have shape ({size},) or ({size}, k), not {full.shape}")

@@ -13,6 +13,7 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .integrate import Solution
 from .layout import Layout
+from .origin import inputs_of, origin, plain
 from .signals import Forcing
 from .trajectory import Residuals, Trajectory
 
@@ -148,6 +149,8 @@ def record(
         "method": method,
         "rtol": _plain(options.get("rtol")),
         "atol": _plain(options.get("atol")),
+        "options": {name: plain(value) for name, value in options.items() if name != "jac"},
+        "inputs": inputs_of(module, forcing),
         "span": list(solution.ends),
         "status": solution.status,
         "message": solution.message,
@@ -190,8 +193,8 @@ def _units(layout: Layout) -> dict[str, str]:
 
 
 def describe(module: Module) -> dict[str, Any]:
-    """What the columns of any run of a module are called, and its parameters."""
-    return {**_described(module.layout), "parameters": dict(module._parameters)}
+    """What the columns of any run of a module are called, where it comes from, and its parameters."""
+    return {**_described(module.layout), "origin": origin(module), "parameters": dict(module._parameters)}
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Stage runtime: how much a call is asked to keep, or how many steps to take -> a UsageError before it begins."""
+"""Stage runtime: numbers as a user gives them -> arrays; what no call can keep or end is refused before it begins."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def require_room(what: str, numbers: float, remedy: str) -> None:
     """
     if numbers > MOST_NUMBERS:
         raise UsageError(
-            f"{what} would keep {numbers:.3g} numbers ({8e-9 * numbers:.3g} GB), and a call keeps {MOST_NUMBERS:.3g} "
-            f"at most; {remedy}"
+            f"{what} would keep {numbers:.3g} numbers ({8.0 * numbers / 2**30:.3g} GiB), and a call keeps "
+            f"{MOST_NUMBERS:.3g} at most; {remedy}"
         )
 
 
@@ -36,6 +36,24 @@ def require_steps(name: str, step: float, start: float, end: float) -> None:
     latest = max(abs(start), abs(end))
     if abs(end - start) > MOST_STEPS * step or (start != end and latest + step == latest):
         raise UsageError(f"{name} = {step:g} s is too small for a run from {start:g} to {end:g} s: it would not end")
+
+
+def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
+    """Real numbers as an array of floats, refused where `width` numbers for each column (n, k) would not fit.
+
+    Raises
+    ------
+    UsageError
+    """
+    shape = np.shape(given) if isinstance(given, np.ndarray) else ()
+    if len(shape) > 1:
+        require_room(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
+    try:
+        if np.iscomplexobj(given):
+            raise TypeError
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise UsageError(f"{what} must hold real numbers, not {_short(given)}") from None
 
 
 def read_times(what: str, given: Any, per_time: int) -> Array:

@@ -24,7 +24,7 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import read_times, require_room, require_steps
+from .room import read_numbers, read_times, require_room, require_steps
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -133,9 +133,10 @@ def simulate(
     MissingDependencyError
         The run needs SciPy, which is not installed.
     """
-    kept = None
+    kept = pause = None
     if checkpoint is not None:
         from .checkpoint import Checkpoint, identify
+        from .solver_state import Pause
 
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
@@ -199,7 +200,9 @@ def simulate(
     many = abs(end - start) / longest
     require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     if kept is not None:
-        kept.open(identify(bound, forcing, watched, nodes, x0, method, stored, dense_output, options))
+        pause = None if compiled else Pause(kept, solver, dense_output)
+        own = {name: value for name, value in options.items() if name != "jac" or value != run.jacobian}
+        kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
     pace = Pace(start, end, x0, module.n_q, longest, run.troubled, numbers)
     try:
         if compiled:
@@ -216,7 +219,7 @@ def simulate(
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
                     run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, pace,
-                    partial(watched.reset, bound, forcing), forcing.enter,
+                    partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])
     except Interrupted as interrupt:
@@ -385,7 +388,7 @@ def find_state(
         return module.x0(t=t)
     if isinstance(initial, Mapping):
         return module.x0(initial, t=t)
-    x = np.array(initial, dtype=float)
+    x = np.array(read_numbers("initial", initial))
     if x.shape != (module.n_x,):
         names = ", ".join(module.x_names)
         raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")

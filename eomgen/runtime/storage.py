@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
+from .arrays import BROKEN, read_arrays
 
 if TYPE_CHECKING:
     from .trajectory import Trajectory
@@ -96,7 +97,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Returns
     -------
     Trajectory
-        With all columns; without dense output.
+        With all columns and ``metadata``; without dense output.
 
     Raises
     ------
@@ -104,22 +105,24 @@ def load_trajectory(path: str | Path) -> Trajectory:
         The file holds something else.
     FileNotFoundError
     """
-    from .trajectory import Trajectory
+    from .trajectory import Residuals, Trajectory
 
     source = Path(path)
     if not source.suffix and not source.exists():
         source = source.with_suffix(".npz")
     try:
-        with np.load(source, allow_pickle=False) as data:
-            arrays = {key: data[key] for key in data.files}
+        arrays = read_arrays(source)
         header = json.loads(str(arrays["header"]))
         if header.pop("format") != FORMAT:
             raise ValueError("another format")
+        names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
+        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
+            raise ValueError("columns that do not fit each other")
+        Residuals(**header["residuals"])
     except FileNotFoundError:
         raise
-    except (ValueError, KeyError, OSError, EOFError, AttributeError) as error:
+    except (*BROKEN, RecursionError) as error:
         raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
-    names = tuple(header.pop("names"))
     count = sum(key.startswith("t_events_") for key in arrays)
     return Trajectory(
         arrays["t"],

@@ -13,6 +13,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .events import Named
 from .names import require, unknown
+from .room import read_numbers
 
 if TYPE_CHECKING:
     import pandas
@@ -71,7 +72,9 @@ class Trajectory:
         Calls of the right-hand side and the Jacobian, factorisations, SciPy's status (1: a terminal event).
     message : str
     metadata : dict
-        Model, parameters, method and tolerances.
+        ``name`` and ``model_method``, ``parameters``, ``inputs`` as they were given, ``method``, ``rtol``, ``atol`` and
+        all ``options``, ``span``, and ``origin``: ``model_digest`` (SHA-256 of the model), ``target`` and ``versions``
+        of eomgen, Python, NumPy and the compiler.  Runs that are the same have the same metadata.
     """
 
     def __init__(
@@ -153,7 +156,7 @@ class Trajectory:
         """
         if self._sample is None:
             raise UsageError("no dense output was kept: simulate with dense_output=True")
-        times = np.atleast_1d(np.asarray(t, dtype=float))
+        times = np.atleast_1d(read_numbers("t", t))
         low, high = sorted(self.metadata["span"])
         if times.ndim != 1 or not ((times >= low) & (times <= high)).all():
             raise UsageError(f"times must lie within the run, {low:.6g} .. {high:.6g} s")

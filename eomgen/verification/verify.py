@@ -145,13 +145,18 @@ def _with_equations(module: Module, equations: Equations, cases: list[Case]) -> 
     why = _only_in_c(equations)
     if why:
         return [Finding.skipped("graph, free bodies, derivatives, runs", why)]
+    from ..equations.digits_kept import FREE, note_lost_digits, smallest_share
     from .bench import Bench
 
     bench, found = Bench(module, equations, cases), []
+    parts = equations.kinematics, equations.mobility, equations.tree
     idle = module.metadata.get("no_inertia")
     if idle:
         why = f"the model is there for kinematics only: {idle}"
         found.append(Finding.skipped("bodies, joints, reactions, derivatives, runs", why))
+    elif equations.method not in FREE and (note := note_lost_digits(*parts)):
+        share = smallest_share(*parts)
+        found.append(Finding("accelerations: what rounding leaves open", EPS / max(share, EPS), 1.0, note=note))
     for group in KINEMATIC if idle else GROUPS:
         check = import_module(f"{__package__}.check_{group}").check
         try:

@@ -25,7 +25,7 @@ typedef uint64_t numeral __attribute__((vector_size(8 * EOMGEN_WIDTH)));
 #define EOMGEN_BEGIN flag failed = { 0 };
 #define EOMGEN_REJECT(lost) failed |= (lost);
 #define EOMGEN_RETURN return failed;
-#define EOMGEN_REFUSE return ~(flag){ 0 };
+#define EOMGEN_REFUSE const flag none = { 0 }; return ~none;
 
 static inline real same(double a)
 {

@@ -59,6 +59,18 @@ cdef extern from "eomgen.h" nogil:
         const eomgen_series *series
     const eomgen_model *eomgen_model_table() noexcept
 
+cdef extern from *:
+    """
+    #if defined(__clang__)
+    #define EOMGEN_COMPILER "clang " __clang_version__
+    #elif defined(__GNUC__)
+    #define EOMGEN_COMPILER "gcc " __VERSION__
+    #else
+    #define EOMGEN_COMPILER "unknown"
+    #endif
+    """
+    const char *EOMGEN_COMPILER
+
 cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
@@ -70,6 +82,7 @@ if MODEL.abi != 3:
     raise ImportError(f"the model's C table has layout {MODEL.abi} and this layer reads layout 3: generate both again")
 
 metadata = MODEL.metadata.decode()
+compiler = EOMGEN_COMPILER.decode()  # of this layer, and of the model that is linked with it
 names = tuple([MODEL.kernels[i].name.decode() for i in range(MODEL.n_kernels)])
 sizes = {"n_p": MODEL.n_p, "n_u": MODEL.n_u, "n_const": MODEL.n_const, "n_work": MODEL.n_work}
 _FACTS = json.loads(metadata)
@@ -92,6 +105,16 @@ cdef cnp.ndarray doubles(object value, str label, object error):
     if array.dtype.kind not in "biufO":
         raise error(f"{label} must hold real numbers, not {array.dtype}")
     return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)
+
+
+cdef inline double moment(object t, object error) except? -7.0:
+    """The time of a call."""
+    if isinstance(t, float):
+        return t
+    try:
+        return t
+    except TypeError:
+        raise error(f"t must be a real number, not {t!r}") from None
 
 
 cdef cnp.ndarray vector(object value, int n, str label, object error):
@@ -242,7 +265,7 @@ cdef class Kernel:
                 or cnp.PyArray_TYPE(<cnp.ndarray>x) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(<cnp.ndarray>x) != 1
                 or cnp.PyArray_DIM(<cnp.ndarray>x, 0) != self.n_in or not cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x)):
             return self.general(t, [("x", self.n_in, x)], p, u, out)
-        now = t
+        now = moment(t, self.error)
         state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
         if out is None:
             out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
@@ -288,7 +311,7 @@ cdef class Kernel:
         if isinstance(t, (np.ndarray, list, tuple)) and np.ndim(t) > 0:
             held.append(self.read(np.expand_dims(t, 0), 1, "t", &batch.time, &columns))
         else:
-            now = t
+            now = moment(t, self.error)
         batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)
         if u is not None:
             held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))

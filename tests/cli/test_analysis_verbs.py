@@ -44,7 +44,7 @@ def test_keys_of_json(call: Call, verb: str) -> None:
     words = {"sensitivity": ["--end", "0.05", "--by", "r,theta"], "impact": ["--stop", "s"]}.get(verb, [])
     result = call(verb, CRANK, "--target", "numpy", "--json", *words)
     assert result.code == 0, result.err
-    assert set(result.json) == KEYS[verb]
+    assert set(result.json) == KEYS[verb] | {"origin"}
     assert result.json["name"] == "slider_crank"
 
 

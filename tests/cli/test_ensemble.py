@@ -18,7 +18,7 @@ def test_a_table_of_cases(call: Call, tmp_path: Path) -> None:
     result = call("ensemble", CRANK, "--cases", cases, "--end", "0.5", "--out", ends, "--json")
     assert result.code == 0, result.err
     found = result.json
-    assert set(found) == {"name", "method", "t", "count", "varied", "steps", "failures", "files", "summary"}
+    assert set(found) == {"name", "method", "origin", "t", "count", "varied", "steps", "failures", "files", "summary"}
     assert (found["count"], found["varied"], found["t"]) == (3, ["r", "theta"], 0.5)
     assert [failure["run"] for failure in found["failures"]] == [1]
     assert "cannot close" in found["failures"][0]["message"]

@@ -30,14 +30,17 @@ def test_json(call: Call) -> None:
     run = call("run", EXAMPLES / "slider_crank.yaml", "--end", "1", "--json").json
     assert set(run) == {
         "name", "method", "choice", "system", "report", "operations", "seconds", "integration", "loop_residual",
-        "energy", "change_points", "final", "files",
+        "energy", "change_points", "final", "files", "origin", "parameters", "inputs",
     }  # fmt: skip
     assert set(run["seconds"]) >= {"describe", "kinematics", "equations", "compile", "simulate"}
-    assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls", "jacobians"}
+    assert set(run["integration"]) == {"method", "rtol", "atol", "end", "steps", "calls", "jacobians", "options"}
     assert set(run["loop_residual"]) == {
         f"{what}{level}" for what in ("raw", "projected", "correction") for level in ("", "_velocity")
     }
     assert set(run["energy"]) == {"initial", "final", "work", "drift", "power_balance"}
+    assert set(run["origin"]) == {"model_digest", "target", "versions"}
+    assert set(run["origin"]["versions"]) == {"eomgen", "python", "numpy", "compiler"}
+    assert run["parameters"]["r"] == 0.1
     assert {"t", "theta", "theta_dot", "s", "pin_x", "speed"} <= set(run["final"])
     assert run["final"]["t"] == 1.0
 

@@ -105,3 +105,19 @@ def test_a_clash_of_names() -> None:
         clash.mechanism()
     with pytest.raises(ModelError, match="there are no coordinates; name at least one"):
         Model.from_lagrangian("p", v**2, []).mechanism()
+
+
+@pytest.mark.parametrize(
+    "text", ["a_dot**4/4 - a**2/2", "-sqrt(1 - a_dot**2)", "exp(a_dot)", "a_dot**3", "sin(a_dot)*a"]
+)
+def test_a_lagrangian_that_is_not_quadratic_in_the_velocities_is_named(text: str) -> None:
+    with pytest.raises(
+        ModelError, match=r"lagrangian.expression: is not quadratic in the velocities.*a_dot; write T"
+    ):
+        Model.from_lagrangian("powers", text, ["a"]).derive()
+
+
+def test_what_is_quadratic_linear_or_constant_in_the_velocities_is_taken() -> None:
+    text = "(1 + a**2)*a_dot**2/2 + a_dot*b_dot/3 + b_dot**2 + b*a_dot + sin(t)*b_dot - a**2 - b**4"
+    M = Model.from_lagrangian("mixed", text, ["a", "b"]).compile(target="numpy").mass_matrix([2.0, 1.0])
+    assert M.tolist() == [[5.0, pytest.approx(1 / 3)], [pytest.approx(1 / 3), 2.0]]

@@ -57,3 +57,46 @@ def test_a_store_of_another_ensemble_is_refused(pendulum: Any, tmp_path: Path) -
     block.write_bytes(b"torn")
     with pytest.raises(eg.UsageError, match="cannot be read.*remove it to run its block again"):
         pendulum.simulate_many(1, angles(4), store=tmp_path / "runs")
+
+
+def test_what_a_killed_call_left_is_no_hindrance(pendulum: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    part = folder / ".manifest.json.0a1b2c3d"
+    part.write_bytes(b"torn")
+    whole = pendulum.simulate_many(1, angles(40), store=folder)
+    assert not part.exists()
+    names = sorted(path.name for path in folder.iterdir())
+    assert len(names) > 2, "a kill would lose all of it"
+    (folder / f".{names[0]}.0a1b2c3d").write_bytes(b"torn")
+    (folder / names[0]).unlink()
+    again = pendulum.simulate_many(1, angles(40), store=folder)
+    assert sorted(path.name for path in folder.iterdir()) == names
+    np.testing.assert_array_equal(again.x, whole.x)
+
+
+def test_hostile_stores_are_refused(pendulum: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "runs"
+    pendulum.simulate_many(1, angles(20), store=folder, block=10)
+    block, manifest = folder / "block_000000.npz", folder / "manifest.json"
+    good, text = block.read_bytes(), manifest.read_text()
+    with np.load(block) as data:
+        arrays = {name: data[name] for name in data.files}
+    for change, words in (
+        ({"runs_t": arrays["runs_t"][:3]}, "another count of runs"), ({"x": arrays["x"][:1]}, "do not fit each other"),
+        ({"words": np.array("[1, 2]")}, "cannot be read"), ({"words": np.array("[" * 99999)}, "cannot be read"),
+    ):  # fmt: skip
+        np.savez(block, **(arrays | change))
+        with pytest.raises(eg.UsageError, match=words):
+            pendulum.simulate_many(1, angles(20), store=folder)
+    block.write_bytes(good)
+    for other in (
+        "[1]",
+        "{}",
+        "[" * 99999,
+        text.replace('"block": 10', '"block": -1'),
+        text.replace(": 10", ": 1e999"),
+    ):
+        manifest.write_text(other)
+        with pytest.raises(eg.UsageError, match="belongs to another ensemble"):
+            pendulum.simulate_many(1, angles(20), store=folder)

@@ -173,12 +173,12 @@ def test_permission_runs_it(sources: Path, monkeypatch: pytest.MonkeyPatch) -> N
     ("entry", "message"),
     [
         ("{type: native}", "functions.swing.source: is missing"),
-        ("{type: native, source: 3}", "functions.swing.source: 3 is not a text"),
+        ("{type: native, source: 3}", "functions.swing.source: 3 is not the path of a file"),
         ("{type: native, source: none.c}", "none.c cannot be read (No such file or directory); paths are relative"),
         ("{type: native, source: laws.c, derivatives: swing}", "functions.swing.derivatives: 'swing' is not a list"),
         ("{type: native, source: laws.c, function: [a]}", "functions.swing.function: ['a'] is not a name"),
         ("{type: native, source: ., function: a}", "cannot be read (Is a directory)"),
-        ("{type: native, source: laws.c, python: [a]}", "functions.swing.python: ['a'] is not a text"),
+        ("{type: native, source: laws.c, python: [a]}", "functions.swing.python: ['a'] is not the path of a file"),
     ],
 )
 def test_broken_native_entries(sources: Path, entry: str, message: str) -> None:

@@ -163,6 +163,7 @@ def damaged_kept(work: Work, fast: bool) -> Iterator[Result]:
                 if place.is_dir():  # what is kept goes on without this file
                     place.rmdir()
                 if not place.is_file():
+                    shutil.rmtree(built, ignore_errors=True)  # so that all is made again
                     work.run(cache, WHOLE, target=target)
                 DAMAGES[name](place)
                 if place.parent.name == "templates":

@@ -1,7 +1,8 @@
 """Soak: random models derived, compiled, simulated and verified for an hour; nothing that a process holds may grow.
 
-``python -m hostile.soak --minutes 60`` from the folder ``tests`` prints a line a minute and exits 1 on a leak or a wrong
-result.  Models of the numpy target come and go in this process; compiled ones, which Python cannot unload, in children.
+``python -m hostile.soak --minutes 60`` from the folder ``tests`` prints a line a minute and exits 1 on a leak or a
+wrong result.  Models of the numpy target come and go in this process; compiled ones, which Python cannot unload, in
+children.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from eomgen.robots import mjcf_compile
 from eomgen.robots.mjcf_files import Scan
 from eomgen.robots.mjcf_text import Text
 from eomgen.robots.xml_text import read_xml
+from eomgen.solids.mesh import measure_mesh
 
 BALL = '<worldbody><body name="ball"><joint name="j"/><geom size="1"/></body></worldbody>'
 SHAPE = '<worldbody><body name="shape"><joint name="j"/><geom type="mesh" mesh="m"/></body></worldbody>'
@@ -368,3 +369,31 @@ def test_one_name_of_a_joint_actuates_that_joint_alone(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(URDF.format(xx="1", xy="0", mass="1", origin="", more=more))
     inputs = eg.load(tmp_path / "r.urdf", actuate="jj").description.sections["inputs"]
     assert [entry.name for entry in inputs] == ["tau_jj"]
+
+
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_pipes_folders_and_names_that_are_none_end_at_once(suffix: str, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    with pytest.raises(eg.ModelError, match="file: is no plain file"):
+        eg.load(tmp_path / f"pipe{suffix}")
+    for name in ("a\0", "\udc80\ud800"):
+        with pytest.raises(eg.UsageError, match="is not the name of a file"):
+            eg.load(name + suffix)
+    (tmp_path / f"folder{suffix}").mkdir()
+    with pytest.raises(IsADirectoryError):
+        eg.load(tmp_path / f"folder{suffix}")
+
+
+def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Path) -> None:
+    path = tmp_path / "m.yaml"
+    os.mkfifo(tmp_path / "pipe.stl")
+    for name, said in {
+        "a\\0.stl": "holds a character that no file name can",
+        "\\ud800.stl": "character|surrogate",
+        "pipe.stl": "is no plain file",
+    }.items():
+        path.write_text(f'name: m\nbodies: {{b: {{solids: [{{type: mesh, file: "{name}", density: 1}}]}}}}\n')
+        with pytest.raises(eg.ModelError, match=said):
+            eg.load(path).check()
+    with pytest.raises(eg.UsageError, match="is not the name of a file"):
+        measure_mesh("a\0.stl")

@@ -48,7 +48,7 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 {
     const double a = ev->g[i], b = ev->g_new[i], h = fabs(run->step), s = a > 0.0 ? 1.0 : -1.0;
     const double da = run->direction * s * ev->slope[i] * h, db = run->direction * s * ev->slope_new[i] * h;
-    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= RESTING * RUNS_TOUCHED * ev->size[i]) {
+    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= (double)RESTING * RUNS_TOUCHED * ev->size[i]) {
         return 0;
     }
     const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
@@ -68,7 +68,7 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
     }
     const double h = (run->t - run->t_old) / (double)SAMPLES, ratio = 0.3819660112501051;
     left = at - h, right = at + h;
-    for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > 1e-8 * fabs(run->step); k++) { /* golden section */
+    for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > RUNS_TURNING * fabs(run->step); k++) { /* golden section */
         const int low = fabs(at - left) > fabs(right - at);
         const double t = at + ratio * ((low ? left : right) - at), value = s * value_at(method, run, ev, i, t);
         if (value < best) {
@@ -128,9 +128,6 @@ static void sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_even
     }
 }
 
-/* Part of a step, before its end, in which the next step may look for the same zero. */
-static const double AT_THE_END = 1e-4;
-
 int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double *t)
 {
     eomgen_events *const ev = j->events;
@@ -149,7 +146,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
         eomgen_between(method, run, zero, row + 2);
         ev->count[i]++;
         ev->latest[i] = zero;
-        if (ev->touch[i] != 0 && (ev->action[i] != EOMGEN_GO_ON || fabs(run->t - zero) <= AT_THE_END * fabs(run->step))) {
+        if (ev->touch[i] != 0 && (ev->action[i] != EOMGEN_GO_ON || fabs(run->t - zero) <= RUNS_LATE * fabs(run->step))) {
             ev->leaving[i] = ev->touch[i]; /* so that it is not found again beside this zero */
         }
         if (ev->most[i] > 0 && ev->count[i] >= ev->most[i]) {

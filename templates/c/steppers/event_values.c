@@ -34,9 +34,9 @@ static void event_slopes(eomgen_run *run, eomgen_events *ev, const double *g, do
 {
     double length = fabs(run->step) > 0.0 ? run->step : run->direction * run->h_abs;
     if (length == 0.0) { /* at the end of a part, where no step is chosen */
-        length = run->t != run->t_old ? run->t - run->t_old : run->direction * 1e-6 * fmax(fabs(run->t), 1.0);
+        length = run->t != run->t_old ? run->t - run->t_old : run->direction * RUNS_MOMENTARY * fmax(fabs(run->t), 1.0);
     }
-    const double h = way * 1e-5 * length;
+    const double h = way * RUNS_ASIDE * length;
     for (int i = 0; i < run->n; i++) {
         ev->y[i] = run->y[i] + h * run->f[i];
     }

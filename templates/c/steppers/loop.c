@@ -104,7 +104,7 @@ static int settle(const eomgen_method *method, eomgen_run *run, eomgen_journey *
     double t = run->t;
     const int stop = j->events != NULL ? eomgen_find_events(method, run, j, &t) : 0;
     if (stop < 0) {
-        return stop == -1 ? EOMGEN_STOPPED : EOMGEN_ZENO;
+        return stop == -1 ? (int)EOMGEN_STOPPED : (int)EOMGEN_ZENO; /* of two enumerations */
     }
     if (j->pieces_room > 0) {
         keep_piece(method, run, j, t);

@@ -1,0 +1,120 @@
+"""What a call cannot take, keep or end is a named error at once: nothing hangs or fills the memory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import eomgen as eg
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def swings() -> dict[str, Any]:
+    return {target: eg.load(EXAMPLES / "pendulum.yaml").compile(target=target) for target in ("cython", "numpy")}
+
+
+@pytest.fixture(scope="module")
+def loop() -> Any:
+    return eg.load(EXAMPLES / "four_bar.yaml").compile()
+
+
+WIDE = np.broadcast_to(0.5, 10**9)
+RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "tiny max_step": (lambda m: m.simulate(1.0, max_step=1e-300), "max_step = 1e-300 s is too small .* would not end"),
+    "small max_step": (lambda m: m.simulate(1.0, max_step=1e-9), "would not end"),
+    "many steps kept": (lambda m: m.simulate(1.0, max_step=2e-8), r"a run of 5e\+07 steps would keep .* GiB"),
+    "dense and small": (lambda m: m.simulate(1.0, max_step=1e-7, dense_output=True), "would keep"),
+    "far end": (lambda m: m.simulate(1e300), r"needs \S+ more to t = 1e\+300 s, which would not end"),
+    "far back": (lambda m: m.simulate((0, -1e300)), "would not end"),
+    "end nan": (lambda m: m.simulate(np.nan), "span must be"),
+    "end inf": (lambda m: m.simulate(np.inf), "span must be"),
+    "complex end": (lambda m: m.simulate(1j), "span must be"),
+    "many times": (lambda m: m.simulate(1.0, t_eval=WIDE), "t_eval with 1000000000 times would keep"),
+    "a long range": (lambda m: m.simulate(1.0, t_eval=range(10**9)), "t_eval with 1000000000 times would keep"),
+    "complex times": (lambda m: m.simulate(1.0, t_eval=[1j]), "t_eval must be a list of times"),
+    "objects as times": (lambda m: m.simulate(1.0, t_eval=np.array([0, object()], dtype=object)), "t_eval must be"),
+    "rtol nan": (lambda m: m.simulate(1.0, rtol=np.nan), "rtol must not be negative and must be finite"),
+    "rtol negative": (lambda m: m.simulate(1.0, rtol=-1.0), "rtol must not be negative"),
+    "initial text": (lambda m: m.simulate(1.0, "ab"), "initial must hold real numbers, not 'ab'"),
+    "initial complex": (lambda m: m.simulate(1.0, [1j, 0]), "initial must hold real numbers"),
+    "runs": (lambda m: m.simulate_many(1.0, count=10**9), "simulate_many with 1000000000 runs would keep .* GiB"),
+    "runs as float": (lambda m: m.simulate_many(1.0, count=1e9), "count must be a whole number of runs"),
+    "runs negative": (lambda m: m.simulate_many(1.0, count=-1), "count must be a whole number of runs"),
+    "runs as text": (lambda m: m.simulate_many(1.0, count="a"), "count must be a whole number of runs"),
+    "samples": (lambda m: m.simulate_many(1.0, count=10**6, t_eval=np.linspace(0, 1, 1000)), "would keep"),
+    "time as text": (lambda m: m.rhs("a", [0.0, 0.0]), "t must"),
+    "time complex": (lambda m: m.rhs(1j, [0.0, 0.0]), "t must"),
+    "time None": (lambda m: m.rhs(None, [0.0, 0.0]), "t must"),
+    "state as text": (lambda m: m.rhs(0.0, "ab"), "x must hold real numbers"),
+    "a guess as text": (lambda m: m.equilibrium({"theta": "a"}), "theta must be a number, not 'a'"),
+    "a guess complex": (lambda m: m.equilibrium({"theta": 1j}), "theta must be a number"),
+    "a state of modes": (lambda m: m.modes("ab"), "x must hold real numbers"),
+    "no names": (lambda m: m.sensitivities(3, 1.0), "names must be one name or several"),
+    "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would not end"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+@pytest.mark.parametrize("case", RUNS)
+def test_runs_and_calls(swings: dict[str, Any], case: str, target: str) -> None:
+    call, words = RUNS[case]
+    begun = time.perf_counter()
+    with pytest.raises(eg.EomgenError, match=words):
+        call(swings[target])
+    assert time.perf_counter() - begun < 20.0
+
+
+POSITIONS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "a far angle": (lambda m: m.kinematics([1e9]), r"the way to theta = 1e\+09 is 1e\+09 rad .* 2000 at most"),
+    "beyond floats": (lambda m: m.kinematics([1e300]), "at most, in small steps"),
+    "minimal": (lambda m: m.minimal.expand([1e9, 0.0]), "at most, in small steps"),
+    "many columns": (lambda m: m.kinematics(np.broadcast_to(0.5, (1, 10**9))), "would keep"),
+    "many minimal": (lambda m: m.minimal.expand(np.broadcast_to(0.5, (2, 10**9))), "would keep"),
+    "many points": (lambda m: m.kinematic_analysis(WIDE), "a range of 1000000000 points would keep"),
+    "text": (lambda m: m.kinematics("a"), "q_i must hold real numbers"),
+    "complex": (lambda m: m.kinematics([1j]), "q_i must hold real numbers"),
+    "minimal text": (lambda m: m.minimal.expand("a"), "x must hold real numbers"),
+    "reactions text": (lambda m: m.reactions(0.0, "a"), "x must hold real numbers"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", POSITIONS)
+def test_positions_of_a_loop(loop: Any, case: str) -> None:
+    call, words = POSITIONS[case]
+    with pytest.raises(eg.EomgenError, match=words):
+        call(loop)
+
+
+def test_turns_that_are_walked_and_a_position_to_start_from(loop: Any) -> None:
+    """The bound is on the walk alone: 300 turns are walked, and a far angle is reached from a guess."""
+    q = loop.kinematics([0.5])[0]
+    far = loop.kinematics([0.5 + 600 * np.pi])[0]
+    np.testing.assert_allclose(far - q, [600 * np.pi, -600 * np.pi, 0], atol=1e-8)
+    there = loop.assemble(theta=1e5)
+    np.testing.assert_allclose(loop.kinematics([1e5], guess=there)[0], there, atol=1e-9)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_results_written_beside_and_over_the_state(swings: dict[str, Any], target: str) -> None:
+    mod, x = swings[target], np.array([0.3, 0.7])
+    expected = mod.rhs(0.0, x)
+    np.testing.assert_array_equal(mod.rhs(0.0, x, out=x), expected)
+    batch = np.asfortranarray(np.ones((2, 50)))[:, ::2]
+    np.testing.assert_array_equal(mod.rhs(0.0, batch, out=batch)[:, 3], mod.rhs(0.0, [1.0, 1.0]))
+    frozen = np.zeros(2)
+    frozen.flags.writeable = False
+    with pytest.raises(eg.UsageError, match="out of rhs .* read-only|out of rhs is read-only"):
+        mod.rhs(0.0, [0.0, 0.0], out=frozen)
+    assert mod.rhs(0.0, np.zeros((2, 0))).shape == (2, 0)
+
+
+def test_steps_of_length_zero_are_named(swings: dict[str, Any]) -> None:
+    with pytest.raises(eg.SimulationError, match="lead nowhere|stopped"):
+        swings["numpy"].simulate(1.0, atol=1e-300, rtol=1e-300, method="LSODA")
