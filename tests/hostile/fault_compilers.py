@@ -59,8 +59,8 @@ def compilers(work: Work) -> dict[str, str]:
 
 FEW = ("hangs behind a child", "hangs in compiling", "makes nothing", "links another model", "has an open quotation",
        "is blank", "links for another machine")  # fmt: skip
-#: Those that meet the Cython layer too, which takes half a minute.
 UNLOADABLE = "leaves out a function"  #: from the link on, so that only loading shows it
+#: Those that meet the Cython layer too, which takes half a minute.
 OF_LAYER = (UNLOADABLE, "fails in compiling", "makes nothing", "makes garbage", "compiles another source")
 
 
