@@ -22,6 +22,7 @@ BATCH_SECONDS = 5.0  #: aimed at for one batch
 GRACE = 10.0  #: seconds after which a case that outlived its alarm is killed with its process
 SILENCE = 900.0  #: seconds a worker may take to prepare
 RENEWAL = 1 << 30  #: a worker that holds more (bytes) is replaced after its batch
+IDLE_DEATHS = 5  #: in a row, of workers that run no case, after which a campaign gives up
 EACH = 20  #: most findings of one key that are kept as files
 
 
@@ -60,6 +61,7 @@ class Campaign:
         self.findings: dict[tuple[str, str], list[dict[str, Any]]] = {}
         self.lock = threading.Lock()
         self.begun = time.monotonic()
+        self.missing = 0  #: cases that were wanted and not run, where the run gave up
 
     @property
     def cases(self) -> int:
@@ -86,6 +88,7 @@ class Campaign:
             for thread in threads:
                 thread.join(timeout=10.0 / self.jobs)
             tell(self)
+        self.missing = max(0, sum(self.wanted.values()) - self.cases) if cases else 0
 
     def take(self) -> tuple[str, int, int] | None:
         """The next batch: of the kind that is furthest behind its part."""
@@ -107,6 +110,7 @@ class Campaign:
         """One worker after the other, batch after batch."""
         with tempfile.TemporaryDirectory(prefix="eomgen-fuzz-", ignore_cleanup_errors=True) as folder:
             worker: Process | None = None
+            idle_deaths = 0
             while (batch := self.take()) is not None:
                 name, first, count = batch
                 end, skip = first + count, []
@@ -120,7 +124,7 @@ class Campaign:
                             else:
                                 with self.lock:
                                     self.records[name].add(report)
-                                first = report["next"]
+                                first, idle_deaths = report["next"], 0
                         self._minimise(worker, name)
                         if self.records[name].memory > RENEWAL and worker.memory() > RENEWAL:
                             raise Died
@@ -144,8 +148,10 @@ class Campaign:
                                 self.records[name].cases += 1
                                 self.records[name].outcomes[outcome] += 1
                             skip.append(seed)
-                        elif str(death):
-                            raise
+                        elif str(death):  # between two cases: by no case's fault
+                            idle_deaths += 1
+                            if idle_deaths > IDLE_DEATHS:
+                                raise
             if worker is not None:
                 worker.stop()
 
@@ -213,7 +219,7 @@ class Process:
 
     def _line(self) -> bytes:
         assert self.process.stdout is not None
-        last = time.monotonic()
+        last, late = time.monotonic(), None
         while b"\n" not in self.rest:
             ready, _, _ = select.select([self.process.stdout], [], [], 0.5)
             if ready:
@@ -223,9 +229,10 @@ class Process:
                 self.rest += data
                 last = time.monotonic()
                 continue
-            seed, begun = BEAT.unpack_from(self.beat, 0)
-            now = time.monotonic()
-            if (seed != IDLE and now - begun > SECONDS + GRACE) or now - last > SILENCE:
+            beat, now = BEAT.unpack_from(self.beat, 0), time.monotonic()
+            over = beat[0] != IDLE and now - beat[1] > SECONDS + GRACE
+            seen_twice, late = over and beat == late, beat if over else None  # a beat may be read half written
+            if seen_twice or now - last > SILENCE:
                 self.process.kill()
                 self.process.wait()
                 raise Died("hang: in machine code, killed")

@@ -66,7 +66,7 @@ class Worker:
         """One case, which the parent can see run."""
         BEAT.pack_into(self.beat, 0, seed, time.monotonic())
         found = self.runner.run(kind, case)
-        BEAT.pack_into(self.beat, 0, IDLE, 0.0)
+        BEAT.pack_into(self.beat, 0, IDLE, time.monotonic())  # the two numbers are not written at once
         return found
 
     def batch(self, name: str, first: int, count: int, skip: list[int]) -> None:
