@@ -6,7 +6,6 @@ import importlib.machinery
 import platform
 import shutil
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -143,6 +142,8 @@ def _translate(directory: Path) -> None:
     if str(directory).isascii():
         _run_cython(directory / SOURCE)
         return
+    import tempfile  # rarely needed
+
     with tempfile.TemporaryDirectory(prefix="eomgen-") as plain:
         for name in LAYER:
             shutil.copy(directory / name, plain)
