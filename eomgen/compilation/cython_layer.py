@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.machinery
 import platform
+import shutil
 import sys
 import threading
 from collections.abc import Callable, Mapping
@@ -115,7 +116,7 @@ def build_layer(
         with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
             try:
                 others = pool.map(compile_one, commands[:-1])
-                _run_cython(directory / SOURCE)
+                _translate(directory)
                 compile_one(commands[-1])
                 list(others)
             except BaseException:
@@ -134,6 +135,25 @@ def _c_flags(compiler: CompilerInfo) -> list[str]:
 
 def _objects(entry: CacheEntry) -> list[Path]:
     return [entry.directory / name for name in _OBJECTS]
+
+
+def _translate(directory: Path) -> None:
+    """Make _core.c, elsewhere if the name of the folder is none that Cython can write into C."""
+    if str(directory).isascii():
+        _run_cython(directory / SOURCE)
+        return
+    import tempfile  # rarely needed
+
+    with tempfile.TemporaryDirectory(prefix="eomgen-") as plain:
+        for name in LAYER:
+            shutil.copy(directory / name, plain)
+        try:
+            _run_cython(Path(plain, SOURCE))
+        except UnicodeError as error:
+            raise ToolchainError(
+                f"Cython cannot write the name of {plain}: {error}. Set TMPDIR or EOMGEN_CACHE_DIR to a name in ASCII"
+            ) from error
+        shutil.copy(Path(plain, "_core.c"), directory)
 
 
 def _run_cython(source: Path) -> None:

@@ -88,9 +88,13 @@ def read_trusted(path: str | os.PathLike[str]) -> bytes:
 
 def make_private(folder: str | os.PathLike[str]) -> None:
     """Make a folder, and those above it that are missing, for this user alone."""
-    name = os.path.abspath(folder)
-    if not os.path.isdir(name):
-        make_private(os.path.dirname(name))
+    name, missing = os.path.abspath(folder), []
+    with suppress(FileNotFoundError, NotADirectoryError):
+        os.lstat(name)  # a name that is too long is told before anything is made
+    while not os.path.isdir(name):
+        missing.append(name)
+        name = os.path.dirname(name)
+    for name in reversed(missing):
         with suppress(FileExistsError):  # of another process; else what follows says what is in the way
             os.mkdir(name, 0o700)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
 from pathlib import Path
 
 import pytest
@@ -11,10 +11,8 @@ from hostile.faults import FAULTS
 
 
 @pytest.fixture(scope="module")
-def work(tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config) -> Iterator[Work]:
-    from conftest import CACHE
-
-    return Work(tmp_path_factory.mktemp("faults"), Path(pytestconfig.stash[CACHE]))
+def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
+    return Work(tmp_path_factory.mktemp("faults"), Path(os.environ["EOMGEN_CACHE_DIR"]))  # that of all tests
 
 
 @pytest.mark.slow
