@@ -127,6 +127,13 @@ def test_resets_and_terminal_events_go_on(ball: Any, tmp_path: Path, killed: Any
     go_through(ball, tmp_path / "c", killed, 2, span=(0, 10), max_step=1e-3, events=[lambda t, x: x[0] - 0.3])
 
 
+def test_a_run_that_ended_where_it_was_reset_goes_on(tmp_path: Path, killed: Any) -> None:
+    m = bouncing(reset={"h_dot": "-0.98*h_dot"})
+    m.event("end", "2*h", direction=-1, terminal=True)
+    for target in ("cython", "numpy"):
+        go_through(m.compile(target=target), tmp_path / target, killed, 1, span=2, rtol=1e-6)
+
+
 def test_impacts_go_on(tmp_path: Path, killed: Any) -> None:
     module = bouncing(restitution=0.98).compile()
     go_through(module, tmp_path / "run.ckpt", killed, 3, span=20, max_step=1e-3)
