@@ -38,6 +38,7 @@ _ERRORS = (
     "SimulationInterrupted",
     "SingularMassMatrixError",
     "ToolchainError",
+    "UnavailableError",
     "UnsolvedError",
     "UsageError",
     "ZenoError",

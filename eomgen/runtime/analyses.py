@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UnavailableError
 from .force_analyses import ForceAnalyses
 
 if TYPE_CHECKING:
@@ -29,10 +29,10 @@ def require_velocities(layout: Layout) -> None:
 
     Raises
     ------
-    UsageError
+    UnavailableError
     """
     if getattr(layout, "given_rates", False):
-        raise UsageError(
+        raise UnavailableError(
             f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
             "other analyses are not derived; rhs, jacobian, simulate and linearise are there"
         )
@@ -43,10 +43,10 @@ def require_projection(layout: Layout) -> None:
 
     Raises
     ------
-    UsageError
+    UnavailableError
     """
     if not layout.projects:
-        raise UsageError(
+        raise UnavailableError(
             f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project, and its "
             "derivatives by inputs and parameters are not derived; derive without baumgarte for analyses"
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UnavailableError, UsageError
 from ..limits.constraints import STATE
 from ..limits.inertia import SINGULAR
 from ..numeric import algebra
@@ -37,7 +37,7 @@ class Canonical:
     def __init__(self, module: Module) -> None:
         layout = module.layout
         if layout.n_m != layout.n_v:
-            raise UsageError(
+            raise UnavailableError(
                 f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "
                 "derive it with method='hamilton'"
             )

@@ -26,9 +26,10 @@ def spell(value: Any, depth: int = DEPTH) -> Any:
     """A value as what has one exact ``repr``, the same in every process.
 
     Of a function: its name, its compiled code, its defaults and what it holds from around it.  Global names it reads,
-    files and random numbers are not seen.  Of another object: its type and its attributes.
+    files and random numbers are not seen.  Of another object: its type and its attributes, in slots too; of one that
+    shows none, such as ``functools.partial``, what it would be pickled as.
     """
-    if value is None or isinstance(value, (bool, int, float, str, bytes)):
+    if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
         return value
     if isinstance(value, (np.ndarray, np.generic)):
         array = np.asarray(value)
@@ -49,10 +50,31 @@ def spell(value: Any, depth: int = DEPTH) -> Any:
     if hasattr(value, "__func__"):
         return ["method", spell(value.__func__, depth - 1), spell(value.__self__, depth - 1)]
     if hasattr(value, "__code__"):
-        held = [cell.cell_contents for cell in value.__closure__ or ()]
-        around = [value.__defaults__, value.__kwdefaults__, held]
+        around = [value.__defaults__, value.__kwdefaults__, [_held(cell) for cell in value.__closure__ or ()]]
         return ["function", value.__module__, value.__qualname__, spell(value.__code__), spell(around, depth - 1)]
-    return ["object", name, getattr(value, "__qualname__", ""), spell(getattr(value, "__dict__", {}), depth - 1)]
+    if isinstance(value, type):
+        return ["type", f"{value.__module__}.{value.__qualname__}"]
+    return ["object", name, spell(_state(value), depth - 1)]
+
+
+def _held(cell: Any) -> Any:
+    try:
+        return cell.cell_contents
+    except ValueError:  # nothing yet
+        return None
+
+
+def _state(value: Any) -> Any:
+    """The attributes of an object, or what it would be pickled as if it shows none."""
+    slots = [name for kind in type(value).__mro__ for name in np.atleast_1d(getattr(kind, "__slots__", ())).tolist()]
+    found = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
+    found |= getattr(value, "__dict__", {})
+    if found:
+        return found
+    try:
+        return value.__reduce_ex__(4)
+    except Exception:  # it cannot be pickled
+        return getattr(value, "__qualname__", "")
 
 
 def code_digest(module: Module) -> str:

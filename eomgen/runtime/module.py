@@ -372,6 +372,8 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
             from .steppers import find_solver
 
             return find_solver(self, name)
+        if (own := getattr(type(self), name, None)) is not None:
+            return own.__get__(self)  # a property that this model does not have: once more, for its own reason
         calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
         raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
 

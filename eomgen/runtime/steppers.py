@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
 from .compiled import no_series, stepper_options
 from .events import Events
@@ -25,7 +25,7 @@ def find_solver(module: Module, name: str) -> Any:
     if name in getattr(core, "methods", ()):
         return solver_class(core, name)
     if name == "Taylor":
-        raise UsageError(no_series(module))
+        raise UnavailableError(no_series(module))
     return getattr(require("scipy.integrate", "scipy", f"method {name}"), name)
 
 

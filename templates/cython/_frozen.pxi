@@ -82,7 +82,7 @@ cdef long thaw(Journey j, dict kept) except -1000:
     if len(stored[0]) != len(stored[1]) or (at_times and len(stored[0]) != whole[11]):
         raise ValueError("results that do not fit each other")
     if k and not (np.isin(found["event_counts"][:, 1], (-1, 0, 1)).all() and
-                  np.isin(found["event_counts"][:, 2], (0, 1)).all()):
+                  np.isin(found["event_counts"][:, 2], (-1, 0, 1, 2)).all()):
         raise ValueError("events that cannot be")
     if len(stored[3]) and not np.isin(stored[3][:, 0], np.arange(k)).all():
         raise ValueError("events that are not there")

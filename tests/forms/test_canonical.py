@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import judges
@@ -94,6 +95,12 @@ def test_other_methods_have_no_momenta() -> None:
     mod = models.build("pendulum").compile("embedding", target="numpy")
     with pytest.raises(UsageError, match="derive it with method='hamilton'"):
         _ = mod.canonical
+    assert not hasattr(mod, "canonical")
+    assert not hasattr(mod, "Taylor")
+    found = {name for name, _ in inspect.getmembers(mod)}  # as notebooks do to complete names
+    assert {"rhs", "simulate", "minimal", "dae"} <= found
+    with pytest.raises(AttributeError, match="there are: "):
+        _ = mod.nothing
     form = models.build("pendulum").compile("hamilton", target="numpy").canonical
     with pytest.raises(UsageError, match=r"z must have shape \(2,\) \[theta, p_theta\]"):
         form.rhs(0.0, np.zeros(3))

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -127,6 +128,13 @@ def test_resets_and_terminal_events_go_on(ball: Any, tmp_path: Path, killed: Any
     go_through(ball, tmp_path / "c", killed, 2, span=(0, 10), max_step=1e-3, events=[lambda t, x: x[0] - 0.3])
 
 
+def test_a_run_that_ended_where_it_was_reset_goes_on(tmp_path: Path, killed: Any) -> None:
+    m = bouncing(reset={"h_dot": "-0.98*h_dot"})
+    m.event("end", "2*h", direction=-1, terminal=True)
+    for target in ("cython", "numpy"):
+        go_through(m.compile(target=target), tmp_path / target, killed, 1, span=2, rtol=1e-6)
+
+
 def test_impacts_go_on(tmp_path: Path, killed: Any) -> None:
     module = bouncing(restitution=0.98).compile()
     go_through(module, tmp_path / "run.ckpt", killed, 3, span=20, max_step=1e-3)
@@ -159,6 +167,41 @@ def test_functions_as_inputs_go_on_and_others_are_refused(crank: Any, tmp_path: 
     go_through(crank, tmp_path / "run.ckpt", killed, 2, span=1, rtol=1e-6, inputs={"tau": drive(0.1)})
     with pytest.raises(eg.UsageError, match=r"belongs to another run: inputs\.tau differ"):
         crank.simulate(1, rtol=1e-6, inputs={"tau": drive(0.2)}, checkpoint=tmp_path / "run.ckpt")
+
+
+class Hidden:
+    """A function whose number is in a slot."""
+
+    __slots__ = ("size",)
+
+    def __init__(self, size: float) -> None:
+        self.size = size
+
+    def __call__(self, t: float, x: Any) -> float:
+        return self.size * np.sin(t)
+
+
+def spline(size: float) -> Callable[[float, Any], Any]:
+    from scipy.interpolate import CubicSpline
+
+    curve = CubicSpline([0.0, 1.0, 2.0], [0.0, size, 0.0])
+    return lambda t, x: float(curve(t))
+
+
+DRIVES = {
+    "partial": lambda size: partial(lambda t, x, size: size * np.sin(t), size=size),
+    "slots": Hidden,
+    "spline": spline,
+}
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_functions_that_hide_their_numbers_are_told_apart(crank: Any, drive: str, tmp_path: Path) -> None:
+    file, make = tmp_path / "run.ckpt", DRIVES[drive]
+    first = crank.simulate(0.5, rtol=1e-6, inputs={"tau": make(0.1)}, checkpoint=file)
+    require_same(first, crank.simulate(0.5, rtol=1e-6, inputs={"tau": make(0.1)}, checkpoint=file))
+    with pytest.raises(eg.UsageError, match=r"belongs to another run: inputs\.tau differ"):
+        crank.simulate(0.5, rtol=1e-6, inputs={"tau": make(0.2)}, checkpoint=file)
 
 
 def test_a_time_asked_for_at_a_corner_after_a_reset_is_stored(tmp_path: Path) -> None:
