@@ -30,9 +30,7 @@ REPORTED = [name for name in dir(MechanismReport) if not name.startswith("__")]
 def bare() -> eg.Model:
     a, b, a_dot, b_dot, k = sympy.symbols("a b a_dot b_dot k")
     lagrangian = (a_dot**2 + b_dot**2 * sympy.cos(a) ** 2 + (a - b) * a_dot * b_dot / 3) / 2 - k * (b - a) ** 2
-    return eg.Model.from_lagrangian(
-        "bare", lagrangian, [a, b], dissipation=(a_dot - b_dot) ** 2, parameters={"k": 2.0}
-    )
+    return eg.Model.from_lagrangian("bare", lagrangian, [a, b], dissipation=(a_dot - b_dot) ** 2, parameters={"k": 2.0})
 
 
 def example(name: str) -> Callable[[], eg.Model]:

@@ -111,9 +111,7 @@ def test_a_clash_of_names() -> None:
     "text", ["a_dot**4/4 - a**2/2", "-sqrt(1 - a_dot**2)", "exp(a_dot)", "a_dot**3", "sin(a_dot)*a"]
 )
 def test_a_lagrangian_that_is_not_quadratic_in_the_velocities_is_named(text: str) -> None:
-    with pytest.raises(
-        ModelError, match=r"lagrangian.expression: is not quadratic in the velocities.*a_dot; write T"
-    ):
+    with pytest.raises(ModelError, match=r"lagrangian.expression: is not quadratic in the velocities.*a_dot; write T"):
         Model.from_lagrangian("powers", text, ["a"]).derive()
 
 
