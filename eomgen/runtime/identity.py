@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +27,10 @@ def spell(value: Any, depth: int = DEPTH) -> Any:
     """A value as what has one exact ``repr``, the same in every process.
 
     Of a function: its name, its compiled code, its defaults and what it holds from around it.  Global names it reads,
-    files and random numbers are not seen.  Of another object: its type and its attributes, in slots too; of one that
-    shows none, such as ``functools.partial``, what it would be pickled as.
+    files and random numbers are not seen.  Of another object: its type, its attributes, those in slots too, and what
+    it would be pickled as, where its type has a way of its own (functools.partial, types written in C).
     """
-    if value is None or isinstance(value, (bool, int, float, complex, str, bytes)):
+    if value is None or isinstance(value, (bool, int, float, str, bytes)):
         return value
     if isinstance(value, (np.ndarray, np.generic)):
         array = np.asarray(value)
@@ -50,31 +51,36 @@ def spell(value: Any, depth: int = DEPTH) -> Any:
     if hasattr(value, "__func__"):
         return ["method", spell(value.__func__, depth - 1), spell(value.__self__, depth - 1)]
     if hasattr(value, "__code__"):
-        around = [value.__defaults__, value.__kwdefaults__, [_held(cell) for cell in value.__closure__ or ()]]
+        held = [_content(cell) for cell in value.__closure__ or ()]
+        around = [value.__defaults__, value.__kwdefaults__, held]
         return ["function", value.__module__, value.__qualname__, spell(value.__code__), spell(around, depth - 1)]
-    if isinstance(value, type):
-        return ["type", f"{value.__module__}.{value.__qualname__}"]
-    return ["object", name, spell(_state(value), depth - 1)]
+    return ["object", name, getattr(value, "__qualname__", ""), spell(_attributes(value), depth - 1)]
 
 
-def _held(cell: Any) -> Any:
+def _content(cell: Any) -> Any:
+    """What a function holds from around it; a name that was not given a value yet holds nothing."""
     try:
         return cell.cell_contents
-    except ValueError:  # nothing yet
+    except ValueError:
         return None
 
 
-def _state(value: Any) -> Any:
-    """The attributes of an object, or what it would be pickled as if it shows none."""
-    slots = [name for kind in type(value).__mro__ for name in np.atleast_1d(getattr(kind, "__slots__", ())).tolist()]
-    found = {name: getattr(value, name) for name in slots if hasattr(value, name) and not name.startswith("__")}
-    found |= getattr(value, "__dict__", {})
-    if found:
+def _attributes(value: Any) -> dict[str, Any]:
+    """What an object holds, by name."""
+    found = dict(getattr(value, "__dict__", {}))
+    kind = type(value)
+    if isinstance(value, type):
         return found
-    try:
-        return value.__reduce_ex__(4)
-    except Exception:  # it cannot be pickled
-        return getattr(value, "__qualname__", "")
+    for base in kind.__mro__:
+        slots = vars(base).get("__slots__", ())
+        for slot in (slots,) if isinstance(slots, str) else tuple(slots):
+            name = f"_{base.__name__.lstrip('_')}{slot}" if slot[:2] == "__" and slot[-2:] != "__" else slot
+            if name not in ("__dict__", "__weakref__") and hasattr(value, name):
+                found.setdefault(name, getattr(value, name))
+    if any(getattr(kind, way) is not getattr(object, way) for way in ("__reduce__", "__reduce_ex__", "__getstate__")):
+        with suppress(Exception):  # whatever its type does; it need not know how
+            found["pickled"] = list(value.__reduce_ex__(2)[1:3])
+    return found
 
 
 def code_digest(module: Module) -> str:
