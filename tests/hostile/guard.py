@@ -18,6 +18,7 @@ import sympy
 import eomgen
 
 PACKAGE = Path(eomgen.__file__).resolve().parent
+TEMPLATES = f"{PACKAGE.parent / 'templates'}{os.sep}"
 #: Where code and data of the package and of Python lie.
 ROOTS = tuple(
     os.path.realpath(path) + os.sep
@@ -177,6 +178,8 @@ class Guard:
         caller = sys._getframe(3).f_code.co_filename
         if caller.startswith("<frozen importlib") or caller.endswith(os.sep + "ast.py") or caller in MAKERS:
             return None  # an import, a parse that runs nothing, a class
+        if caller.endswith("jinja2/environment.py") and self._real(filename).startswith(TEMPLATES):
+            return None  # a template of the package
         return None if source is None else f"compile {source!r:.120} as {filename!r} by {caller}"
 
     def _executed(self, code: Any) -> str | None:
