@@ -179,3 +179,12 @@ def label_of(reference: Mapping[str, Any]) -> str:
             f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"
         )
     return f"{reference.get('body')}.at{text}"
+
+
+def without_defaults(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
+    """Values that are neither None nor their default; arrays, which do not compare as a whole, are no default."""
+
+    def left_out(key: str, value: Any) -> bool:
+        return value is None or (isinstance(value, str | int) and key in defaults and value == defaults[key])
+
+    return {key: value for key, value in values.items() if not left_out(key, value)}

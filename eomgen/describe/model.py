@@ -10,7 +10,7 @@ from ..graph.shown import shown
 from ..joints import JOINTS
 from . import FORCE_FIELDS
 from .build import build
-from .description import GROUND_NAME, SECTIONS, Description
+from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .fields_constraints import CONSTRAINT
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
@@ -194,11 +194,11 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         given = {"expression": expression, "terminal": terminal, "direction": direction, "reset": reset or None}
         given |= {"restitution": restitution, "doc": doc}
         defaults = {"terminal": False, "direction": 0, "doc": ""}
-        self._description.add("events", name, _given(given, defaults))
+        self._description.add("events", name, without_defaults(given, defaults))
 
     def _quantity(self, section: str, name: str, value: Value, unit: str, doc: str, key: str = "value") -> None:
         given = {key: value, "unit": unit, "doc": doc}
-        self._description.add(section, name, _given(given, {"unit": "", "doc": "", key: ""}))
+        self._description.add(section, name, without_defaults(given, {"unit": "", "doc": "", key: ""}))
 
     def coordinate(self, name: str) -> Any:
         """The SymPy symbol of a coordinate, by name; it is looked up when the model is checked."""
@@ -390,15 +390,6 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         from .display import model_html
 
         return model_html(self._description)
-
-
-def _given(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
-    """Values that are neither None nor their default; arrays, which do not compare as a whole, are no default."""
-
-    def left_out(key: str, value: Any) -> bool:
-        return value is None or (isinstance(value, str | int) and key in defaults and value == defaults[key])
-
-    return {key: value for key, value in values.items() if not left_out(key, value)}
 
 
 _SINGULAR = {section: {"bodies": "body"}.get(section, section[:-1]) for section in SECTIONS}

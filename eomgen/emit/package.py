@@ -40,6 +40,8 @@ VERIFICATION = (
     *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
     *("identities.py", "jacobians.py", "recorded.py", "selftest.py", "verify.py"),
 )
+#: Files of the other folders that no package needs: of eomgen's own cache, and of files of robots.
+ELSEWHERE = frozenset({"files/kept.py", "files/locks.py", "limits/files.py"})
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
 
 
@@ -106,12 +108,12 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, texts.py, and limits/ to ensembles/ and parts of verification/, as in eomgen itself."""
+    """errors.py, texts.py, and limits/ to ensembles/ without ELSEWHERE and parts of verification/, as in eomgen."""
     root = files("eomgen")
     found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "texts.py")}
     for folder in ("limits", "files", "numeric", "runtime", "analysis", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
-            if item.name.endswith(".py"):
+            if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
     for name in VERIFICATION:
         found[f"verification/{name}"] = (root / "verification" / name).read_text(encoding="utf-8")

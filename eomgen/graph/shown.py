@@ -6,6 +6,8 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
+from .. import texts
+
 LONGEST = 120  #: characters of a value in a message
 EXPONENT = 10_000  #: of a number that SymPy may work out
 #: Begins the text of a value that has none: SymPy prints recursively, Python refuses whole numbers of 4300 digits.
@@ -24,8 +26,7 @@ def shown(value: Any) -> str:
 
 def shortened(value: Any, longest: int = LONGEST) -> str:
     """The text of a value, cut where it is long."""
-    text = shown(value)
-    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+    return texts.shortened(shown(value), longest)
 
 
 def quoted(value: Any, longest: int = LONGEST) -> str:
@@ -37,7 +38,7 @@ def quoted(value: Any, longest: int = LONGEST) -> str:
             text = f"{NO_TEXT}{type(value).__name__}>"
     else:
         text = shown(value)
-    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+    return texts.shortened(text, longest)
 
 
 def _prints(value: Any) -> bool:

@@ -4,5 +4,5 @@ One file per kind.  ``rounding``: what double precision leaves; ``constraints``:
 error model; ``inertia``: positive, physical; ``systems``: linear systems of a method; ``motions``: walks along
 constraints without forces; ``statics``: balance and stability; ``impacts``; ``runs``: integrators, events, inputs;
 ``descriptions``: what a user wrote; ``files``: sizes of robot files.  Templates in C take theirs from here too
-(:mod:`eomgen.emit.limits`).
+(:mod:`eomgen.limits.in_c`).
 """

@@ -141,6 +141,8 @@ class Assembled:
         state = read_numbers("x", x)
         if state.shape not in ((self.n_q,), (self.n_x,)):
             raise UsageError(f"x must be of shape ({self.n_q},) or ({self.n_x},), not {state.shape}")
+        if not np.isfinite(state).all():
+            raise UsageError(f"x must be finite, not {state}")
         initial = self._initial(t, None, None)
         here = initial.side(state[: self.n_q])
         there = initial.side(initial.reference())

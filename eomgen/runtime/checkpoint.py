@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from .signals import Forcing
 
 FORMAT = "eomgen checkpoint 1"
-EVERY = 60.0  #: seconds between two writings
 
 
 class Checkpoint:
@@ -39,7 +38,7 @@ class Checkpoint:
     file : str or Path
     every : float
         Seconds of the clock on the wall between two writings.
-    resume : bool, optional
+    resume : bool or None
         True: the file must be there; False: what is there is replaced; None: go on if it is there, else begin.
 
     Attributes
@@ -53,12 +52,12 @@ class Checkpoint:
         Values that cannot be.
     """
 
-    def __init__(self, file: Any, every: float = EVERY, resume: bool | None = None) -> None:
+    def __init__(self, file: Any, every: float, resume: bool | None) -> None:
         if not isinstance(file, (str, Path)) or not str(file) or "\0" in str(file):
             raise UsageError(f"checkpoint must be the path of a file, not {file!r}")
         if isinstance(every, bool) or not isinstance(every, (int, float)) or not (every >= 0.0 and isfinite(every)):
             raise UsageError(f"checkpoint_every must be a number of seconds, not {every!r}")
-        if resume not in (None, True, False):
+        if not isinstance(resume, bool | None):
             raise UsageError(f"resume must be True, False or None, not {resume!r}")
         self.file, self.every, self.resume = Path(file), float(every), resume
         self.identity: dict[str, Any] = {}

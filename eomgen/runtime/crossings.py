@@ -14,11 +14,22 @@ import numpy as np
 
 from ..errors import ZenoError
 from ..limits.rounding import EPS
-from ..limits.runs import ASIDE, CROWDED, INSTANT, LATE, MOMENTARY, TOUCHED, TOUCHING, TURNING
+from ..limits.runs import (
+    ASIDE,
+    CROWDED,
+    HALVED,
+    INSTANT,
+    LATE,
+    MOMENTARY,
+    RESTING,
+    SAMPLED,
+    TOUCHED,
+    TOUCHING,
+    TURNING,
+)
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, crowd_of
 
-SAMPLES, HALVINGS, RESTING = 16, 50, 1000  #: as in crossings.c
 GOLDEN = 0.3819660112501051
 
 
@@ -140,7 +151,7 @@ class Crossings:
     def _after_reset(self, step: Step, i: int, last: float) -> list[Bracket]:
         """A reset left the value at zero: it has to be seen on its side before it can come back."""
         t, g, seen, side = step.t_old, 0.0, False, self.leaving[i]
-        for k in range(HALVINGS, -1, -1):
+        for k in range(HALVED, -1, -1):
             later = step.t if k == 0 else step.t_old + (step.t - step.t_old) * 2.0**-k
             value = last if k == 0 else self._value(step, i, later)
             if seen and value * side <= 0.0:
@@ -167,10 +178,10 @@ class Crossings:
         return least < 0.5 * min(abs(a), abs(b))
 
     def _touching(self, step: Step, i: int, a: float, b: float) -> list[Bracket]:
-        s, h = 1.0 if a > 0.0 else -1.0, (step.t - step.t_old) / SAMPLES
+        s, h = 1.0 if a > 0.0 else -1.0, (step.t - step.t_old) / SAMPLED
         best, at = np.inf, step.t_old
-        for k in range(1, SAMPLES):
-            t = step.t_old + k * (step.t - step.t_old) / SAMPLES
+        for k in range(1, SAMPLED):
+            t = step.t_old + k * (step.t - step.t_old) / SAMPLED
             if (value := s * self._value(step, i, t)) < best:
                 best, at = value, t
         left, right = at - h, at + h

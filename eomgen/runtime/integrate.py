@@ -185,16 +185,14 @@ class _Journey:
         pause: Pause | None = None,
     ) -> None:  # fmt: skip
         """Go on to the end, a terminal event or a failure, from where a checkpoint was kept if there is one."""
-        corners, going_on = len(self.nodes) - 1, False
+        corners, k, going_on = len(self.nodes) - 1, 0, False
         if pause is not None and pause.checkpoint.kept is not None:
-            k, self.status = pause.go_on(self, corners)
-            going_on = self.status == 2
-            self.status, self.message = (0, MESSAGES[0]) if going_on else (self.status, MESSAGES[self.status])
+            k, status = pause.go_on(self, corners)
+            going_on = status == 2
             if not going_on:
+                self.status, self.message = status, MESSAGES[status]
                 return
-            self._go(k, going_on, reset, enter, pause)
-        else:
-            self._go(0, False, reset, enter, pause)
+        self._go(k, going_on, reset, enter, pause)
         if pause is not None and self.status >= 0:
             pause.save(self, corners - 1, ended=self.status)
 

@@ -188,9 +188,9 @@ class Rows:
         t : float
         rows : {"independent", "all"}
         """
-        if rows == "all":
+        if isinstance(rows, str) and rows == "all":
             return self.every(q, p=p, u=u, out=out, t=t)
-        if rows != "independent":
+        if not isinstance(rows, str) or rows != "independent":
             raise UsageError(f"rows must be 'independent' or 'all', not {rows!r}")
         result = self.every(q, p=p, u=u, t=t)[self.independent]
         if out is None:

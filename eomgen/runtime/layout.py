@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array, Scales, Space
 from .names import check_names
+from .room import read_numbers
 
 ABI = 1  #: layout of the metadata this file reads
 
@@ -202,7 +203,7 @@ class Layout:
                 result[names.index(name)] = number(f"{what} {name}", value)
             self._check_masses(what, names, result)
             return result
-        result = np.asarray(given, dtype=float)
+        result = read_numbers(f"the {what}s", given)
         if result.shape != (len(names),):
             raise UsageError(f"the {what}s must have shape ({len(names)},) ({', '.join(names)}), not {result.shape}")
         self._check_masses(what, names, result)
@@ -240,7 +241,7 @@ def number(label: str, value: object) -> float:
     """One finite number, or a UsageError that names it."""
     try:
         result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise UsageError(f"{label} must be a number, not {value!r}") from None
     if not np.isfinite(result):
         raise UsageError(f"{label} must be finite, not {result}")

@@ -197,7 +197,7 @@ def simulate(
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     longest = float(options.get("max_step", np.inf))
     numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
-    many = abs(end - start) / longest
+    many = abs(end - start) / longest if longest > 0.0 else 0.0  # a solver of another refuses what it does not take
     require_room(f"a run of {many:.3g} steps", many * numbers, "give the times to store, t_eval, or run in parts")
     if kept is not None:
         pause = None if compiled else Pause(kept, solver, dense_output)

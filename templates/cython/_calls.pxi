@@ -113,3 +113,13 @@ cdef int enable_quick_calls(Kernel kernel) except -1:
         kind.tp_vectorcall_offset = <char *>&kernel.quick - <char *><PyObject *>kernel
         kind.tp_flags |= Py_TPFLAGS_HAVE_VECTORCALL
     return 0
+
+
+def address(str name not None):
+    """Address of a kernel's C function (its type is in eomgen.h), for ctypes, Numba or another extension."""
+    return <uintptr_t>MODEL.kernels[find(name, KeyError)].call
+
+
+def capsule(str name not None):
+    """The same address as a capsule named ``eomgen_function``."""
+    return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)

@@ -391,15 +391,5 @@ include "_calls.pxi"
 
 context, timed, state, motion = Context, Timed, State, Motion
 
-
-def address(str name not None):
-    """Address of a kernel's C function (its type is in eomgen.h), for ctypes, Numba or another extension."""
-    return <uintptr_t>MODEL.kernels[find(name, KeyError)].call
-
-
-def capsule(str name not None):
-    """The same address as a capsule named ``eomgen_function``."""
-    return PyCapsule_New(<void *>MODEL.kernels[find(name, KeyError)].call, "eomgen_function", NULL)
-
 include "_steppers.pxi"
 include "_ensembles.pxi"

@@ -6,7 +6,7 @@ cdef object FROZEN = ("numbers", "counts", "rows", "block", "events", "event_cou
 cdef cnp.npy_intp block_length(Journey j):
     """Numbers in stages, in what a method keeps besides, and in the coefficients between two states."""
     cdef cnp.npy_intp n = j.run.n
-    return n * (j.method.rows_K + j.method.rows_F) + eomgen_further(j.method, n, SERIES)
+    return n * (j.method.rows_K + j.method.rows_F) + eomgen_further(j.method, n, j.run.series)
 
 
 cdef dict freeze(Journey j, long status):
@@ -74,7 +74,7 @@ cdef long thaw(Journey j, dict kept) except -1000:
     widths = [1, n, 3 + n * (1 + j.method.rows_F), 2 + n, 1 + n]
     if any(array.size != len(array) * width for array, width in zip(stored, widths)):
         raise ValueError("results of other sizes")
-    most_order = SERIES.most if j.method.expands else 0
+    most_order = j.run.series.most if j.method.expands else 0
     at_times = j.journey.n_eval >= 0
     bounds = {7: most_order, 8: 1, 9: 1, 10: j.journey.n_nodes - 1, 11: max(j.journey.n_eval, 0), 15: 1, 16: 2}
     if any(not 0 <= whole[place] <= most for place, most in bounds.items()) or min(whole[1:7]) < -1000:

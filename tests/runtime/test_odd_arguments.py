@@ -118,3 +118,19 @@ def test_results_written_beside_and_over_the_state(swings: dict[str, Any], targe
 def test_steps_of_length_zero_are_named(swings: dict[str, Any]) -> None:
     with pytest.raises(eg.SimulationError, match="lead nowhere|stopped"):
         swings["numpy"].simulate(1.0, atol=1e-300, rtol=1e-300, method="LSODA")
+
+
+LOOPS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "text as parameters": (lambda m: m.bind(p="?"), "the parameters must hold real numbers, not '\\?'"),
+    "an object as inputs": (lambda m: m.bind(u=...), "the inputs must hold real numbers"),
+    "a huge number": (lambda m: m.x0({m.q_names[0]: 10**400}), "must be a number, not 1000"),
+    "rows of an array": (lambda m: m.constraints(m.assemble(), rows=np.ones(2)), "rows must be 'independent' or 'all'"),
+    "a branch of nan": (lambda m: m.branch(np.full(m.n_q, np.nan)), "x must be finite"),
+}
+
+
+@pytest.mark.parametrize("case", LOOPS)
+def test_what_no_loop_can_take_is_named(loop: Any, case: str) -> None:
+    call, words = LOOPS[case]
+    with pytest.raises(eg.UsageError, match=words):
+        call(loop)

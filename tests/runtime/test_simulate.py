@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import DOP853, solve_ivp
+from scipy.integrate import DOP853, RK45, solve_ivp
 
 from eomgen.errors import EvaluationError, SimulationError, SingularMassMatrixError, UsageError
 from eomgen.runtime import Module, NumpyCore
@@ -204,6 +204,14 @@ def test_wrong_options_are_told(pendulum):
     ]:
         with pytest.raises(UsageError, match=words):
             pendulum.simulate(**({"span": 1.0} | options))
+
+
+def test_a_solver_of_another_refuses_its_options_itself(pendulum):
+    class Own(RK45):
+        pass
+
+    with pytest.raises(ValueError, match="must be positive"):
+        pendulum.simulate(1.0, method=Own, max_step=0.0)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -5,8 +5,6 @@
 
 #include "eomgen_loop.h"
 
-enum { SAMPLES = 16, HALVINGS = 50, RESTING = 1000 };
-
 static int add(eomgen_events *ev, int n, int i, double a, double b, double fa, double fb)
 {
     const double row[4] = {a, b, fa, fb};
@@ -24,7 +22,7 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
 {
     double t = run->t_old, g = 0.0;
     int seen = 0;
-    for (int k = HALVINGS; k >= 0; k--) {
+    for (int k = RUNS_HALVED; k >= 0; k--) {
         const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
         const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
         if (seen && value * ev->leaving[i] <= 0.0) {
@@ -48,7 +46,7 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
 {
     const double a = ev->g[i], b = ev->g_new[i], h = fabs(run->step), s = a > 0.0 ? 1.0 : -1.0;
     const double da = run->direction * s * ev->slope[i] * h, db = run->direction * s * ev->slope_new[i] * h;
-    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= (double)RESTING * RUNS_TOUCHED * ev->size[i]) {
+    if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= RUNS_RESTING * RUNS_TOUCHED * ev->size[i]) {
         return 0;
     }
     const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
@@ -60,13 +58,14 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
 {
     const double s = ev->g[i] > 0.0 ? 1.0 : -1.0;
     double left = run->t_old, right = run->t, best = HUGE_VAL, at = left;
-    for (int k = 1; k < SAMPLES; k++) {
-        const double t = run->t_old + k * (run->t - run->t_old) / (double)SAMPLES, value = s * value_at(method, run, ev, i, t);
+    for (int k = 1; k < RUNS_SAMPLED; k++) {
+        const double t = run->t_old + k * (run->t - run->t_old) / (double)RUNS_SAMPLED;
+        const double value = s * value_at(method, run, ev, i, t);
         if (value < best) {
             best = value, at = t;
         }
     }
-    const double h = (run->t - run->t_old) / (double)SAMPLES, ratio = 0.3819660112501051;
+    const double h = (run->t - run->t_old) / (double)RUNS_SAMPLED, ratio = 0.3819660112501051;
     left = at - h, right = at + h;
     for (int k = 0; k < 60 && best > 0.0 && fabs(right - left) > RUNS_TURNING * fabs(run->step); k++) { /* golden section */
         const int low = fabs(at - left) > fabs(right - at);
