@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.machinery
+import os
 import platform
 import sys
 import threading
@@ -115,7 +116,7 @@ def build_layer(
         with ThreadPoolExecutor(1) as pool:  # steppers and ensembles while Cython translates
             try:
                 others = pool.map(compile_one, commands[:-1])
-                _run_cython(directory / SOURCE)
+                _run_cython(directory / SOURCE, running)
                 compile_one(commands[-1])
                 list(others)
             except BaseException:
@@ -136,7 +137,7 @@ def _objects(entry: CacheEntry) -> list[Path]:
     return [entry.directory / name for name in _OBJECTS]
 
 
-def _run_cython(source: Path) -> None:
+def _run_cython(source: Path, running: Running) -> None:
     """Translate the layer to C in this process; cythonize would want setuptools."""
     import contextlib
     import io
@@ -145,8 +146,15 @@ def _run_cython(source: Path) -> None:
 
     translate: Callable[..., Any] = Main.compile
     said = io.StringIO()
-    with _lock, contextlib.redirect_stderr(said):
-        result = translate(str(source), output_file=str(source.with_suffix(".c")), language_level=3)
+    try:
+        with _lock, contextlib.redirect_stderr(said):
+            result = translate(str(source), output_file=str(source.with_suffix(".c")), language_level=3)
+    except UnicodeEncodeError:  # it writes the name of the folder into the C code, and this one is no text here
+        command = [sys.executable, "-P", "-m", "cython", "-3", source.name, "-o", source.with_suffix(".c").name]
+        ended = running.run(command, source.parent, COMPILE)
+        if ended.returncode != 0:
+            raise_failure(f"translating the Cython layer {os.fsencode(source)!r}", ended, source.parent)
+        return
     if result.num_errors:
         raise ToolchainError(f"Cython cannot translate {source}:\n{said.getvalue()}", "cython", said.getvalue())
 
