@@ -141,6 +141,8 @@ class Crossings:
             if event.direction != UNWATCHED and not (noted and not self.leaving[i]):
                 if self.leaving[i]:
                     found += self._after_reset(step, i, b)
+                elif a == 0.0 and self.forward * float(self.slope[i]) * b < 0.0:
+                    found += self._from_zero(step, i, b)
                 elif (a <= 0.0 <= b) or (a >= 0.0 >= b):
                     found.append(Bracket(i, step.t_old, step.t, a, b))
                 elif self._may_touch(step, i, a, b):
@@ -165,6 +167,19 @@ class Crossings:
         if back and event.direction * side <= 0 and event.action in (RESET, WAIT):
             raise self._endless(step.t)
         return [Bracket(i, step.t_old, step.t_old, float(side), 0.0)] if back else []
+
+    def _from_zero(self, step: Step, i: int, last: float) -> list[Bracket]:
+        """A value that is zero where a step begins, leaves to one side and ends on the other: two zeros."""
+        side = 1.0 if self.forward * float(self.slope[i]) > 0.0 else -1.0
+        t, g, seen = step.t_old, 0.0, False
+        for k in range(HALVINGS, -1, -1):
+            later = step.t if k == 0 else step.t_old + (step.t - step.t_old) * 2.0**-k
+            value = last if k == 0 else self._value(step, i, later)
+            if seen and value * side <= 0.0:
+                return [Bracket(i, step.t_old, step.t_old, -side, 0.0), Bracket(i, t, later, g, value)]
+            seen = seen or value * side > 0.0
+            t, g = later, value
+        return [Bracket(i, step.t_old, step.t, 0.0, last)]
 
     def _may_touch(self, step: Step, i: int, a: float, b: float) -> bool:
         """Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again."""
@@ -205,7 +220,10 @@ class Crossings:
         return []
 
     def _zero(self, step: Step, bracket: Bracket) -> float:
-        """The zero in a bracket: R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4."""
+        """The zero in a bracket: R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4.
+
+        Where the value jumps, the far side of the jump: a run that goes on from the near one would meet it again.
+        """
         i, a, b, fa, fb = bracket
         c, fc, d = a, fa, b - a
         e = d
@@ -233,7 +251,8 @@ class Crossings:
             a, fa = b, fb
             b += d if abs(d) > tolerance else tolerance if m > 0.0 else -tolerance
             fb = self._value(step, i, b)
-        return float(b)
+        jumps = fb * bracket.fa > 0.0 > fb * fc and abs(fb) > TOUCHING * float(self.size[i])
+        return float(c if jumps else b)
 
     # -- resets ---------------------------------------------------------------------------------------------------
     def arrive(self, t: float, x: Array, length: float) -> None:

@@ -40,6 +40,26 @@ static int brackets_after_reset(const eomgen_method *method, eomgen_run *run, eo
     return back ? add(ev, n, i, run->t_old, run->t_old, side, 0.0) : n;
 }
 
+/* A value that is zero where a step begins, leaves to one side and ends on the other: a zero at the beginning, and one
+   where it comes back, such as a ball that is thrown up from the floor and falls back onto it within one step. */
+static int brackets_from_zero(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+{
+    const double side = run->direction * ev->slope[i] > 0.0 ? 1.0 : -1.0;
+    double t = run->t_old, g = 0.0;
+    int seen = 0;
+    for (int k = HALVINGS; k >= 0; k--) {
+        const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
+        const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
+        if (seen && value * side <= 0.0) {
+            n = add(ev, n, i, run->t_old, run->t_old, -side, 0.0);
+            return add(ev, n, i, t, next, g, value);
+        }
+        seen = seen || value * side > 0.0;
+        t = next, g = value;
+    }
+    return add(ev, n, i, run->t_old, run->t, 0.0, ev->g_new[i]);
+}
+
 /* Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again. What is no more
    than rounding at both ends rests there. */
 static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
@@ -102,6 +122,8 @@ static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_ev
         }
         if (ev->leaving[i] != 0) {
             n = brackets_after_reset(method, run, ev, n, i);
+        } else if (a == 0.0 && run->direction * ev->slope[i] * b < 0.0) {
+            n = brackets_from_zero(method, run, ev, n, i);
         } else if ((a <= 0.0 && b >= 0.0) || (a >= 0.0 && b <= 0.0)) {
             n = add(ev, n, i, run->t_old, run->t, a, b);
         } else if (may_touch(run, ev, i)) {

@@ -4,7 +4,8 @@
 #include "eomgen_loop.h"
 
 /* The zero between a and b, where the values fa and fb differ in sign: R. P. Brent, Algorithms for Minimization without
-   Derivatives, 1973, chapter 4; to four roundings, like SciPy's. */
+   Derivatives, 1973, chapter 4; to four roundings, like SciPy's. Where the value jumps,
+   the far side of the jump: a run that goes on from the near one would meet it again. */
 static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket)
 {
     double a = bracket[0], b = bracket[1], fa = bracket[2], fb = bracket[3], c = a, fc = fa, d = b - a, e = d;
@@ -39,5 +40,6 @@ static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_
         b += fabs(d) > tolerance ? d : m > 0.0 ? tolerance : -tolerance;
         fb = value_at(method, run, ev, i, b);
     }
-    return b;
+    const int jumps = fb * bracket[2] > 0.0 && fb * fc < 0.0 && fabs(fb) > RUNS_TOUCHING * ev->size[i];
+    return jumps ? c : b;
 }
