@@ -172,7 +172,7 @@ class Crossings:
         """A value that is zero where a step begins, leaves to one side and ends on the other: two zeros."""
         side = 1.0 if self.forward * float(self.slope[i]) > 0.0 else -1.0
         t, g, seen = step.t_old, 0.0, False
-        for k in range(HALVINGS, -1, -1):
+        for k in range(HALVED, -1, -1):
             later = step.t if k == 0 else step.t_old + (step.t - step.t_old) * 2.0**-k
             value = last if k == 0 else self._value(step, i, later)
             if seen and value * side <= 0.0:

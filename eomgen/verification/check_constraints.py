@@ -83,6 +83,8 @@ def _potentials(bench: Bench) -> Finding:
         gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
         own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
         limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + 1e-40
+        if "bias" in bench.graph_kernels:  # folded constants weigh more beside half a turn, as rounding does
+            limit = np.maximum(limit, FOLDED / UNIT * bench.bounds("bias", bench.graph_kernels["bias"])[1][:, k])
         found.add(k, gap, limit, size_of(own), layout.v)
     return found.finding()
 

@@ -17,7 +17,7 @@ from ..numeric.scales import Array
 from .bench import Bench, numbers
 from .cases import Case
 from .comparison import Comparison, pairs, size_of
-from .differences import FIRST_STEP, extrapolate
+from .differences import FIRST_STEP, SHORTER, extrapolate
 from .digits import Numbers, solve
 from .finding import Finding
 from .rounding import UNIT
@@ -212,11 +212,16 @@ def _compare(
         return Finding.skipped(check, "the system of accelerations and multipliers is singular")
     noise = np.maximum(noise, 2.0 * EPS * size_of(bench.rhs(bench.cases[0])))  # where drivers alone give accelerations
     slopes, errors, left_out = [], [], []
+    step = OFF_CONSTRAINTS if len(bench.layout.rows) else FIRST_STEP
+    rounding = 4.0 * bench.layout.n_x * UNIT * condition
     for j, f in enumerate(columns):
+        slope, error = J[:, j], np.zeros(len(J))
         try:
-            slope, error = extrapolate(f, noise, OFF_CONSTRAINTS if len(bench.layout.rows) else FIRST_STEP)
+            for first in (step, SHORTER * step):
+                slope, error = extrapolate(f, noise, first)
+                if (np.abs(slope - J[:, j]) <= error + rounding * size_of(slope)).all():
+                    break
         except EomgenError:
-            slope, error = J[:, j], np.zeros(len(J))
             left_out.append(names[j])
         slopes.append(slope)
         errors.append(error)
@@ -224,6 +229,6 @@ def _compare(
         found.note = f"without {', '.join(left_out)}: no state nearby"
     expected, error = np.array(slopes).T, np.array(errors).T
     size = max(size_of(expected), size_of(bench.rhs(bench.cases[0])), least)
-    limit = error + 4.0 * bench.layout.n_x * UNIT * condition * size
+    limit = error + rounding * size
     found.add(0, J - expected, limit, size, pairs(bench.labels("rhs"), names))
     return found.finding()

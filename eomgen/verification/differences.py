@@ -14,6 +14,8 @@ from ..numeric.scales import Array
 
 HALVINGS = 5
 FIRST_STEP = 2e-2  #: relative to the size of the variable
+#: Beside a singular position a long first step misjudges its error: where it disagrees, a shorter one decides.
+SHORTER = 0.1
 SAFETY = 20.0  #: on the estimated error
 
 

@@ -14,7 +14,7 @@ from ..errors import EomgenError
 from ..numeric.scales import Array
 from .cases import Case
 from .comparison import Comparison, failed, pairs, size_of
-from .differences import FIRST_STEP, extrapolate
+from .differences import FIRST_STEP, SHORTER, extrapolate
 from .finding import Finding
 from .identities import KERNEL, condition_at
 
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from ..runtime.module import Module
 
 CASES = 2  #: states that are tried
-#: First steps of the differences: beside a singular position a long one misjudges its error, and the short one counts.
-STEPS = (FIRST_STEP, 0.1 * FIRST_STEP)
+STEPS = (FIRST_STEP, SHORTER * FIRST_STEP)
 NAMES = {"jacobian": "x", "input_jacobian": "u", "parameter_jacobian": "p"}  #: kernel -> what it differentiates by
 
 

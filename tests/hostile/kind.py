@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 #: Name of a kind -> the module of this folder that holds it, as ``KIND`` (one) or in ``KINDS`` (several, by name).
+ANOTHER = 1 << 40  #: from the seed of a case that cannot be written down to the next one tried
 MODULES = {
     "expressions": "expressions",
     "yaml": "yaml_files",
@@ -65,6 +66,15 @@ def find(name: str) -> Kind:
     module = import_module(f"hostile.{MODULES[name]}")
     kinds: dict[str, Kind] = getattr(module, "KINDS", None) or {name: module.KIND}
     return kinds[name]
+
+
+def make(kind: Kind, name: str, seed: int) -> Any:
+    """The case of a seed; where it is nested too deeply to be written down, another one."""
+    while True:
+        try:
+            return kind.make(generator(name, seed))
+        except RecursionError:
+            seed += ANOTHER
 
 
 def generator(kind: str, seed: int) -> random.Random:

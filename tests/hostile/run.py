@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 from .campaign import Campaign
-from .kind import MODULES, find, generator, keep
+from .kind import MODULES, find, keep, make
 from .outcome import FINDINGS, Runner
 from .report import RESULTS, progress, summary
 
@@ -66,7 +66,7 @@ def one(name: str, seed: int) -> int:
         kind = find(name)
         runner = Runner(Path(folder) / "home", Path(folder) / "cache")
         runner.prepare(kind)
-        case = kind.make(generator(name, seed))
+        case = make(kind, name, seed)
         path = keep(case, Path(folder) / "shown")
         print(
             path.read_text(encoding="utf-8", errors="surrogatepass")

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from .kind import Kind, find, generator, keep
+from .kind import Kind, find, keep, make
 from .outcome import FINDINGS, Outcome, Runner
 
 BEAT = struct.Struct("qd")  #: seed of the case that runs, or -1; when it began (s, monotonic clock)
@@ -77,7 +77,7 @@ class Worker:
         for seed in range(first, first + count):
             if seed in skip:
                 continue
-            found = self.case(kind, seed, kind.make(generator(name, seed)))
+            found = self.case(kind, seed, make(kind, name, seed))
             tally.add(seed, found)
             if found.kind in FINDINGS:
                 fault = {"outcome": found.kind, "seed": seed, "key": found.key, "text": found.text}
@@ -92,7 +92,7 @@ class Worker:
         """Write the smallest case found that still ends in the same fault."""
         kind = find(name)
         self.runner.prepare(kind)
-        case = kind.make(generator(name, seed))
+        case = make(kind, name, seed)
         smallest = smaller(kind, case, lambda other: self.case(kind, seed, other).key == key)
         self.report({"smallest": str(keep(smallest, Path(stem))), "done": True})
 

@@ -47,7 +47,7 @@ static int brackets_from_zero(const eomgen_method *method, eomgen_run *run, eomg
     const double side = run->direction * ev->slope[i] > 0.0 ? 1.0 : -1.0;
     double t = run->t_old, g = 0.0;
     int seen = 0;
-    for (int k = HALVINGS; k >= 0; k--) {
+    for (int k = RUNS_HALVED; k >= 0; k--) {
         const double next = k > 0 ? run->t_old + ldexp(run->t - run->t_old, -k) : run->t;
         const double value = k > 0 ? value_at(method, run, ev, i, next) : ev->g_new[i];
         if (seen && value * side <= 0.0) {
