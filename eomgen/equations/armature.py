@@ -6,6 +6,9 @@ gyroscopic effect is left out, as in MuJoCo and Pinocchio); for a coordinate of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
+
 from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
@@ -50,18 +53,9 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
                 inverse[i] = inverse[i] + inertia * (slope[i] * acceleration)
         kinetic = kinetic + 0.5 * inertia * (rate * rate)
 
-    def mass_matrix() -> Rows:
-        mass = [list(row) for row in tree.mass_matrix]
-        for inertia, slope in slopes:
-            moving = [i for i in range(n) if not slope[i].is_zero]
-            for i in moving:
-                for j in moving:
-                    mass[i][j] = mass[i][j] + inertia * (slope[i] * slope[j])
-        return tuple(tuple(row) for row in mass)
-
     return TreeEquations(
         method=tree.method,
-        mass_matrix=mass_matrix,
+        mass_matrix=partial(_mass_matrix, tree, slopes),
         bias=tuple(bias),
         inverse_dynamics=tuple(inverse),
         kinetic_energy=kinetic,
@@ -72,3 +66,14 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
         canonical=tree.canonical,
         turned=tree.turned,
     )
+
+
+def _mass_matrix(tree: TreeEquations, slopes: Sequence[tuple[Expr, Sequence[Expr]]]) -> Rows:
+    """M of the tree and J y_q^T y_q of each drive."""
+    mass = [list(row) for row in tree.mass_matrix]
+    for inertia, slope in slopes:
+        moving = [i for i, part in enumerate(slope) if not part.is_zero]
+        for i in moving:
+            for j in moving:
+                mass[i][j] = mass[i][j] + inertia * (slope[i] * slope[j])
+    return tuple(tuple(row) for row in mass)

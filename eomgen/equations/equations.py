@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from types import FunctionType
 
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
@@ -97,6 +98,8 @@ class TreeEquations:
         canonical: tuple[Expr, ...] = (),
         turned: Turned | None = None,
     ) -> None:
+        if isinstance(mass_matrix, FunctionType):
+            raise TypeError("a function that holds expressions is not copied with them: give a functools.partial")
         self.method = method
         self._mass_matrix = mass_matrix
         self.bias = bias

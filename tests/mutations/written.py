@@ -28,8 +28,8 @@ FAULTS = (
     ),
     Fault(
         "text-docstring", "eomgen/texts.py",
-        r"""_ESCAPED = re.compile(r'[^ !#-\[\]-~]')""",
-        r"""_ESCAPED = re.compile(r'[^ -\[\]-~]')""",
+        """_ESCAPED = re.compile(r"[^ !#-\\[\\]-~]")""",
+        """_ESCAPED = re.compile(r"[^ -\\[\\]-~]")""",
         "three quotes in a text end a docstring, one a TOML string",
         ("tests/test_texts.py::test_a_docstring_has_the_value_of_the_text",),
     ),

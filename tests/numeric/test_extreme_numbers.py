@@ -111,7 +111,7 @@ def test_constants_that_overflow_are_a_named_error_in_late_kernels_too() -> None
 def test_an_inertia_that_overflows_is_a_fault() -> None:
     what = fault_of_inertia(np.full((3, 3), np.inf))
     assert what is not None
-    assert what[0] == "is not finite"
+    assert what[0] == "has an entry that is not finite"
     assert fault_of_inertia(np.diag([1e308, 1e308, 1e308])) is None
     assert longest_within([[[0, 0, 0], [1e308, 0, 0]]]) == 1e308
 
