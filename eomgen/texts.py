@@ -55,11 +55,11 @@ def visible(text: str, lines: bool = True) -> str:
     ----------
     text : str
     lines : bool, optional
-        Whether newlines stay; else they are shown too.
+        Whether newlines and tabs stay; else they are shown too.
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or (lines and c == "\n") else repr(c)[1:-1] for c in text)
+    return "".join(c if c.isprintable() or (lines and c in "\n\t") else repr(c)[1:-1] for c in text)
 
 
 def shortened(text: str, longest: int) -> str:

@@ -38,7 +38,7 @@ def balance_energy(equations: Equations, trajectory: Trajectory) -> EnergyBalanc
     ----------
     equations : Equations
     trajectory : Trajectory
-        With dense output.
+        With dense output where :func:`counts_work` says so.
 
     Returns
     -------
@@ -81,6 +81,15 @@ def _work(kinematics: Kinematics, trajectory: Trajectory) -> NDArray[np.float64]
     values |= {"t": times, **dict(zip(trajectory.x_names, between.x, strict=True)), **{u: between[u] for u in names}}
     watts = np.broadcast_to(evaluate([power], values)[0], times.shape).reshape(-1, POINTS)
     return np.concatenate([[0.0], np.cumsum((watts * weights).sum(axis=1) * step[:, 0] / 2.0)])
+
+
+def counts_work(equations: Equations) -> bool:
+    """Whether the work of a run is summed between its steps: something without a potential does work that is known."""
+    kinematics = equations.kinematics
+    if kinematics.mechanism.bare or not all(e.is_zero for e in kinematics.constraints.time_derivative):
+        return False
+    power = _power(kinematics)
+    return not power.is_zero and not _without_twin(power)
 
 
 def uncounted_functions(equations: Equations) -> list[str]:

@@ -127,6 +127,8 @@ def run(
         module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
     initial, parameters, inputs = sort_settings(module, chosen)
+    from .energy import balance_energy, counts_work, uncounted_functions
+
     start = perf_counter()
     with stage("simulate"):
         trajectory = module.simulate(
@@ -134,13 +136,11 @@ def run(
             initial=initial or None,
             parameters=parameters or None,
             inputs=inputs or None,
-            dense_output=True,
+            dense_output=plot is not None or counts_work(equations),
             **kept,
             **solver,
         )
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
-    from .energy import balance_energy, uncounted_functions
-
     with after_integration():
         energy = balance_energy(equations, trajectory)
         files = _write(equations, trajectory, out, plot)

@@ -297,4 +297,4 @@ class Crossings:
     # -- results --------------------------------------------------------------------------------------------------
     def results(self, n: int) -> tuple[list[Array], list[Array]]:
         """Times (k,) and states (n, k) of each event."""
-        return [np.array(times) for times in self.t], [np.array(found).reshape(-1, n).T for found in self.x]
+        return [np.array(times) for times in self.t], [np.array(found).reshape(len(found), n).T for found in self.x]

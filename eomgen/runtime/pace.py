@@ -95,7 +95,7 @@ class Pace:
         if self.taken * self.kept > MOST_NUMBERS:
             raise SimulationError(
                 f"the run has taken {self.taken} steps to t = {t:.6g} s of {self.end:.6g} s, and no more are kept; "
-                "give the times to store, t_eval, or run in parts"
+                "take a shorter span, or in Python give the times to store, t_eval"
             )
         if self.taken > ENOUGH and abs(self.end - t) * self.taken > ENDLESS * abs(t - self.start):
             more = abs(self.end - t) / max(abs(t - self.start), TINY) * self.taken

@@ -144,3 +144,17 @@ def test_the_work_of_an_input_that_changes_over_time_is_counted(call: Call, tmp_
     out = call(*words).out
     assert "work of forces and inputs" in out
     assert "kept to" not in out
+
+
+def test_a_run_without_work_keeps_no_steps_between() -> None:
+    """A million steps of a motion without dampers and drives fit: only what is reported is kept."""
+    from eomgen.cli.energy import counts_work
+
+    bob = {"mass": 1, "com": [0, -0.5, 0]}
+    for damping, wanted in ((None, False), (0.1, True)):
+        model = eomgen.Model("bob", gravity=(0, -9.81, 0))
+        body = model.body("bob", **bob)
+        model.revolute("hinge", model.ground, body, coordinate="q")
+        if damping is not None:
+            model.torsional_damper("d", "hinge", damping=damping)
+        assert counts_work(model.derive()) is wanted

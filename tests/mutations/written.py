@@ -35,7 +35,7 @@ FAULTS = (
     ),
     Fault(
         "text-terminal", "eomgen/texts.py",
-        'return "".join(c if c.isprintable() or (lines and c == "\\n") else repr(c)[1:-1] for c in text)',
+        'return "".join(c if c.isprintable() or (lines and c in "\\n\\t") else repr(c)[1:-1] for c in text)',
         "return text",
         "escape sequences in a text reach the terminal",
         ("tests/test_texts.py::test_only_what_prints_reaches_a_terminal",),
