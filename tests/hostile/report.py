@@ -42,7 +42,7 @@ def summary(campaign: Campaign) -> str:
         return "\n".join([*lines, "", "Nothing was found.", ""])
     lines += ["", "| found in | first seed | fault |", "|---|---|---|"]
     for (name, key), known in sorted(campaign.findings.items()):
-        lines.append(f"| {name} | {known[0]['seed']} | {key.replace('|', '/')} |")
+        lines.append(f"| {name} | {known[0]['seed']} | {' '.join(key.replace('|', '/').split())} |")
     return "\n".join([*lines, ""])
 
 

@@ -32,7 +32,8 @@ def found_by(result: Verification) -> set[str]:
 
 
 def verified(equations: Equations) -> set[str]:
-    return found_by(equations.compile(target="numpy").verify(states=3))
+    """Breaches of equations changed by hand; a new record of them, since compiling starts from what one was made of."""
+    return found_by(dataclasses.replace(equations).compile(target="numpy").verify(states=3))
 
 
 def negated(row: tuple[Any, ...], k: int) -> tuple[Any, ...]:
