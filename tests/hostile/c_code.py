@@ -52,7 +52,7 @@ MATHEMATICS = frozenset(
         "sqrt",
         "pow",
     }
-    | {"fabs", "floor", "ceil", "fmod", "fmin", "fmax", "nextafter", "fma", "copysign", "trunc", "round"}
+    | {"fabs", "ldexp", "floor", "ceil", "fmod", "fmin", "fmax", "nextafter", "fma", "copysign", "trunc", "round"}
 )
 COPIES = frozenset({"memcpy", "memset", "memmove", "memcmp", "_GLOBAL_OFFSET_TABLE_"})
 
