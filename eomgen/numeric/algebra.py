@@ -7,6 +7,7 @@ which callers handle as every failed evaluation.
 
 from __future__ import annotations
 
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,24 @@ def _failed(what: str, *matrices: Any) -> EvaluationError:
     return UnsolvedError(f"{what}: the matrix is singular, or its entries are too far apart in size")
 
 
+class _Told:
+    """NumPy's LinAlgError within the block -> an error that says what failed, and why."""
+
+    def __init__(self, what: str, *matrices: Any) -> None:
+        self.what, self.matrices = what, matrices
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        if isinstance(error, np.linalg.LinAlgError):
+            raise _failed(self.what, *self.matrices) from None
+
+
 def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
     """U, singular values, V^T."""
-    try:
+    with _Told("singular values cannot be found", A):
         U, sizes, Vt = np.linalg.svd(A, full_matrices=full_matrices)
-    except np.linalg.LinAlgError:
-        raise _failed("singular values cannot be found", A) from None
     if not np.isfinite(sizes).all():
         raise _failed("singular values cannot be found", A)
     return U, sizes, Vt
@@ -34,10 +47,8 @@ def svd(A: Any, full_matrices: bool = True) -> tuple[Array, Array, Array]:
 
 def singular_values(A: Any) -> Array:
     """Singular values, the largest first."""
-    try:
+    with _Told("singular values cannot be found", A):
         sizes = np.asarray(np.linalg.svd(A, compute_uv=False))
-    except np.linalg.LinAlgError:
-        raise _failed("singular values cannot be found", A) from None
     if not np.isfinite(sizes).all():
         raise _failed("singular values cannot be found", A)
     return sizes
@@ -45,84 +56,64 @@ def singular_values(A: Any) -> Array:
 
 def eigh(A: Any) -> tuple[Array, Array]:
     """Eigenvalues and eigenvectors of a symmetric matrix."""
-    try:
+    with _Told("eigenvalues cannot be found", A):
         values, vectors = np.linalg.eigh(A)
-    except np.linalg.LinAlgError:
-        raise _failed("eigenvalues cannot be found", A) from None
     return values, vectors
 
 
 def eigvalsh(A: Any) -> Array:
     """Eigenvalues of a symmetric matrix, the smallest first."""
-    try:
+    with _Told("eigenvalues cannot be found", A):
         return np.asarray(np.linalg.eigvalsh(A))
-    except np.linalg.LinAlgError:
-        raise _failed("eigenvalues cannot be found", A) from None
 
 
 def eig(A: Any) -> tuple[Any, Any]:
     """Eigenvalues and eigenvectors, complex where they are."""
-    try:
+    with _Told("eigenvalues cannot be found", A):
         values, vectors = np.linalg.eig(A)
-    except np.linalg.LinAlgError:
-        raise _failed("eigenvalues cannot be found", A) from None
     return values, vectors
 
 
 def eigvals(A: Any) -> Any:
     """Eigenvalues, complex where they are."""
-    try:
+    with _Told("eigenvalues cannot be found", A):
         return np.linalg.eigvals(A)
-    except np.linalg.LinAlgError:
-        raise _failed("eigenvalues cannot be found", A) from None
 
 
 def solve(A: Any, b: Any) -> Array:
     """x with A x = b."""
-    try:
+    with _Told("linear equations have no solution", A, b):
         return np.asarray(np.linalg.solve(A, b))
-    except np.linalg.LinAlgError:
-        raise _failed("linear equations have no solution", A, b) from None
 
 
 def inv(A: Any) -> Any:
     """A^-1."""
-    try:
+    with _Told("a matrix has no inverse", A):
         return np.linalg.inv(A)
-    except np.linalg.LinAlgError:
-        raise _failed("a matrix has no inverse", A) from None
 
 
 def pinv(A: Any, rcond: float | None = None) -> Array:
     """A^+; entries of A below ``rcond`` of the largest singular value count as zero."""
-    try:
+    with _Told("a matrix has no pseudo-inverse", A):
         return np.asarray(np.linalg.pinv(A) if rcond is None else np.linalg.pinv(A, rcond=rcond))
-    except np.linalg.LinAlgError:
-        raise _failed("a matrix has no pseudo-inverse", A) from None
 
 
 def lstsq(A: Any, b: Any, rcond: float | None = None) -> Array:
     """The x of least norm with least |A x - b|."""
-    try:
+    with _Told("linear equations have no solution", A, b):
         return np.asarray(np.linalg.lstsq(A, b, rcond=rcond)[0])
-    except np.linalg.LinAlgError:
-        raise _failed("linear equations have no solution", A, b) from None
 
 
 def cholesky(A: Any) -> Array:
     """L with L L^T = A."""
-    try:
+    with _Told("a matrix is not positive definite", A):
         return np.asarray(np.linalg.cholesky(A))
-    except np.linalg.LinAlgError:
-        raise _failed("a matrix is not positive definite", A) from None
 
 
 def cond(A: Any) -> float:
     """The largest singular value over the smallest."""
-    try:
+    with _Told("a condition number cannot be found", A):
         return float(np.linalg.cond(A))
-    except np.linalg.LinAlgError:
-        raise _failed("a condition number cannot be found", A) from None
 
 
 def norm2(A: Any) -> float:

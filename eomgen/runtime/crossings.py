@@ -276,11 +276,11 @@ class Crossings:
             touching = abs(self.g[i]) <= TOUCHING * self.size[i]
             if self.leaving[i]:  # it only touched zero
                 continue
-            if action in (RESET, WAIT) and way * self.forward * float(arrived[i]) < 0.0:
+            if way * self.forward * float(arrived[i]) < 0.0:
                 stuck = True  # it goes the other way: less than the accuracy is left
             nowhere = (action == WAIT and rate < 0.0) or not abs(rate) > TOUCHING * came[i]
-            stuck = stuck or bool(touching and nowhere and action in (RESET, WAIT))
-            self.leaving[i] = (1 if rate > 0.0 else -1) if touching and (rate or action in (RESET, WAIT)) else 0
+            stuck = stuck or bool(touching and nowhere)
+            self.leaving[i] = (1 if rate > 0.0 else -1) if touching else 0
         changed = [self.events[i] for i in self.fired if self.events[i].action in (RESET, WAIT)]
         if changed:
             self.resets += 1

@@ -48,12 +48,7 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
     shape = np.shape(given) if isinstance(given, np.ndarray) else ()
     if len(shape) > 1:
         require_room(f"{what} of shape {shape}", float(np.prod(shape[1:], dtype=float)) * width, "give fewer columns")
-    try:
-        if np.iscomplexobj(given):
-            raise TypeError
-        return np.asarray(given, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"{what} must hold real numbers, not {_short(given)}") from None
+    return _floats(given, f"{what} must hold real numbers")
 
 
 def read_times(what: str, given: Any, per_time: int) -> Array:
@@ -65,12 +60,16 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
     """
     with suppress(TypeError):  # no length: one number, or what np.array refuses
         require_room(f"{what} with {len(given)} times", len(given) * per_time, "give fewer, or run in parts")
+    return np.array(_floats(given, f"{what} must be a list of times in seconds"))
+
+
+def _floats(given: Any, wanted: str) -> Array:
     try:
         if np.iscomplexobj(given):
             raise TypeError
-        return np.array(given, dtype=float)
+        return np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"{what} must be a list of times in seconds, not {_short(given)}") from None
+        raise UsageError(f"{wanted}, not {_short(given)}") from None
 
 
 def _short(given: Any) -> str:
