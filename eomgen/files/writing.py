@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 from ..errors import UsageError
 
 TOKEN = 8  #: random digits at the end of a part's name
+TRIES = 3  #: of writing, where others clean up meanwhile
 PREFIX = 60  #: characters of a file's name in that of the part: names end at 255 bytes
 
 
@@ -76,7 +77,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 
 def remove_parts(path: str | os.PathLike[str]) -> None:
-    """Remove what writers of a file that were killed have left beside it; nobody else may be writing it."""
+    """Remove what writers of a file that were killed have left beside it; :func:`write_whole` alone may be at work."""
     target = Path(path)
     begin = f".{target.name[:PREFIX]}."
     for part in target.parent.iterdir() if target.parent.is_dir() else ():
@@ -87,10 +88,20 @@ def remove_parts(path: str | os.PathLike[str]) -> None:
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write a text (UTF-8) or bytes; see :func:`whole_file`."""
+    """Write a text (UTF-8) or bytes; see :func:`whole_file`.
+
+    Again where the part is gone before it takes its place: another call took it for one of a killed writer
+    (:func:`remove_parts`).
+    """
     data = content.encode("utf-8") if isinstance(content, str) else content
-    with whole_file(path) as file:
-        file.write(data)
+    for left in range(TRIES - 1, -1, -1):
+        try:
+            with whole_file(path) as file:
+                file.write(data)
+            return
+        except FileNotFoundError:
+            if not left:
+                raise
 
 
 def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> None:

@@ -21,7 +21,8 @@ import eomgen as eg
 from eomgen.cli.command import run_command
 from eomgen.emit.write import write_package
 from eomgen.errors import UsageError
-from eomgen.files.writing import refuse_link, save_figure, whole_file, write_whole
+from eomgen.files import writing
+from eomgen.files.writing import TRIES, refuse_link, remove_parts, save_figure, whole_file, write_whole
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "pendulum.yaml"
 FULL = """
@@ -82,6 +83,30 @@ def test_names_may_be_as_long_as_names_can_be(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="too long"):
         write_whole(tmp_path / ("a" * 300), "x")
     assert names(tmp_path) == [file.name]
+
+
+@pytest.mark.parametrize("times", range(1, TRIES + 1))
+def test_a_part_that_another_call_removes_is_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    """Two calls on one store: the later one takes the part of the earlier for what a killed writer left."""
+    file, replace, left = tmp_path / "a.npz", os.replace, [times]
+    file.write_text("earlier")
+
+    def late(part: Path, target: Path) -> None:
+        if left[0]:
+            left[0] -= 1
+            remove_parts(target)
+        replace(part, target)
+
+    monkeypatch.setattr(writing.os, "replace", late)
+    if times < TRIES:
+        write_whole(file, "new")
+    else:
+        with pytest.raises(FileNotFoundError) as raised:
+            write_whole(file, "new")
+        assert raised.value.filename == str(file)
+    assert (file.read_text(), names(tmp_path)) == ("new" if times < TRIES else "earlier", ["a.npz"])
 
 
 @pytest.mark.parametrize("kind", ["file", "folder", "nothing"])
