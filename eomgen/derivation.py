@@ -20,8 +20,8 @@ from .records import dataclass
 from .texts import html_text
 
 if TYPE_CHECKING:
+    from .api.module import Module
     from .program.choice import Choice
-    from .runtime.module import Module
 
 READABLE = 400  #: operations up to which equations are shown written out
 

@@ -27,11 +27,11 @@ from .kinematics.mobility import Mobility, judge
 from .kinematics.report import MechanismReport, report
 
 if TYPE_CHECKING:
+    from .api.module import Module
     from .describe.mechanism import Mechanism
     from .describe.model import Model
     from .program.choice import Choice
     from .program.program import Program
-    from .runtime.module import Module
     from .runtime.protocols import Core
 
 TARGETS = ("cython", "numpy", "c")
@@ -209,9 +209,9 @@ def compile_equations(
     equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
 ) -> Module:
     """Generate, compile and load; see :meth:`eomgen.derivation.Equations.compile`."""
+    from .api.module import Module
     from .program import KERNELS
     from .runtime.late import LateCore
-    from .runtime.module import Module
 
     if target == "c":
         raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")

@@ -20,7 +20,7 @@ from ..numeric.scales import Array, Indices
 from .tangent import find_tangent
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class Balance(NamedTuple):
@@ -47,14 +47,16 @@ class Balance(NamedTuple):
         return self.x[len(self.x) - len(self.a) :]
 
 
-def weigh(module: Module, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None) -> Balance:
+def weigh(
+    module: BoundModel, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None
+) -> Balance:
     """The forces at a position on the constraints.
 
     Where constraints move in time the velocities are those that they enforce, and the forces are those of that motion.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     q : (n_q,) array
     held : (k, n_v) array, optional
@@ -107,13 +109,19 @@ class Slopes(NamedTuple):
 
 
 def slopes(
-    module: Module, t: float, x: Array, held: Array, held_by: Array, parameters: Sequence[int], inputs: Sequence[int]
+    module: BoundModel,
+    t: float,
+    x: Array,
+    held: Array,
+    held_by: Array,
+    parameters: Sequence[int],
+    inputs: Sequence[int],
 ) -> Slopes:
     """Exact derivatives of the accelerations and velocities at rest by displacements, parameters and inputs.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     x : (n_x,) array
     held : (k_h, n_v) array
@@ -143,13 +151,13 @@ def slopes(
     return Slopes(tangent.Z, (J @ along)[n_q:], along[n_q:], by_unknown, motion)
 
 
-def assembly_jacobian(module: Module, t: float, x: Array) -> Array:
+def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
     """[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]."""
     return module.kernels.state("assembly_jacobian")(x, t=t)
 
 
 def force_slopes(
-    module: Module, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = 1e-5
+    module: BoundModel, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = 1e-5
 ) -> tuple[Array, Array]:
     """Changes of the forces (n_dof - k, n_z) and of the enforced velocities (n_v, n_z) along the columns of Z.
 
@@ -157,7 +165,7 @@ def force_slopes(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     here : Balance
     gradients : callable

@@ -20,7 +20,7 @@ from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from .search import Search
 
 
@@ -46,13 +46,13 @@ class Equilibrium:
         By their largest real part; 'marginal' where it vanishes.
     linear : Linearisation or None
         About the equilibrium; None where supports hold it.
-    module : Module
+    module : BoundModel
         With the unknowns found bound.
     steps : int
         Steps of Newton's iteration.
     """
 
-    def __init__(self, module: Module, t: float, x: Array, found: dict[str, Any]) -> None:
+    def __init__(self, module: BoundModel, t: float, x: Array, found: dict[str, Any]) -> None:
         self.module, self.t, self.x, self.q = module, t, x, x[: module.n_q]
         self.coordinates: dict[str, float] = found["coordinates"]
         self.unknowns: dict[str, float] = found["unknowns"]
@@ -86,7 +86,7 @@ class Equilibrium:
         return as_html(f"Equilibrium of {self.module.name}", self.facts)
 
 
-def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: int) -> Equilibrium:
+def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, steps: int) -> Equilibrium:
     """The result at a balanced position."""
     t, layout = search.t, module.layout
     held = search.gradients(module, q) if search.supported else None
@@ -113,7 +113,7 @@ def describe(search: Search, module: Module, q: Array, unknowns: Array, steps: i
     return Equilibrium(module, t, here.x, found)
 
 
-def _held_motion(search: Search, module: Module, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
+def _held_motion(search: Search, module: BoundModel, here: Balance, t: float) -> tuple[Array, SecondOrder | None]:
     """A of the motion with the held coordinates held, and its equations of second order where it has such."""
     n_q, s = module.n_q, module.layout.scales.q
     tree = module.mass_matrix(here.x[:n_q], t=t)
@@ -132,7 +132,7 @@ def _held_motion(search: Search, module: Module, here: Balance, t: float) -> tup
     return A, SecondOrder(M, C, K, C_error, K_error)
 
 
-def read_coordinates(module: Module, q: Array, t: float) -> dict[str, float]:
+def read_coordinates(module: BoundModel, q: Array, t: float) -> dict[str, float]:
     """All coordinates by name, those of cut joints included."""
     values = dict(zip(module.q_names, q.tolist(), strict=True))
     if module.layout.n_k:

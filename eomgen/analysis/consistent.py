@@ -26,7 +26,7 @@ from ..runtime.layout import Layout, number
 from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 STEPS = 100  #: along the constraints, at most; they gain a constant factor each, the larger the nearer the state
 CLOSING = 25  #: Newton steps onto the constraints, at most
@@ -34,8 +34,9 @@ PASSES = 30  #: of the linear correction of velocities, at most
 DAMPING = 0.5  #: largest scaled step
 
 
-def find_consistent(
-    module: Module,
+@np.errstate(all="ignore")
+def consistent(
+    module: BoundModel,
     x: ArrayLike,
     t: float = 0.0,
     *,
@@ -44,7 +45,37 @@ def find_consistent(
     p: Any = None,
     u: Any = None,
 ) -> Array:
-    """See :meth:`~..runtime.force_analyses.ForceAnalyses.consistent`."""
+    """The state on the constraints that differs least from a given one, positions first, then velocities.
+
+    Parameters
+    ----------
+    x : (n_x,) array
+        Any state.
+    t : float
+    weights : mapping of str to float, or 'mass', optional
+        What a change costs: weight times the square of the change, in radians or lengths of the model; 1 where
+        nothing is said.  The weight of a coordinate is that of its rate too, unless the rate is named.  ``'mass'``
+        takes the mass matrix of the tree as the metric.
+    hold : sequence of str
+        Coordinates and rates that keep their values exactly.
+    p, u : optional
+        As for ``bind``.
+
+    Returns
+    -------
+    (n_x,) array
+
+    Raises
+    ------
+    ProjectionError
+        The constraints cannot be met near the state, or not with these values held.
+    UsageError
+        An unknown name, or a weight that is not positive.
+
+    Notes
+    -----
+    ``project(x)`` is the same with weights 1 to first order in the change; ``x0`` starts from named values.
+    """
     module = module if p is None and u is None else module.bind(p, u)
     layout, t = module.layout, number("t", t)
     state = np.array(read_numbers("x", x))
@@ -80,7 +111,7 @@ def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held
 
 
 def _metric(
-    module: Module, q: Array, t: float, weights: Mapping[str, float] | str | None, names: Sequence[str]
+    module: BoundModel, q: Array, t: float, weights: Mapping[str, float] | str | None, names: Sequence[str]
 ) -> Array:
     """The lower triangle L of W = L L^T; by default 1 over the square of each coordinate's scale."""
     layout = module.layout
@@ -108,7 +139,7 @@ def _difference(layout: Layout, a: Array, b: Array) -> Array:
 
 
 def _positions(
-    module: Module, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+    module: BoundModel, start: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
 ) -> Array:
     """The q nearest to the start with C(q, t) = 0.
 
@@ -184,7 +215,7 @@ def _positions(
 
 
 def _velocities(
-    module: Module, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
+    module: BoundModel, q: Array, v: Array, t: float, weights: Mapping[str, float] | str | None, held: Sequence[str]
 ) -> Array:
     """The v nearest to the given ones that the constraints allow.
 

@@ -15,13 +15,13 @@ from ..numeric.scales import Array, Scales
 from ..runtime.room import read_numbers
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class States(NamedTuple):
     """Projected states and times, k of them, and what they are evaluated with."""
 
-    module: Module
+    module: BoundModel
     t: Array  #: (k,)
     x: Array  #: (n_x, k)
     options: dict[str, Any]  #: p and u
@@ -65,11 +65,11 @@ class States(NamedTuple):
         return out
 
 
-def _all_rows(module: Module) -> Any:
+def _all_rows(module: BoundModel) -> Any:
     return module.kernels.constraint_jacobian.every
 
 
-def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> States:
+def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> States:
     """Check and project states.
 
     Raises
@@ -128,10 +128,26 @@ def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
     return np.asarray(scaled[:, :, 0].T / scales.c[:, None])
 
 
+@np.errstate(all="ignore")
 def multipliers(
-    module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
+    module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
-    """See :meth:`~..runtime.analyses.Analyses.multipliers`."""
+    """Lagrange multipliers l of all constraint rows, in ``M v' + h + C_q^T l = 0``.
+
+    Parameters
+    ----------
+    t : float or (k,) array
+    x : (n_x,) or (n_x, k) array
+        States; projected onto the constraints first.
+    p, u, out : optional
+        As for every kernel; u may also be (n_u, k), inputs of each state.
+
+    Returns
+    -------
+    (n_rows,) or (n_rows, k) array
+        In the order of ``constraint_labels``; N where a row is in m, N m where it is in rad.  Where rows depend on
+        each other, the smallest multipliers, each times the scale of its row.
+    """
 
     def find(states: States) -> Array:
         force = states.residual(states.accelerations())
@@ -142,7 +158,7 @@ def multipliers(
 
 def evaluate(
     find: Callable[[States], Array],
-    module: Module,
+    module: BoundModel,
     t: ArrayLike,
     x: ArrayLike,
     p: Any = None,

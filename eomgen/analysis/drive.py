@@ -29,7 +29,7 @@ from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,9 @@ class ActuatorForces:
         return as_text("Forces of the drives", facts)
 
 
-def find_forces(
-    module: Module,
+@np.errstate(all="ignore")
+def actuator_forces(
+    module: BoundModel,
     t: ArrayLike,
     x: ArrayLike,
     a: Mapping[str, ArrayLike] | ArrayLike | None = None,
@@ -84,7 +85,33 @@ def find_forces(
     p: Any = None,
     u: Any = None,
 ) -> ActuatorForces:
-    """See :meth:`~..runtime.analyses.Analyses.actuator_forces`."""
+    """Constrained inverse dynamics: the forces of chosen drives that make a motion, loops closed.
+
+    Parameters
+    ----------
+    t : float or (k,) array
+    x : (n_x,) or (n_x, k) array
+        States; projected onto the constraints first.
+    a : mapping of str to float or (k,) array, or (n_v,) or (n_v, k) array, optional
+        Accelerations: those of the independent coordinates by name (others 0), from which the rest follows, or all
+        of them, which must obey the constraints.  By default the independent accelerations are 0.
+    actuated : sequence of str, optional
+        What is driven: coordinates of the tree or of cut joints, whose forces come on top of the model's own, or
+        inputs in which forces are linear, whose whole values are found.  By default the independent coordinates.
+    p, u : optional
+        As for ``bind``.
+
+    Returns
+    -------
+    ActuatorForces
+        ``forces["theta"]``, ``forces.forces`` (n,) or (n, k), ``multipliers``, ``reactions``.  With more drives
+        than freedoms the smallest sum of squares (torques, and forces times the model's length).
+
+    Raises
+    ------
+    UsageError
+        An unknown name; accelerations that break the constraints; drives that cannot make the motion.
+    """
     module = module if p is None and u is None else module.bind(p, u)
     layout = module.layout
     states = prepare(module, t, x)

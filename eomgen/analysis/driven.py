@@ -22,19 +22,19 @@ from .tracks import Track
 from .walking import Path
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 FEWEST = 201  #: points stored where none are asked for
 
 
-def is_driven(module: Module) -> bool:
+def is_driven(module: BoundModel) -> bool:
     """Whether the positions follow from the time alone."""
     layout = module.layout
     return layout.n_dof == 0 and layout.n_q > 0 and layout.n_h == layout.n_c
 
 
 def simulate_driven(
-    module: Module,
+    module: BoundModel,
     span: tuple[float, float],
     initial: Mapping[str, float] | ArrayLike | None,
     forcing: Forcing,
@@ -46,7 +46,7 @@ def simulate_driven(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With the parameters and constant inputs of the run bound.
     span : (float, float)
     t_eval : (n_t,) array, optional

@@ -10,20 +10,21 @@ from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
-from ..runtime.analyses import require_velocities
 from ..runtime.initial import Initial
 from ..runtime.layout import number
 from ..runtime.names import unknown
+from ..runtime.refusals import require_velocities
 from ..runtime.room import read_numbers
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
-def find_equilibrium(
-    module: Module,
+@np.errstate(all="ignore")
+def equilibrium(
+    module: BoundModel,
     guess: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,
@@ -32,7 +33,39 @@ def find_equilibrium(
     hold: Mapping[str, float | None] | Sequence[str] = (),
     unknowns: Sequence[str] = (),
 ) -> Equilibrium:
-    """See :meth:`~..runtime.analyses.Analyses.equilibrium`."""
+    """Find a position at rest in which all forces are in balance (virtual work) and nonholonomic rows allow rest.
+
+    Newton's iteration, then the motion in a viscous fluid, then Levenberg's and Marquardt's steps.
+
+    Parameters
+    ----------
+    guess : mapping of str to float, or (n_q,) array, optional
+        Where to start: coordinates by name, or all of them; the declared initial position by default.
+    t : float
+        Time (s), held fixed.  Constraints that move in time move with the velocities they have then.
+    p, u : optional
+        As for ``bind``.
+    hold : mapping of str to float or None, or sequence of str
+        Coordinates, of the tree or of cut joints, and where they are held; None: where the guess is.  With
+        ``unknowns`` the parameters balance them, without they are supported (``supports`` says by what force).
+    unknowns : sequence of str
+        Parameters or inputs to solve for, such as a spring's free length: at least as many as held coordinates.
+
+    Returns
+    -------
+    Equilibrium
+        ``x``, ``q``, ``eq["theta"]``, ``unknowns``, ``supports``, ``eigenvalues``, ``stability``, ``linear``.
+
+    Raises
+    ------
+    EquilibriumError
+        None was found from the guess; the message names the coordinate with the largest force left, or one that
+        nonholonomic constraints move even at rest.
+    AssemblyError
+        The loops do not close with the held values.
+    UsageError
+        An unknown name, or too few unknowns.
+    """
     require_velocities(module.layout)
     module = module if p is None and u is None else module.bind(p, u)
     time = number("t", t)
@@ -61,7 +94,7 @@ def find_equilibrium(
     return describe(search, point.module, point.q, point.unknowns, steps)
 
 
-def _start(module: Module, guess: Any, held: Mapping[str, float], t: float) -> Array:
+def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) -> Array:
     """A closed position near the guess that has the held values."""
     initial = Initial(module.kernels, t)
     if guess is None or isinstance(guess, Mapping):

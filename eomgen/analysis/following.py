@@ -20,7 +20,7 @@ from ..numeric.projection import largest, within
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 STEPS = 25  #: Newton steps
 LONGEST = 0.3  #: largest scaled Newton step
@@ -41,13 +41,13 @@ class Follower:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With parameters and inputs bound.
     led : sequence of str
         Coordinates of the tree or of cut joints, as many as degrees of freedom.
     """
 
-    def __init__(self, module: Module, led: Sequence[str]) -> None:
+    def __init__(self, module: BoundModel, led: Sequence[str]) -> None:
         self.module, self.led = module, tuple(led)
         self.layout = layout = module.layout
         self.scales = layout.scales

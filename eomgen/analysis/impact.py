@@ -28,7 +28,7 @@ from .impact_law import collide
 from .tables import as_text
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,9 @@ class Impact:
         return as_text("Impact", [*facts, ("energy lost", f"{self.energy_lost:.6g} J")])
 
 
-def strike(
-    module: Module,
+@np.errstate(all="ignore")
+def impact(
+    module: BoundModel,
     t: float,
     x: ArrayLike,
     gaps: Mapping[str, float] | None = None,
@@ -88,7 +89,45 @@ def strike(
     p: Any = None,
     u: Any = None,
 ) -> Impact:
-    """See :meth:`~..runtime.force_analyses.ForceAnalyses.impact`."""
+    """The state after an impact without friction, or after coordinates are locked at once.
+
+    Parameters
+    ----------
+    t : float
+    x : (n_x,) array
+        The state right before; projected onto the constraints first.
+    gaps : mapping of str to float
+        Coordinates or outputs (functions of positions) that must not become negative and are 0 now -> coefficient
+        of restitution, 0 to 1.  Gaps that open are left alone.
+    lock : sequence of str
+        Coordinates that stop (plastic, whatever the sign of the impulse).
+    closed : bool
+        Take the gaps as closed whatever their values, as at a stop that is put where a coordinate is now.
+    p, u : optional
+        As for ``bind``.
+
+    Returns
+    -------
+    Impact
+        ``x`` after it, ``impulses`` by name, ``rates_before``, ``rates_after``, ``constraint_impulses``,
+        ``energy_lost``.
+
+    Raises
+    ------
+    UsageError
+        An unknown name; a gap that is not 0 (within 1e-6 lengths of the model, or rad); impulses that cannot do
+        it; a gap that drivers close.
+
+    Notes
+    -----
+    Newton's law of restitution with complementarity, for all gaps at once that close or are at rest: each impulse
+    is 0 or positive, rate+ + e min(rate-, 0) too, and one of the two is 0 (Moreau 1988; Pfeiffer and Glocker,
+    Multibody Dynamics with Unilateral Contacts, ch. 8; Brogliato, Nonsmooth Mechanics, ch. 5).  A gap that was
+    opening and is closing after that makes a further impact at the same instant.  No energy is ever gained, but
+    from gaps that move in time.  Springs, dampers and other finite forces have no part in it.  Velocities after
+    the impact are unique; impulses are not where gaps depend on each other, and the law itself is a choice:
+    momentum and energy alone do not determine what several bodies that touch do.
+    """
     module = module if p is None and u is None else module.bind(p, u)
     found, locked = check_gaps(module.layout, gaps, lock)
     states = _one_state(module, number("t", t), x)
@@ -108,7 +147,7 @@ def strike_run(gaps: Gaps, t: float, x: Array, restitutions: Mapping[str, float]
 
 
 def strike_events(
-    module: Module,
+    module: BoundModel,
     t: float,
     x: Array,
     events: Sequence[Mapping[str, Any]],
@@ -120,7 +159,7 @@ def strike_events(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     x : (n_x,) array
     events : sequence of mappings
@@ -167,7 +206,7 @@ def strike_events(
     return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
 
 
-def _one_state(module: Module, t: float, x: ArrayLike) -> States:
+def _one_state(module: BoundModel, t: float, x: ArrayLike) -> States:
     states = prepare(module, t, x)
     if not states.single:
         raise UsageError(f"x must be one state ({module.layout.n_x},)")

@@ -15,7 +15,7 @@ from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import Formula
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
 
 
@@ -24,14 +24,14 @@ class Gaps:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With parameters and constant inputs bound.
     names : sequence of str
     forcing : Forcing, optional
         Inputs that vary.
     """
 
-    def __init__(self, module: Module, names: Sequence[str], forcing: Forcing | None = None) -> None:
+    def __init__(self, module: BoundModel, names: Sequence[str], forcing: Forcing | None = None) -> None:
         self.module, self.layout, self.names, self.forcing = module, module.layout, tuple(names), forcing
         layout = module.layout
         self.outputs = [(i, layout.y.index(n)) for i, n in enumerate(names) if n not in layout.q + layout.loops]

@@ -13,8 +13,9 @@ from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from ..runtime.recording import Columns, describe, units_of
+from ..runtime.run_arguments import find_span, find_state
 from ..runtime.signals import Forcing
-from ..runtime.simulate import find_span, find_state
+from ..runtime.simulate import simulate
 from ..runtime.trajectory import Residuals, Trajectory
 from .impact import Impact, strike_run
 from .impact_gaps import Gaps, allowance, check_gaps
@@ -22,13 +23,13 @@ from .impact_trajectory import ImpactRun
 from .impact_watch import Watch, first_missed
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 IDLE = 50  #: closings in a row that bring neither an impact nor time
 
 
-def run_with_impacts(
-    module: Module,
+def simulate_impacts(
+    module: BoundModel,
     span: float | tuple[float, float] | None,
     gaps: Mapping[str, float],
     initial: Mapping[str, float] | ArrayLike | None = None,
@@ -38,7 +39,35 @@ def run_with_impacts(
     most: int = 1000,
     **options: Any,
 ) -> ImpactRun:
-    """See :meth:`~..runtime.force_analyses.ForceAnalyses.simulate_impacts`."""
+    """Integrate, with an impact whenever a gap closes.
+
+    Parameters
+    ----------
+    span : (float, float) or float
+        Start and end (s), forward in time.
+    gaps : mapping of str to float
+        As for :meth:`impact`.
+    initial, parameters, inputs : optional
+        As for ``simulate``.
+    most : int
+        Impacts after which the run is given up: they accumulate as a body comes to rest.
+    **options
+        method, rtol, atol, max_step, first_step, as for ``simulate``.
+
+    Returns
+    -------
+    ImpactRun
+        A trajectory (``run["theta"]``, ``run.at(t)``, ``run.save(path)`` ...) with both states at each impact, and
+        ``impacts`` (time, Impact), ``pieces``, the trajectories between impacts, and ``ended``: 'end'; 'rest', a
+        closed gap is pressed together; 'impacts', there were ``most``; 'event', an event of the model.
+
+    Raises
+    ------
+    UsageError
+        A gap is negative at the start, an unknown name, or a mechanism without freedom.
+    SimulationError, AssemblyError, MissingDependencyError
+        As for ``simulate``; also where a gap is found negative without an impact before.
+    """
     for key in ("events", "t_eval", "dense_output"):
         if key in options:
             raise UsageError(
@@ -60,7 +89,7 @@ def run_with_impacts(
     return run.finish(run.travel(start, find_state(bound, initial, start, forcing)))
 
 
-def _ending(module: Module) -> list[str]:
+def _ending(module: BoundModel) -> list[str]:
     """The model's events that end a run."""
     declared = module.layout.metadata.get("events") or []
     for event in declared:
@@ -77,7 +106,7 @@ class _Run:
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         restitutions: dict[str, float],
         forcing: Forcing,
         inputs: Mapping[str, Any] | None,
@@ -165,8 +194,15 @@ class _Run:
         """Integrate to the next closing gap: the time and state there, and which gaps close."""
         n = len(self.limits)
         watch = Watch(self.gaps, t, x, rates, self.limits)
-        piece = self.module.simulate(
-            (t, self.end), x, None, self.inputs, events=[*self.ends, *watch.events()], dense_output=True, **self.options
+        piece = simulate(
+            self.module,
+            (t, self.end),
+            x,
+            None,
+            self.inputs,
+            events=[*self.ends, *watch.events()],
+            dense_output=True,
+            **self.options,
         )
         fired = np.array([len(times) > 0 for times in [*piece.t_events][-n:]])
         times, states = piece.t, piece.x

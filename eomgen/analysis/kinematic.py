@@ -17,6 +17,8 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
+from ..runtime.names import unknown
+from ..runtime.refusals import require_velocities
 from ..runtime.room import read_numbers, require_room
 from .following import Follower
 from .gaps import describe_gap
@@ -26,8 +28,8 @@ from .tracks import Track
 from .walking import Path
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.initial import Initial
-    from ..runtime.module import Module
 
 LONGEST = 4000.0 * np.pi  #: radians or length scales walked at most, 2000 turns
 
@@ -42,15 +44,13 @@ class Range(NamedTuple):
     y2: Array
 
 
-def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
+def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]) -> Range:
     """Sort names into led coordinates, their rates and accelerations.
 
     Raises
     ------
     UsageError
     """
-    from ..runtime.names import unknown
-
     layout = module.layout
     coordinates = layout.q + layout.loops
     known = [name + suffix for name in coordinates for suffix in ("", "_dot", "_ddot")]
@@ -98,10 +98,61 @@ def _column(name: str, value: Any) -> Array:
     return array
 
 
-def analyse(
-    module: Module, asked: Range, initial: Mapping[str, float] | ArrayLike | None, partial: bool
+def kinematic_analysis(
+    module: BoundModel,
+    t: ArrayLike | None = None,
+    initial: Mapping[str, float] | ArrayLike | None = None,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    partial: bool = False,
+    **led: ArrayLike,
 ) -> KinematicAnalysis:
-    """Walk the range; see :meth:`~..runtime.analyses.Analyses.kinematic_analysis`."""
+    """Positions, velocities and accelerations over a range of time or of coordinates, without forces.
+
+    The range is walked from the initial position in small steps, so the mechanism stays on its branch, also through
+    change points, where others meet it.
+
+    Parameters
+    ----------
+    t : (n,) array or float, optional
+        Times (s), for drivers; 0 by default.
+    initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
+        Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
+        declared initial position at t = 0 by default, from where it is walked to the first point; if that is a
+        dead centre of the led coordinates, the branch is the one found next to it.
+    parameters, inputs : optional
+        As for :meth:`bind`.
+    partial : bool
+        Return the part of the range that can be reached instead of raising an error.
+    **led : (n,) arrays or floats
+        Values of coordinates, of the tree or of cut joints, at most as many as degrees of freedom; those left
+        over stand still.  ``theta_dot=`` and ``theta_ddot=`` give their rates over time (0 by default).
+
+    Returns
+    -------
+    KinematicAnalysis
+
+    Raises
+    ------
+    PartitionError
+        The range cannot be followed to its end (``.reached`` holds the part before), or its start is singular.
+    AssemblyError
+        The initial values do not fit the loops and drivers.
+    UsageError
+        Unknown names, wrong shapes, too many coordinates led.
+    """
+    require_velocities(module.layout)
+    asked = read_range(module, t, led)
+    if parameters is not None or inputs is not None:
+        module = module.bind(parameters, inputs)
+    return analyse(module, asked, initial, partial)
+
+
+def analyse(
+    module: BoundModel, asked: Range, initial: Mapping[str, float] | ArrayLike | None, partial: bool
+) -> KinematicAnalysis:
+    """Walk the range from the initial position."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
     t0, y0 = float(asked.t[0]), asked.y[:, 0]
@@ -134,7 +185,7 @@ def analyse(
     return walk_range(follower, asked, q, partial, led)
 
 
-def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, t0: float) -> tuple[float, Array]:
+def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | None, t0: float) -> tuple[float, Array]:
     """A closed position and its time: as given, or the declared one at t = 0."""
     from ..runtime.initial import Initial
 
@@ -161,7 +212,7 @@ def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, 
     return t0, here.close(q, {}).q if layout.n_h else q
 
 
-def complete(module: Module, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
+def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
     """The led coordinates, and those of the independent ones that stand still besides.
 
     Raises
@@ -219,7 +270,7 @@ def _refuse_long_ways(follower: Follower, names: Sequence[str], y: Array) -> Non
         )
 
 
-def _freedom(module: Module, q: Array, t: float) -> str:
+def _freedom(module: BoundModel, q: Array, t: float) -> str:
     """Why no more coordinates can be led."""
     n = module.n_dof
     if n:

@@ -18,13 +18,14 @@ from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 FORMS = ("minimal", "full")
 
 
+@np.errstate(all="ignore")
 def linearise(
-    module: Module,
+    module: BoundModel,
     x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,
@@ -33,7 +34,40 @@ def linearise(
     form: str = "minimal",
     independent: Sequence[str] | None = None,
 ) -> Linearisation:
-    """See :meth:`~..runtime.analyses.Analyses.linearise`."""
+    """Linearise the equations of motion about any state.
+
+    Parameters
+    ----------
+    x : mapping of str to float, or (n_x,) array, optional
+        A state: initial values by name, as :meth:`x0` takes them, or all of it, projected onto the constraints; by
+        default the declared initial values, assembled.
+    t : float
+        Time (s), held fixed.
+    p, u : optional
+        As for ``bind``.
+    form : {'minimal', 'full'}
+        ``minimal``: states are the independent displacements and velocities along the constraints, nonholonomic
+        ones included, so that constraints add no eigenvalues.  ``full``: A is ``jacobian(t, x)``.
+    independent : sequence of str, optional
+        Coordinates of the tree to take as the n_dof independent ones; where rates of coordinates are given, all
+        independent coordinates, all independent velocities or both.
+
+    Returns
+    -------
+    Linearisation
+        A, B, C, D, names, eigenvalues, ``mass``, ``damping``, ``stiffness``, ``drift``, ``state_space()``.
+
+    Raises
+    ------
+    UsageError
+        Unknown names or a wrong shape.
+    PartitionError
+        The rank of the constraints drops here, or the chosen coordinates are not independent.
+
+    Notes
+    -----
+    All matrices are exact derivatives of the complete right-hand side (implicit differentiation; no differences).
+    """
     if module.layout.given_rates:
         refuse_inputs(module.layout)
     if form not in FORMS:
@@ -88,7 +122,7 @@ def linearise(
 
 
 def _outputs(
-    module: Module, t: float, x: Array, rates: Array, directions: Array, moved: Array, U: Array
+    module: BoundModel, t: float, x: Array, rates: Array, directions: Array, moved: Array, U: Array
 ) -> tuple[Array, Array]:
     """C and D: changes of the outputs for changes of x along directions, with the accelerations that follow."""
     layout = module.layout
@@ -100,7 +134,7 @@ def _outputs(
     return Y[:, :n_x] @ directions + by_a @ moved[n_q:], Y[:, n_x + n_v : n_x + n_v + layout.n_u] + by_a @ U[n_q:]
 
 
-def output_derivatives(module: Module, t: float, x: Array, a: Array) -> Array:
+def output_derivatives(module: BoundModel, t: float, x: Array, a: Array) -> Array:
     """Outputs by [q, v, a, u, p], each at fixed others; (n_y, n_x + n_v + n_u + n_p)."""
     n_q = module.n_q
     return module.kernels.motion("output_derivatives")(x[:n_q], x[n_q:], a, t=t)

@@ -22,16 +22,16 @@ from .balance import assembly_jacobian
 from .tangent import Tangent
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from ..runtime.module import Module
 
 
-def find_given_tangent(module: Module, t: float, x: Array, independent: Sequence[str] | None) -> Tangent:
+def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequence[str] | None) -> Tangent:
     """The independent directions at a state on the constraints.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With given rates.
     t : float
     x : (n_x,) array

@@ -20,12 +20,12 @@ from .balance import assembly_jacobian
 from .start import Columns
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
     from ..runtime.trajectory import Trajectory
 
 
-def refuse_lost_branches(module: Module, forcing: Forcing, run: Trajectory, columns: Columns) -> None:
+def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, columns: Columns) -> None:
     """Refuse parameters and inputs whose change opens a crossing that the run passes.
 
     Raises

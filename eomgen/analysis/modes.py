@@ -20,12 +20,14 @@ from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.room import read_numbers
+from .equilibrium import equilibrium
+from .linear import linearise
 from .linearisation import Linearisation
 from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class Damped(NamedTuple):
@@ -144,8 +146,9 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
     return np.asarray(squares), np.asarray(shapes)
 
 
-def find_modes(
-    module: Module,
+@np.errstate(all="ignore")
+def modes(
+    module: BoundModel,
     x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,
@@ -153,19 +156,41 @@ def find_modes(
     u: Any = None,
     independent: Any = None,
 ) -> Modes:
-    """See :meth:`~..runtime.analyses.Analyses.modes`."""
+    """Natural frequencies, mode shapes and damping ratios of small motions about an equilibrium.
+
+    Parameters
+    ----------
+    x : mapping of str to float, or (n_x,) or (n_q,) array, optional
+        The equilibrium, at rest where only coordinates are given; by default the one that :meth:`equilibrium` finds
+        from the declared initial position.
+    t : float
+    p, u : optional
+        As for ``bind``.
+    independent : sequence of str, optional
+        Coordinates to give the shapes in.
+
+    Returns
+    -------
+    Modes
+        ``frequencies`` (rad/s), ``hertz``, ``shapes``, ``motions``, ``rigid``, ``damped``.
+
+    Raises
+    ------
+    UsageError
+        The state is no equilibrium.
+    EquilibriumError
+        None was found.
+    """
     module = module if p is None and u is None else module.bind(p, u)
     if x is None:
-        from .equilibrium import find_equilibrium
-
-        x = find_equilibrium(module, t=t).x
+        x = equilibrium(module, t=t).x
     if isinstance(x, Mapping):
         at_rest = not Initial(module.kernels, t).sort(x).rates
         x = module.x0(x, t=t)[: module.n_q if at_rest else module.n_x]
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
         state = np.concatenate([state, np.zeros(module.n_v)])
-    linear = module.linearise(state, t, independent=independent)
+    linear = linearise(module, state, t, independent=independent)
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())
         raise UsageError(

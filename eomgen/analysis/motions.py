@@ -18,7 +18,7 @@ from .following import Follower
 from .singular import Singular
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 METHOD = "kinematic"
 
@@ -26,7 +26,7 @@ METHOD = "kinematic"
 class MotionColumns(Columns):
     """Columns of a motion whose accelerations are known, and come from no force.  NaN where it is not defined."""
 
-    def __init__(self, module: Module, t: Array, x: Array, u: Array, a: Array) -> None:
+    def __init__(self, module: BoundModel, t: Array, x: Array, u: Array, a: Array) -> None:
         super().__init__(module, t, x, u)
         self.a = a
 
@@ -72,7 +72,7 @@ class KinematicAnalysis(Trajectory):
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         motion: tuple[Array, Array, Array, Array],
         columns: MotionColumns,
         header: dict[str, Any],
@@ -180,7 +180,7 @@ def keep(
     return KinematicAnalysis(module, (t, q, v, a), columns, complete, found, stop, led, **rest)
 
 
-def residuals(module: Module, t: Array, x: Array) -> Residuals:
+def residuals(module: BoundModel, t: Array, x: Array) -> Residuals:
     """How well the constraints are kept, all rows, where the motion is defined."""
     n = module.n_q
     if not module.n_rows or not t.size:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..runtime.names import unknown
+from ..runtime.refusals import require_velocities
 from .following import Follower
 from .gaps import describe_gap
 from .kinematic import complete, start_from
@@ -17,7 +19,7 @@ from .tracks import Track
 from .walking import Path
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 BEYOND = 0.05  #: of a length scale, a radian or a second past a limit, where the gap is told
 FAR = 100.0  #: length scales to search for a limit of a length
@@ -52,15 +54,44 @@ class MotionRange(NamedTuple):
         return self.stops == (None, None)
 
 
-def find_range(
-    module: Module,
+@np.errstate(all="ignore")
+def motion_range(
+    module: BoundModel,
     name: str,
-    initial: Mapping[str, float] | ArrayLike | None,
-    t: float,
-    within: tuple[float, float] | None,
+    initial: Mapping[str, float] | ArrayLike | None = None,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    t: float = 0.0,
+    within: tuple[float, float] | None = None,
 ) -> MotionRange:
-    """Walk both ways; see :meth:`~..runtime.analyses.Analyses.motion_range`."""
-    from ..runtime.names import unknown
+    """The limits between which a coordinate can move the mechanism, found by walking both ways.
+
+    Parameters
+    ----------
+    name : str
+        A coordinate of the tree or of a cut joint, or ``t`` for a mechanism that drivers move.
+    initial : mapping or array, optional
+        Position to start from, as for :meth:`kinematic_analysis`.
+    parameters, inputs : optional
+        As for :meth:`bind`.
+    t : float
+        Time (s); stands still unless ``name`` is ``t``.
+    within : (float, float), optional
+        Where to look; a full turn both ways for an angle, a hundred length scales or seconds else.
+
+    Returns
+    -------
+    MotionRange
+
+    Raises
+    ------
+    PartitionError, AssemblyError, UsageError
+        As :meth:`kinematic_analysis`.
+    """
+    require_velocities(module.layout)
+    if parameters is not None or inputs is not None:
+        module = module.bind(parameters, inputs)
 
     layout = module.layout
     if layout.n_h < layout.n_c:
@@ -104,7 +135,7 @@ def find_range(
     return MotionRange(name, lower, upper, (bottom, top), (below, above), tuple(singular))
 
 
-def _is_length(module: Module, name: str) -> bool:
+def _is_length(module: BoundModel, name: str) -> bool:
     layout = module.layout
     kinds = dict(zip((*layout.q, *layout.loops), (*layout.coordinate_kinds, *layout.loop_kinds), strict=True))
     return kinds[name] == "length"

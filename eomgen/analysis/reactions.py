@@ -20,7 +20,7 @@ from ..numeric.scales import Array
 from .constrained import States, evaluate, prepare, solve_multipliers
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 CHUNK = 4_000_000  #: numbers held at once
 GROUND = -1
@@ -37,7 +37,7 @@ class Geometry(NamedTuple):
     origins: Array  #: (n_bodies, 3, k)
 
 
-def joint_table(module: Module) -> dict[str, Any]:
+def joint_table(module: BoundModel) -> dict[str, Any]:
     """What the model's metadata says of its joints.
 
     Raises
@@ -197,22 +197,63 @@ def _reactions(states: States, a: Array, multipliers: Array, drives: Mapping[int
     return remove_self_stress(states, table, geometry, result, multipliers)
 
 
+@np.errstate(all="ignore")
 def reactions(
-    module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
+    module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
-    """See :meth:`~..runtime.analyses.Analyses.reactions`."""
+    """Reaction forces and moments of all joints.
+
+    Parameters
+    ----------
+    t, x, p, u, out
+        As for :meth:`multipliers`.
+
+    Returns
+    -------
+    (n_joints, 6) or (n_joints, 6, k) array
+        Per joint of ``joint_names`` the force (N) and moment (N m) ``[Fx Fy Fz Mx My Mz]`` that the predecessor
+        exerts on the successor at the successor's marker, in ground axes.  Reactions do no work in the motion the
+        joint allows: forces of drives, friction, springs and couplings along its coordinates are not in them
+        (they act as torques where a coordinate turns, as forces where it slides).
+
+    Raises
+    ------
+    UsageError
+        A wrong shape, or a model without bodies.
+
+    Notes
+    -----
+    Where constraints are redundant, rigid bodies do not determine all of it: see :meth:`undetermined_reactions`.
+    Returned are then the reactions with the smallest sum of squares of all joints' forces and of their moments
+    divided by the model's length, wherever loops are cut.
+    """
     joint_table(module)
     return evaluate(lambda states: find_reactions(states)[0], module, t, x, p, u, out)
 
 
-def undetermined_reactions(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
-    """See :meth:`~..runtime.analyses.Analyses.undetermined_reactions`."""
+@np.errstate(all="ignore")
+def undetermined_reactions(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
+    """Which components of :meth:`reactions` redundant constraints leave undetermined.
+
+    Returns
+    -------
+    (n_joints, 6) or (n_joints, 6, k) array of bool
+    """
     joint_table(module)
     return evaluate(lambda states: find_reactions(states)[1], module, t, x, p, u)
 
 
-def driving_forces(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:
-    """See :meth:`~..runtime.analyses.Analyses.driving_forces`."""
+@np.errstate(all="ignore")
+def driving_forces(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:
+    """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
+
+    Returns
+    -------
+    dict
+        Name of the element, or ``<name>.<row>`` where it has several rows, -> force or (k,) forces: the power they
+        bring in is the force times the rate of the row's left side, so that a driver that holds ``theta - f(t)``
+        at 0 exerts this torque along ``theta``.
+    """
     states = prepare(module, t, x, p, u)
     table = joint_table(module)
     values = states.shaped(

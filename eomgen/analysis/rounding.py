@@ -17,7 +17,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 ROUNDING = 10.0 * EPS  #: relative error of the entries of a matrix that is exact but for rounding
 BALANCED = 100.0 * EPS  #: what rounding leaves of a balance, relative to what a unit displacement does to it
@@ -117,12 +117,12 @@ def _balance(A: Array, own: Array | None) -> Array:
     return d
 
 
-def own_accelerations(module: Module, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
+def own_accelerations(module: BoundModel, t: float, x: Array, B: Array, velocities: Indices, mass: Array) -> Array:
     """Accelerations that the forces of the model would make if they did not balance, scaled (1/s^2), (n_dof,).
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     x : (n_x,) array
     B : (n_v, n_dof) array

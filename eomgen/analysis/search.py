@@ -20,7 +20,7 @@ from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
 
@@ -30,7 +30,7 @@ class Point(NamedTuple):
 
     q: Array
     unknowns: Array
-    module: Module
+    module: BoundModel
     here: Balance
 
 
@@ -46,7 +46,7 @@ class Held(NamedTuple):
 class Search:
     """The equations of balance for one model, time and set of held coordinates, and the ways to solve them."""
 
-    def __init__(self, module: Module, t: float, held: Mapping[str, float], unknowns: Sequence[str]) -> None:
+    def __init__(self, module: BoundModel, t: float, held: Mapping[str, float], unknowns: Sequence[str]) -> None:
         layout = module.layout
         self.module, self.layout, self.t, self.held, self.names = module, layout, t, held, tuple(unknowns)
         for name in self.names:
@@ -57,7 +57,7 @@ class Search:
         self.names = tuple(layout.p[k] for k in self.parameters) + tuple(layout.u[k] for k in self.inputs)
         self.supported = bool(held) and not self.names
 
-    def bound(self, values: Array) -> Module:
+    def bound(self, values: Array) -> BoundModel:
         """The module with values of the unknowns."""
         if not self.names:
             return self.module
@@ -70,7 +70,7 @@ class Search:
         """What is bound now."""
         return np.concatenate([self.module.p[self.parameters], self.module.u[self.inputs]])
 
-    def held_rows(self, module: Module, q: Array) -> list[Held]:
+    def held_rows(self, module: BoundModel, q: Array) -> list[Held]:
         """The held coordinates, three rows for a rotation."""
         initial, layout, found = Initial(module.kernels, self.t), self.layout, []
         for name in self.held:
@@ -83,7 +83,7 @@ class Search:
                 found.append(Held(label, name, row / layout.scales.q, scale))
         return found
 
-    def gradients(self, module: Module, q: Array) -> Array:
+    def gradients(self, module: BoundModel, q: Array) -> Array:
         """Gradients (k, n_v) of the held coordinates by displacements, in their scales."""
         rows = [held.gradient for held in self.held_rows(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
@@ -147,7 +147,7 @@ class Search:
         rows = spread @ (np.abs(J[:n]).sum(axis=1) * s) / s
         return np.concatenate([rows + own, np.abs(J[n:]).sum(axis=1)])
 
-    def _held_by_parameters(self, module: Module, x: Array) -> Array:
+    def _held_by_parameters(self, module: BoundModel, x: Array) -> Array:
         """Derivatives (k, n_p) of the held coordinates by the parameters, scaled; only cut joints have some."""
         layout = self.layout
         held = self.held_rows(module, x[: layout.n_q])

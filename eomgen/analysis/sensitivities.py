@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from ..errors import NoDerivativeError, SimulationError, UsageError
 from ..limits.motions import SINGULAR
 from ..numeric.scales import Array, Indices
-from ..runtime.analyses import require_projection, require_velocities
 from ..runtime.change_points import singular_values
 from ..runtime.events import Events, warn_of_unknown
 from ..runtime.failure import place
@@ -24,9 +23,11 @@ from ..runtime.integrate import Solution, choose_solver, integrate, require_end
 from ..runtime.names import unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
+from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
+from ..runtime.run_arguments import DEFAULTS, find_span, find_state, ordered_times
 from ..runtime.signals import Forcing
-from ..runtime.simulate import DEFAULTS, find_span, find_state, ordered_times
+from ..runtime.simulate import simulate
 from ..runtime.tolerances import check_tolerances
 from .lost_branch import refuse_lost_branches
 from .saltation import Saltation
@@ -35,12 +36,12 @@ from .start import held_names, keep_consistent, split_columns, start_sensitivity
 from .variations import Variational
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
 
 
-def differentiate_run(
-    module: Module,
+def sensitivities(
+    module: BoundModel,
     names: Sequence[str],
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, float] | ArrayLike | None = None,
@@ -55,7 +56,33 @@ def differentiate_run(
     events: Any = None,
     **options: Any,
 ) -> Sensitivities:
-    """See :meth:`~..runtime.analyses.Analyses.sensitivities`."""
+    """Integrate a run together with its derivatives by parameters, inputs and initial values.
+
+    Parameters
+    ----------
+    names : sequence of str
+        What to differentiate by: parameters, inputs (a constant added to each) and initial values that are held.
+    span, initial, parameters, inputs : optional
+        As for ``simulate``.
+    hold : sequence of str, optional
+        Coordinates and rates that keep their initial values when something else changes; the constraints give the
+        rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
+        declared ones, then the independent ones, while they leave each other room.
+    **options
+        method (of SciPy, DOP853), rtol (1e-9), atol (1e-11), t_eval, max_step, first_step.
+
+    Returns
+    -------
+    Sensitivities
+        ``s["theta", "k"]``, ``s.dx`` (n_x, k, n_t), ``s.dy`` (n_y, k, n_t), ``s.trajectory``.
+
+    Raises
+    ------
+    UsageError
+        An unknown name, or one that is not held.
+    SimulationError, AssemblyError, MissingDependencyError
+        As for ``simulate``.
+    """
     require_velocities(module.layout)
     require_projection(module.layout)
     forcing = Forcing(module.layout, inputs)
@@ -80,7 +107,7 @@ def differentiate_run(
     require_steps("max_step", float(options.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:
-        alone = bound.simulate((start, stop), x0, None, inputs, events=events, method=method, **options)
+        alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
@@ -134,7 +161,7 @@ def differentiate_run(
     return Sensitivities(trajectory, columns.names, dx, dy, held, salts.found)
 
 
-def _refuse_change_point(module: Module, forcing: Forcing, t: float, x: Array) -> None:
+def _refuse_change_point(module: BoundModel, forcing: Forcing, t: float, x: Array) -> None:
     """Tell of a loss of rank at the state where the derivatives grow without bound.
 
     Raises
@@ -183,7 +210,7 @@ def _distinct(solution: Solution) -> Indices:
     return np.flatnonzero(np.concatenate([[True], ~same]))
 
 
-def _checked(module: Module, hold: Sequence[str]) -> list[str]:
+def _checked(module: BoundModel, hold: Sequence[str]) -> list[str]:
     layout = module.layout
     allowed = (*layout.q, *layout.v, *layout.loops, *layout.loop_rates)
     for name in hold:

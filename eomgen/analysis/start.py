@@ -20,9 +20,9 @@ from ..runtime.initial import Initial
 from .balance import assembly_jacobian
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.input_slopes import Slopes
     from ..runtime.layout import Layout
-    from ..runtime.module import Module
 
 
 class Columns(NamedTuple):
@@ -75,7 +75,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     return Columns(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
-def held_names(module: Module, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
+def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
     """Coordinates and rates that an assembly at x holds: given ones, declared ones and independent ones, while they
     leave each other room."""
     layout = module.layout
@@ -94,7 +94,7 @@ def held_names(module: Module, t: float, x: Array, given: Mapping[str, float] | 
     return found
 
 
-def assembly_rows(module: Module, t: float, x: Array, inputs: Slopes | None) -> Array:
+def assembly_rows(module: BoundModel, t: float, x: Array, inputs: Slopes | None) -> Array:
     """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
     layout, E = module.layout, assembly_jacobian(module, t, x)
     if inputs is not None:
@@ -105,7 +105,7 @@ def assembly_rows(module: Module, t: float, x: Array, inputs: Slopes | None) -> 
 
 
 def start_sensitivity(
-    module: Module, t: float, x: Array, held: Sequence[str], columns: Columns, inputs: Slopes | None = None
+    module: BoundModel, t: float, x: Array, held: Sequence[str], columns: Columns, inputs: Slopes | None = None
 ) -> Array:
     """dx0 (n_x, k) of an assembled state, with the derivatives of the inputs there.
 
@@ -175,7 +175,7 @@ def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, co
 
 
 def keep_consistent(
-    module: Module,
+    module: BoundModel,
     t: float,
     x: Array,
     S: Array,

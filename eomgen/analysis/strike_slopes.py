@@ -24,7 +24,7 @@ from .start import assembly_rows
 from .variations import Move, Variational
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class Strike:
@@ -32,14 +32,14 @@ class Strike:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With the inputs at that instant bound.
     t : float
     x : (n_x,) array
         The state right after.
     """
 
-    def __init__(self, module: Module, t: float, x: Array) -> None:
+    def __init__(self, module: BoundModel, t: float, x: Array) -> None:
         self.module, self.t, self.layout = module, t, module.layout
         self.q, self.v = x[: self.layout.n_q], x[self.layout.n_q :]
         self.C_q = module.constraint_jacobian(self.q, t=t, rows="all")
@@ -65,14 +65,14 @@ class Strike:
 
 
 def after_impact(
-    run: Variational, module: Module, t: float, v: Array, move: Move, x: Array, event: int, e: float
+    run: Variational, module: BoundModel, t: float, v: Array, move: Move, x: Array, event: int, e: float
 ) -> Array:
     """How the state after the impact of one gap changes, (n_x, k).
 
     Parameters
     ----------
     run : Variational
-    module : Module
+    module : BoundModel
         With the inputs at that instant bound.
     t : float
     v : (n_v,) array
@@ -105,7 +105,7 @@ def after_impact(
 
 
 def after_reset(
-    run: Variational, module: Module, t: float, before: Array, move: Move, x: Array, event: int, u: Array
+    run: Variational, module: BoundModel, t: float, before: Array, move: Move, x: Array, event: int, u: Array
 ) -> Array:
     """How the state after a reset changes, (n_x, k); arguments as for :func:`after_impact`, u (n_u,) before it."""
     layout = module.layout
@@ -142,7 +142,7 @@ def after_reset(
     return np.vstack([dq, strike.solve(np.diag(scales.q**-2), dv, pushed, rates, *nothing)])
 
 
-def _back(run: Variational, module: Module, strike: Strike, dq: Array, move: Move) -> Array:
+def _back(run: Variational, module: BoundModel, strike: Strike, dq: Array, move: Move) -> Array:
     """What brings changes of coordinates (n_q, k) back onto the constraints."""
     layout, t, q = module.layout, strike.t, strike.q
     n_h, n_q, n_x = layout.n_h, layout.n_q, layout.n_x

@@ -20,8 +20,8 @@ from ..numeric.scales import Array, Indices, Scales
 from ..runtime.names import unknown
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from ..runtime.module import Module
 
 
 class Tangent(NamedTuple):
@@ -40,13 +40,13 @@ def displacement_names(layout: Layout) -> tuple[str, ...]:
 
 
 def find_tangent(
-    module: Module, t: float, x: Array, jacobian: Array, independent: Sequence[str] | None = None
+    module: BoundModel, t: float, x: Array, jacobian: Array, independent: Sequence[str] | None = None
 ) -> Tangent:
     """The independent directions at a state on the constraints.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : float
     x : (n_x,) array
     jacobian : (n_x, n_x) array
@@ -124,7 +124,7 @@ def displacement_rates(layout: Layout, x: Array, rates: Array, displacements: Ar
     return result
 
 
-def projected_directions(module: Module, t: float, x: Array, jacobian: Array) -> Array:
+def projected_directions(module: BoundModel, t: float, x: Array, jacobian: Array) -> Array:
     """Derivative (n_x, n_x) of the projected state by the state, at a state on the constraints."""
     layout = module.layout
     n_q, scales, space = layout.n_q, layout.scales, layout.space

@@ -14,7 +14,7 @@ from .linear import output_derivatives
 from .start import Columns
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class Move(NamedTuple):
@@ -50,7 +50,7 @@ class Variational:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With parameters and constant inputs bound.
     forcing : Forcing
         The inputs of the run.
@@ -58,7 +58,7 @@ class Variational:
         What is differentiated by.
     """
 
-    def __init__(self, module: Module, forcing: Forcing, columns: Columns) -> None:
+    def __init__(self, module: BoundModel, forcing: Forcing, columns: Columns) -> None:
         self.module, self.forcing, self.columns = module, forcing, columns
         self.inputs = InputSlopes(module.layout, forcing, module.p)
         self.weights = _weights(module, columns)
@@ -116,7 +116,7 @@ class Variational:
         return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
 
 
-def _weights(module: Module, columns: Columns) -> Array:
+def _weights(module: BoundModel, columns: Columns) -> Array:
     """Sizes of what is differentiated by, so that one tolerance fits all columns."""
     weights = np.ones(len(columns.names))
     for column, index in columns.parameters:

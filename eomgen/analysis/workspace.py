@@ -14,6 +14,7 @@ from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
+from ..runtime.refusals import require_velocities
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
@@ -23,7 +24,7 @@ from .workspace_walk import OUT, REACHED, Flood, Stage, flood
 if TYPE_CHECKING:
     import pandas
 
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 RESOLUTION = {2: 400, 3: 100}  #: raster cells along each side
 
@@ -63,7 +64,7 @@ class Workspace:
         Those positions, named.
     """
 
-    def __init__(self, module: Module, grid: Grid, filled: Flood, known: Conditions) -> None:
+    def __init__(self, module: BoundModel, grid: Grid, filled: Flood, known: Conditions) -> None:
         layout = module.layout
         self.name, self.q_names = layout.name, layout.q
         self.over: dict[str, Array] = dict(zip(grid.names, grid.axes, strict=True))
@@ -241,16 +242,58 @@ def _measures(J: Array) -> tuple[Array, Array, Array, Array]:
     return smallest, largest, product, quotient
 
 
-def find_workspace(
-    module: Module,
+@np.errstate(all="ignore")
+def workspace(
+    module: BoundModel,
     over: Mapping[str, Any],
     of: str | Sequence[str],
-    initial: Mapping[str, float] | ArrayLike | None,
-    t: float,
-    limits: bool | Mapping[str, Any],
-    points: int,
+    initial: Mapping[str, float] | ArrayLike | None = None,
+    parameters: Any = None,
+    inputs: Any = None,
+    *,
+    t: float = 0.0,
+    limits: bool | Mapping[str, tuple[float | None, float | None]] = False,
+    points: int = 100_000,
 ) -> Workspace:
-    """See :meth:`~..runtime.kinematic_analyses.KinematicAnalyses.workspace`."""
+    """What outputs can reach over a grid of independent coordinates, and how well conditioned it is there.
+
+    The grid is walked from the initial position, neighbour to neighbour, so that the mechanism stays on its branch.
+
+    Parameters
+    ----------
+    over : mapping of str to (float, float, int) or (n,) array
+        One to three coordinates, of the tree or of cut joints, each with (low, high, count) or rising or falling
+        values; ``t`` for drivers.  Coordinates not named, as far as they are free, stand still.
+    of : str or sequence of str
+        Outputs that are functions of position, such as coordinates of a marker, and coordinates.
+    initial : mapping or array, optional
+        Position to start from, as for :meth:`kinematic_analysis`.
+    parameters, inputs : optional
+        As for :meth:`bind`.
+    t : float
+        Time (s), unless it is varied.
+    limits : bool, or mapping of str to (lower, upper)
+        Whether to stay within the limits the joints declare, or limits of coordinates; None for none.
+    points : int
+        Most points a grid may have.
+
+    Returns
+    -------
+    Workspace
+        ``ws["tip_x"]``, ``status``, ``jacobian``, ``manipulability``, ``quality``, ``singularities``, ``area()``.
+
+    Raises
+    ------
+    PartitionError
+        No point of the grid can be reached, or the start is singular.
+    AssemblyError
+        The initial values do not fit the loops and drivers.
+    UsageError
+        Unknown names, too many coordinates, too many points, outputs that are not functions of position.
+    """
+    require_velocities(module.layout)
+    if parameters is not None or inputs is not None:
+        module = module.bind(parameters, inputs)
     grid = read_grid(module, over, of, limits, points)
     stage = Stage(module, grid, initial, t)
     reader = Reader(stage)

@@ -12,8 +12,8 @@ from ..numeric.scales import Array
 from ..runtime.names import unknown
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from ..runtime.module import Module
 
 MOST_AXES = 3
 Index = tuple[int, ...]
@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
 
 def read_grid(
-    module: Module, over: Mapping[str, Any], of: str | Sequence[str], limits: bool | Mapping[str, Any], points: int
+    module: BoundModel, over: Mapping[str, Any], of: str | Sequence[str], limits: bool | Mapping[str, Any], points: int
 ) -> Grid:
     """Check names, values, limits and the number of points.
 
@@ -118,7 +118,7 @@ def _axis(name: str, given: Any) -> Array:
     return values
 
 
-def _limits(module: Module, given: bool | Mapping[str, Any]) -> tuple[Limit, ...]:
+def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit, ...]:
     """Declared limits, or those given."""
     coordinates = (*module.layout.q, *module.layout.loops)
     if not isinstance(given, Mapping):

@@ -27,7 +27,7 @@ from .walking import Path, Walk
 from .workspace_grid import Grid, Index
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 FINEST = 1 / 40  #: of the way between neighbours: smaller steps are left to a walk that looks for singular positions
 TRIES = 64  #: grid points tried as the first one
@@ -56,7 +56,7 @@ class Stage:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     grid : Grid
     initial : mapping or array, optional
         Position to start from.
@@ -64,7 +64,9 @@ class Stage:
         Time (s), if it is not varied.
     """
 
-    def __init__(self, module: Module, grid: Grid, initial: Mapping[str, float] | ArrayLike | None, t: float) -> None:
+    def __init__(
+        self, module: BoundModel, grid: Grid, initial: Mapping[str, float] | ArrayLike | None, t: float
+    ) -> None:
         self.module, self.grid = module, grid
         names = tuple(name for name in grid.names if name != "t")
         layout = module.layout

@@ -27,9 +27,9 @@ from .run import complete_parameters, sort_settings
 from .screen import stage
 
 if TYPE_CHECKING:
+    from ..api.module import Module
     from ..derivation import Equations
     from ..describe import Model
-    from ..runtime import Module
 
 
 class Prepared(NamedTuple):

@@ -29,7 +29,7 @@ from .workspace import read_grid, workspace_to_dict, write_workspace
 
 if TYPE_CHECKING:
     from ..analysis.motions import KinematicAnalysis
-    from ..runtime import Module
+    from ..api.module import Module
 
 COUNT = 201  #: points of a range unless it says
 SHOWN = 9  #: of them on the screen

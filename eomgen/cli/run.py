@@ -30,9 +30,10 @@ from .options import (
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 
 if TYPE_CHECKING:
+    from ..api.module import Module
     from ..derivation import Equations
     from ..describe import Model
-    from ..runtime import Module, Trajectory
+    from ..runtime import Trajectory
     from .energy import EnergyBalance
 
 TABLES = (".npz", ".csv")

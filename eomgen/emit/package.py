@@ -40,6 +40,8 @@ VERIFICATION = (
     *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
     *("identities.py", "jacobians.py", "recorded.py", "selftest.py", "verify.py"),
 )
+#: Files of api/ that need no equations.
+FACADE = ("__init__.py", "module.py")
 #: Files of the other folders that no package needs: of eomgen's own cache, and of files of robots.
 ELSEWHERE = frozenset({"files/kept.py", "files/locks.py", "limits/files.py"})
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
@@ -115,6 +117,8 @@ def _runtime_files() -> dict[str, str]:
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
+    for name in FACADE:
+        found[f"api/{name}"] = (root / "api" / name).read_text(encoding="utf-8")
     for name in VERIFICATION:
         found[f"verification/{name}"] = (root / "verification" / name).read_text(encoding="utf-8")
     return found

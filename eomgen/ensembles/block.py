@@ -16,10 +16,11 @@ from ..runtime.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SM
 from ..runtime.events import WAIT, Events
 from ..runtime.late import eager
 from ..runtime.signals import Forcing
+from ..runtime.simulate import simulate
 from .cases import UNASSEMBLED, Cases, assemble_states
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 Integers = np.ndarray[Any, np.dtype[Any]]
 
@@ -114,13 +115,13 @@ class Block:
 
 
 def run_block(
-    module: Module, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
+    module: BoundModel, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
 ) -> Block:
     """Run every case of a block.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     cases : Cases
     plan : Plan
     threads : int
@@ -146,7 +147,9 @@ def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
     return {name: a if a.ndim == 1 else a[:, chosen].T for name, a in (("p", cases.p), ("u", cases.u))}
 
 
-def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
+def _run_compiled(
+    module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
+) -> Block:
     core: Any = eager(module.core)
     forcing = find_forcing(module, plan)
     forcing.attach(module)
@@ -162,14 +165,14 @@ def _run_compiled(module: Module, x0: Array, rows: Mapping[str, Array], plan: Pl
     return Block(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
 
 
-def find_forcing(module: Module, plan: Plan) -> Forcing:
+def find_forcing(module: BoundModel, plan: Plan) -> Forcing:
     """The inputs of all runs; those that are constant count as 0 here."""
     forcing = Forcing(module.layout, {**dict.fromkeys(plan.constants, 0.0), **plan.inputs})
     forcing.unsettled = frozenset(plan.constants)
     return forcing
 
 
-def forcing_of(module: Module, cases: Cases, plan: Plan, k: int) -> Forcing:
+def forcing_of(module: BoundModel, cases: Cases, plan: Plan, k: int) -> Forcing:
     """The inputs of run k."""
     forcing = find_forcing(module, plan)
     forcing.attach(module.bind(**cases.column(k)))
@@ -178,7 +181,7 @@ def forcing_of(module: Module, cases: Cases, plan: Plan, k: int) -> Forcing:
     return forcing
 
 
-def inputs_at(module: Module, cases: Cases, plan: Plan, t: Array, x: Array) -> Array:
+def inputs_at(module: BoundModel, cases: Cases, plan: Plan, t: Array, x: Array) -> Array:
     """Inputs (n_u, k) of every run at times (k,) and states (n_x, k)."""
     u = np.array(np.broadcast_to(cases.u if cases.u.ndim > 1 else cases.u[:, None], (module.n_u, cases.count)))
     forcing = find_forcing(module, plan)
@@ -190,7 +193,7 @@ def inputs_at(module: Module, cases: Cases, plan: Plan, t: Array, x: Array) -> A
     return u
 
 
-def find_events(module: Module, plan: Plan) -> Events:
+def find_events(module: BoundModel, plan: Plan) -> Events:
     """The events of the runs.
 
     Raises
@@ -240,7 +243,9 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
         raise raised[0]
 
 
-def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any) -> Block:
+def _run_python(
+    module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
+) -> Block:
     """The same through ``simulate``, one run after the other: where there is no compiled stepper for the method."""
     count, n = x0.shape
     sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
@@ -254,8 +259,8 @@ def _run_python(module: Module, x0: Array, rows: Mapping[str, Array], plan: Plan
         bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
         constants = {name: float(bound.u[module.u_names.index(name)]) for name in plan.constants}
         try:
-            run = bound.simulate(
-                plan.span, x0[k], inputs={**constants, **plan.inputs}, method=plan.method, progress=False,
+            run = simulate(
+                bound, plan.span, x0[k], inputs={**constants, **plan.inputs}, method=plan.method, progress=False,
                 events=plan.events, dense_output=samples is not None, **plan.options,
             )  # fmt: skip
             if samples is not None and plan.t_eval is not None:
@@ -301,7 +306,7 @@ def _spread(found: Block, good: Integers, count: int, start: float) -> Block:
     return Block(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
 
 
-def project(module: Module, cases: Cases, block: Block, plan: Plan) -> None:
+def project(module: BoundModel, cases: Cases, block: Block, plan: Plan) -> None:
     """Bring the stored states onto the constraints, as ``simulate`` does; a state that cannot be becomes NaN."""
     if not module.n_rows and not module.layout.space:
         return
@@ -313,7 +318,7 @@ def project(module: Module, cases: Cases, block: Block, plan: Plan) -> None:
         _project_columns(module, cases, block, plan, block.notes[2:], block.notes[1])
 
 
-def _project_columns(module: Module, cases: Cases, block: Block, plan: Plan, states: Array, times: Array) -> None:
+def _project_columns(module: BoundModel, cases: Cases, block: Block, plan: Plan, states: Array, times: Array) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
     led = find_forcing(module, plan).constrained
     if cases.alike and not led:

@@ -10,7 +10,7 @@ from .cases import Cases
 from .reductions import GRAIN, Arrays, Reduction
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 LARGEST = 16 * GRAIN  #: runs of a block at most
 ROOM = 2**26  #: bytes of samples of a block, roughly
@@ -21,14 +21,16 @@ Kept = tuple[Arrays, dict[int, str]]
 
 
 def reduce_block(
-    module: Module, cases: Cases, plan: Plan, reduction: Reduction, threads: int = 1, watch: Any = None
+    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, threads: int = 1, watch: Any = None
 ) -> Kept:
     """Run a block and keep of it what a reduction makes, with the numbers of each run under ``runs_``."""
     block = run_block(module, cases, plan, threads, watch)
     return keep(module, cases, plan, reduction, block, block.words)
 
 
-def keep(module: Module, cases: Cases, plan: Plan, reduction: Reduction, block: Block, words: dict[int, str]) -> Kept:
+def keep(
+    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, block: Block, words: dict[int, str]
+) -> Kept:
     """What a reduction makes of a block, and the numbers of each run."""
     kept = reduction.reduce(module, cases, plan, block)
     return {**kept, **{f"runs_{name}": getattr(block, name) for name in RUNS}}, words
@@ -48,7 +50,7 @@ def split(count: int, size: int) -> list[tuple[int, int]]:
 
 
 def run_local(
-    module: Module,
+    module: BoundModel,
     cases: Cases,
     plan: Plan,
     reduction: Reduction,

@@ -15,10 +15,10 @@ from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
 from ..runtime.room import require_room
-from ..runtime.simulate import find_state
+from ..runtime.run_arguments import find_state
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from ..runtime.signals import Forcing
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -74,7 +74,7 @@ class Cases:
 
 
 def collect_cases(
-    module: Module,
+    module: BoundModel,
     initial: Mapping[str, Any] | ArrayLike | None,
     parameters: Mapping[str, Any] | ArrayLike | None,
     inputs: Mapping[str, Any] | ArrayLike | None,
@@ -84,7 +84,7 @@ def collect_cases(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     initial : mapping of str to float or (k,), or (n_x,) or (n_x, k) array, optional
     parameters : mapping of str to float or (k,), or (n_p,) or (n_p, k) array, optional
     inputs : mapping of str to float or (k,), or (n_u,) or (n_u, k) array, optional
@@ -116,13 +116,13 @@ def collect_cases(
 
 
 def assemble_states(
-    module: Module, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
 ) -> tuple[Array, Mask, list[str]]:
     """The initial states of all runs, on the constraints.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     cases : Cases
     t : float
         Time of the start (s).
@@ -158,7 +158,7 @@ def assemble_states(
     return _assemble_each(module, cases, lambda k: _assemble_one(module, cases, k, t))
 
 
-def _assemble_each(module: Module, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:
+def _assemble_each(module: BoundModel, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:
     x, words = np.full((module.n_x, cases.count), np.nan), []
     failed: Mask = np.zeros(cases.count, dtype=bool)
     for k in range(cases.count):
@@ -170,21 +170,21 @@ def _assemble_each(module: Module, cases: Cases, assemble: Callable[[int], Array
     return x, failed, words
 
 
-def _assemble_led(module: Module, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
+def _assemble_led(module: BoundModel, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
     """The state of one run whose constraints depend on inputs that vary."""
     values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
     given = values if cases.states is None else cases.states[:, k]
     return find_state(module.bind(**cases.column(k)), given, t, forcing)
 
 
-def _assemble_one(module: Module, cases: Cases, k: int, t: float) -> Array:
+def _assemble_one(module: BoundModel, cases: Cases, k: int, t: float) -> Array:
     if cases.states is not None:
         return module.project(cases.states[:, k], t=t, **cases.column(k))
     values = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()}
     return module.x0(values, t=t, **cases.column(k))
 
 
-def _is_free(module: Module, cases: Cases, free: bool) -> bool:
+def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
     """Whether named initial values are entries of the state, whatever the others are."""
     return free and not module.layout.loops and all(name in module.x_names for name in cases.values)
 

@@ -17,7 +17,7 @@ from .handle import Handle
 from .reductions import Custom, Reduction
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 AHEAD = 3  #: blocks under way or waiting for each worker
 
@@ -74,7 +74,7 @@ def count_workers(client: Any) -> int:
 
 def run_on_workers(
     client: Any,
-    module: Module,
+    module: BoundModel,
     handle: Handle,
     cases: Cases,
     plan: Plan,
@@ -122,7 +122,7 @@ def _task(handle: Handle, cases: Cases, plan: Plan, reduction: Reduction) -> Kep
     return reduce_block(handle.open(), cases, plan, reduction)
 
 
-def _lost(module: Module, cases: Cases, plan: Plan, reduction: Reduction, error: BaseException) -> Kept:
+def _lost(module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, error: BaseException) -> Kept:
     """What is kept of a block that no worker could run: runs without states, marked so."""
     sizes, k = (module.n_x, 0 if plan.t_eval is None else len(plan.t_eval)), cases.count
     samples = None if plan.t_eval is None else np.full((*sizes, k), np.nan)

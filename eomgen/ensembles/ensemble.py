@@ -13,6 +13,7 @@ from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
+from ..runtime.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .cases import Cases
 from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs
@@ -20,7 +21,7 @@ from .reductions import Reduction, States, Statistics, names_of, summarise, with
 if TYPE_CHECKING:
     import pandas
 
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
 
 
@@ -66,7 +67,7 @@ class Ensemble:
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         cases: Cases,
         plan: Plan,
         runs: dict[str, Any],
@@ -181,7 +182,7 @@ class Ensemble:
         """Run k again, with all its steps; options as for ``Module.simulate``."""
         plan = self._plan
         settings = {"method": plan.method, **plan.options, **options}
-        return self._module.simulate(plan.span, **self.case(k), **settings)
+        return simulate(self._module, plan.span, **self.case(k), **settings)
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each run: status, end, parameters that vary, and the columns at the end."""

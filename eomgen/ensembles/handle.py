@@ -18,7 +18,7 @@ from ..runtime.late import eager
 from ..runtime.pickling import restore
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 
 class Handle(NamedTuple):
@@ -41,7 +41,7 @@ class Handle(NamedTuple):
         Values bound.
     """
 
-    kind: type[Module]
+    kind: type[BoundModel]
     name: str
     file: str
     digest: str
@@ -50,7 +50,7 @@ class Handle(NamedTuple):
     u: Array
     needs: tuple[str, ...] = ()
 
-    def open(self) -> Module:
+    def open(self) -> BoundModel:
         """The module: from its own file if that is here, the same and for this processor, else built from the sources,
         or imported.
 
@@ -63,7 +63,7 @@ class Handle(NamedTuple):
         return self.kind(core, self.p, self.u)
 
 
-def describe(module: Module) -> Handle:
+def describe(module: BoundModel) -> Handle:
     """How workers get a module.
 
     Raises

@@ -17,7 +17,7 @@ from .block import EVENT, Block, Plan, inputs_at
 from .cases import Cases
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 Arrays = dict[str, Any]
 GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depend on blocks, threads or workers
@@ -26,7 +26,7 @@ GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depe
 class Reduction(Protocol):
     """How blocks are boiled down."""
 
-    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays: ...
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays: ...
     def join(self, parts: Sequence[Arrays]) -> Arrays: ...
 
 
@@ -42,7 +42,7 @@ class States:
     def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
         self.kept = tuple(kept)
 
-    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
         """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
         return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
 
@@ -58,7 +58,7 @@ class Statistics:
     sample variance, The American Statistician 37 (1983).
     """
 
-    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
         """count, mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
         if plan.t_eval is None or block.samples is None:
             ended = (block.status == 0) | (block.status == EVENT)
@@ -96,7 +96,7 @@ class Custom:
     def __init__(self, function: Callable[[Block], Mapping[str, Any]]) -> None:
         self.function = function
 
-    def reduce(self, module: Module, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
         """As the function says."""
         made = self.function(block)
         if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
@@ -122,7 +122,7 @@ def choose_reduction(reduce: Any) -> Reduction:
     raise UsageError(f"reduce must be 'states', 'statistics', 'events' or a function of a block, not {reduce!r}")
 
 
-def with_outputs(module: Module, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:
+def with_outputs(module: BoundModel, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:
     """States (n_x, k) at times (k,) with their outputs, as ``names_of`` has them; NaN where one cannot be evaluated."""
     further = [i for i, name in enumerate(module.y_names) if name not in module.x_names]
     if not further:
@@ -140,7 +140,7 @@ def with_outputs(module: Module, cases: Cases, plan: Plan, x: Array, t: Array) -
     return np.concatenate([x, y[further]])
 
 
-def names_of(module: Module) -> tuple[str, ...]:
+def names_of(module: BoundModel) -> tuple[str, ...]:
     """States, then the outputs that do not repeat a coordinate."""
     return (*module.x_names, *(name for name in module.y_names if name not in module.x_names))
 

@@ -16,9 +16,9 @@ from ..runtime.compiled import can_run
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
 from ..runtime.room import require_room, require_steps
+from ..runtime.run_arguments import DEFAULTS, find_span, ordered_times
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
-from ..runtime.simulate import DEFAULTS, find_span, ordered_times
 from ..runtime.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
@@ -28,8 +28,8 @@ from .reductions import GRAIN, Reduction, choose_reduction
 from .store import stored_length
 
 if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from ..runtime.module import Module
 
 STORED = 64  #: blocks at least that a store keeps of a large ensemble
 WIDEST = 8  #: runs side by side in one thread, at most
@@ -37,7 +37,7 @@ OPTIONS = ("rtol", "atol", "max_step", "first_step")
 
 
 def simulate_many(
-    module: Module,
+    module: BoundModel,
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, Any] | ArrayLike | None = None,
     parameters: Mapping[str, Any] | ArrayLike | None = None,
@@ -65,7 +65,7 @@ def simulate_many(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     span : (float, float) or float, optional
         As for ``simulate``.
     initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
@@ -169,7 +169,7 @@ def simulate_many(
 
 
 def _run(
-    module: Module, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], missing: list[int],
+    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], missing: list[int],
     threads: int, client: Any, watch: Callable[[float], None] | None,
 ) -> Iterator[tuple[int, Kept]]:  # fmt: skip
     if client is None:
@@ -181,7 +181,12 @@ def _run(
 
 
 def _gather(
-    module: Module, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], kept: dict[int, Kept]
+    module: BoundModel,
+    cases: Cases,
+    plan: Plan,
+    reduction: Reduction,
+    parts: list[tuple[int, int]],
+    kept: dict[int, Kept],
 ) -> Ensemble:
     ordered = [kept[index] for index in range(len(parts))]
     runs = {name: np.concatenate([arrays[f"runs_{name}"] for arrays, _ in ordered]) for name in RUNS}
@@ -191,7 +196,7 @@ def _gather(
 
 
 def _plan(
-    module: Module, span: Any, method: Any, t_eval: Any, tables: dict[str, Any],
+    module: BoundModel, span: Any, method: Any, t_eval: Any, tables: dict[str, Any],
     constants: tuple[str, ...], max_steps: int, step: float | None, options: dict[str, Any], watched: tuple[Any, int],
 ) -> Plan:  # fmt: skip
     declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
@@ -250,7 +255,7 @@ def _positive(what: str, given: Any, default: int) -> int:
 
 
 def _open_store(
-    folder: str | Path, module: Module, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
+    folder: str | Path, module: BoundModel, cases: Cases, plan: Plan, reduce: Any, parts: list[tuple[int, int]]
 ) -> Any:
     from ..runtime.identity import code_digest
     from .store import Store

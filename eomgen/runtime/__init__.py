@@ -1,4 +1,4 @@
-"""Stage runtime: a compiled or NumPy core -> Module; Module -> Trajectory.
+"""Stage runtime: a compiled or NumPy core -> BoundModel; BoundModel -> Trajectory.
 
 Importing it costs NumPy and little more; SciPy, pandas, matplotlib and rich load inside the calls that need them.
 """
@@ -8,9 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .module import Module
-
 if TYPE_CHECKING:
+    from .bound_model import BoundModel
     from .minimal import Minimal
     from .numpy_core import NumpyCore
     from .protocols import Core
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 _HOMES = {
+    "BoundModel": "bound_model",
     "Core": "protocols",
     "Minimal": "minimal",
     "NumpyCore": "numpy_core",
@@ -27,7 +27,7 @@ _HOMES = {
     "load_trajectory": "storage",
 }
 
-__all__ = ["Core", "Minimal", "Module", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]
+__all__ = ["BoundModel", "Core", "Minimal", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]
 
 
 def __getattr__(name: str) -> Any:

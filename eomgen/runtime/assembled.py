@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,19 +11,25 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
+from .initial import Initial
+from .kernels import Kernels
 from .layout import Layout, number
 from .room import read_numbers
-
-if TYPE_CHECKING:
-    from .initial import Initial
 
 
 class Assembled:
     """What a :class:`~.module.Module` can say about the positions that its loops allow."""
 
+    kernels: Kernels
     layout: Layout
+    x_names: tuple[str, ...]
     n_q: int
     n_x: int
+
+    if TYPE_CHECKING:
+
+        def bind(self, p: Any = None, u: Any = None) -> Self:
+            """See :meth:`~.bound_model.BoundModel.bind`."""
 
     @np.errstate(all="ignore")
     def x0(
@@ -149,11 +155,20 @@ class Assembled:
         return 0 if abs(here) < CHOSEN else int(np.sign(here * (np.sign(there) or 1.0)))
 
     def _initial(self, t: float, p: Any, u: Any) -> Initial:
-        from .initial import start_from
-        from .module import Module
+        """The assembly of this model with other parameters and inputs, if given.
 
-        assert isinstance(self, Module)
-        return start_from(self, t, p, u)
+        Raises
+        ------
+        UsageError
+            A number where parameters or inputs are meant, since a coordinate bears the name p or u.
+        """
+        layout = self.layout
+        for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
+            scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
+            if scalar and name in layout.q + layout.loops + layout.v:
+                kind = "velocity" if name in layout.v else "coordinate"
+                raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
+        return Initial((self if p is None and u is None else self.bind(p, u)).kernels, t)
 
 
 def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:

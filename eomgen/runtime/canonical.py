@@ -18,7 +18,7 @@ from ..numeric.scales import Array
 from .room import read_numbers
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 
 class Canonical:
@@ -34,7 +34,7 @@ class Canonical:
     n_z : int
     """
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: BoundModel) -> None:
         layout = module.layout
         if layout.n_m != layout.n_v:
             raise UnavailableError(

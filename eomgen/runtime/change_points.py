@@ -19,7 +19,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 #: Scaled motion between two samples, of coordinates that the constraints hold; a pass takes pi, or half of it.
 SPACING = 0.15
@@ -45,14 +45,14 @@ class ChangePoint(NamedTuple):
         return f"t = {self.time:.6g} s, {freedoms} at {shown}{more}"
 
 
-def scaled_jacobians(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
+def scaled_jacobians(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
     """Scaled constraint Jacobians (k, m, n) at times (k,), states (n_x, k) and inputs (n_u, k)."""
     layout = module.layout
     C_q = np.moveaxis(module.constraint_jacobian(x[: layout.n_q], t=t, u=u, rows="all"), -1, 0)
     return np.asarray(layout.scales.jacobian(C_q))
 
 
-def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) -> Array:
+def singular_values(module: BoundModel, t: Array, x: Array, u: Array | None = None) -> Array:
     """Singular values of the scaled constraint Jacobian relative to the largest, (k, min(m, n))."""
     block = max(1, ENTRIES // (module.layout.n_c * module.layout.n_v))
     found = []
@@ -64,12 +64,12 @@ def singular_values(module: Module, t: Array, x: Array, u: Array | None = None) 
     return np.asarray(values / np.maximum(values[:, :1], TINY))
 
 
-def find_change_points(module: Module, t: Array, x: Array, u: Array) -> list[ChangePoint]:
+def find_change_points(module: BoundModel, t: Array, x: Array, u: Array) -> list[ChangePoint]:
     """Where a run passed configurations in which rank is lost.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With the parameters of the run.
     t : (n_t,) array
         Of the integrator's steps; a time that comes twice is that of an event that resets the state.
@@ -93,13 +93,13 @@ class Curve:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     t : (k,) array
     x : (n_x, k) array
     u : (n_u, k) array
     """
 
-    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
+    def __init__(self, module: BoundModel, t: Array, x: Array, u: Array) -> None:
         self.t, self.x, self.n_q = t, x, module.layout.n_q
         slopes = module.kernels.timed("rhs", nan=True)(t, x, **({"u": u} if len(u) else {}))
         known = bool(np.isfinite(slopes).all())
@@ -132,7 +132,7 @@ class Looks:
         As for :func:`find_change_points`.
     """
 
-    def __init__(self, module: Module, t: Array, x: Array, u: Array) -> None:
+    def __init__(self, module: BoundModel, t: Array, x: Array, u: Array) -> None:
         self.module, self.t, self.u = module, t, u
         layout = module.layout
         self.rank, self.n_q = layout.rank, layout.n_q

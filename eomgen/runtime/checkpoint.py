@@ -23,8 +23,8 @@ from .identity import code_digest, differences, digest
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
+    from .bound_model import BoundModel
     from .events import Events
-    from .module import Module
     from .signals import Forcing
 
 FORMAT = "eomgen checkpoint 1"
@@ -115,7 +115,7 @@ class Checkpoint:
 
 
 def identify(
-    module: Module,
+    module: BoundModel,
     forcing: Forcing,
     events: Events,
     nodes: Sequence[float],

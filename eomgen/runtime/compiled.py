@@ -21,8 +21,8 @@ from .signals import Forcing
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
+    from .bound_model import BoundModel
     from .checkpoint import Checkpoint
-    from .module import Module
     from .pace import Pace
     from .progress import Progress
 
@@ -37,7 +37,7 @@ MESSAGES = {
 }
 
 
-def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
+def can_run(module: BoundModel, method: Any, forcing: Forcing) -> bool:
     """Whether a run needs nothing but the module's own steppers.
 
     Raises
@@ -57,7 +57,7 @@ def can_run(module: Module, method: Any, forcing: Forcing) -> bool:
     return there and not forcing.foreign
 
 
-def no_series(module: Module) -> str:
+def no_series(module: BoundModel) -> str:
     """Why a module has no Taylor method."""
     why = module.metadata.get("no_series", "its module has none compiled, as with target='numpy'")
     return (
@@ -96,7 +96,7 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
 
 
 def integrate_compiled(
-    module: Module,
+    module: BoundModel,
     forcing: Forcing,
     nodes: Sequence[float],
     x0: Array,

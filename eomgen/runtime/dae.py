@@ -10,24 +10,21 @@ where the corrections m of the holonomic rows are 0 in every solution, and S are
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..limits.runs import ATOL, RTOL
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .room import read_numbers
 
 if TYPE_CHECKING:
-    from .module import Module
-    from .trajectory import Trajectory
+    from .bound_model import BoundModel
 
 
-class Dae:
+class DaeForm:
     """The differential-algebraic form of a model; of redundant constraints the independent rows alone.
 
     Attributes
@@ -39,7 +36,7 @@ class Dae:
         Entries of y whose rates are not in F: multipliers and corrections.
     """
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: BoundModel) -> None:
         layout = module.layout
         rows, holonomic = layout.rows, layout.rows[layout.rows < layout.n_h]
         first, n_c, n_h = layout.n_x, layout.n_c, layout.n_h
@@ -117,52 +114,3 @@ class Dae:
             l = algebra.lstsq(J.T, -force, rcond=None)
             y[layout.n_x : layout.n_x + len(l)] = l / layout.scales.c[layout.rows]
         return y, yp
-
-    def solve(
-        self,
-        span: float | tuple[float, float] | None = None,
-        initial: Mapping[str, float] | ArrayLike | None = None,
-        parameters: Any = None,
-        inputs: Mapping[str, Any] | None = None,
-        *,
-        t_eval: Sequence[float] | Array | None = None,
-        events: Any = None,
-        rtol: float = RTOL,
-        atol: float = ATOL,
-        **options: Any,
-    ) -> Trajectory:
-        """Integrate F = 0 by IDA of SUNDIALS, with the exact Jacobian; needs scikit-sundae.
-
-        Parameters
-        ----------
-        span, initial, parameters, inputs
-            As for ``Module.simulate``; an input is a number, a table or a function of t and x.
-        t_eval : times in order, optional
-            IDA's own steps by default.
-        events : optional
-            As for ``Module.simulate``; IDA's root finding locates them, by changes of sign between its steps (give
-            ``max_step`` where a value comes to zero and back), a reset or an impact starts it anew with consistent
-            values, a terminal event ends the run.
-        rtol, atol : float, optional
-            Tolerances of coordinates and velocities; multipliers and corrections are not controlled.
-        **options
-            Further ones of ``sksundae.ida.IDA``, such as ``max_step`` or ``max_order``.
-
-        Returns
-        -------
-        Trajectory
-            Of states, projected as those of ``simulate`` are.
-
-        Raises
-        ------
-        MissingDependencyError
-            scikit-sundae is not installed.
-        SimulationError
-            IDA gave up.
-        ZenoError
-            Events that reset the state follow each other ever faster.
-        """
-        from .dae_solution import integrate_dae
-
-        tolerances = {"rtol": rtol, "atol": atol}
-        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, events, tolerances, options)

@@ -6,7 +6,7 @@ with consistent values.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,21 +14,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
-from ..limits.runs import ENDLESS, ENOUGH
+from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
+from .dae import DaeForm
 from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
 from .integrate import Solution, require_end
 from .names import require
 from .recording import record
 from .resets import Resets
 from .room import require_steps
+from .run_arguments import find_span, find_state, ordered_times
 from .signals import Forcing
-from .simulate import find_span, find_state, ordered_times
 from .tolerances import check_step, check_tolerances
 
 if TYPE_CHECKING:
-    from .dae import Dae
-    from .module import Module
+    from .bound_model import BoundModel
     from .trajectory import Trajectory
 
 UNCONTROLLED = 1e30  #: absolute tolerance of unknowns that the error test leaves out
@@ -36,8 +36,59 @@ STEPS = 1_000_000  #: at most, between two times wanted
 OWN = ("eventsfn", "num_events", "jacfn", "userdata", "algebraic_idx")  #: options of IDA that are set here
 
 
+class Dae(DaeForm):
+    """The differential-algebraic form of a model, with a solver."""
+
+    def solve(
+        self,
+        span: float | tuple[float, float] | None = None,
+        initial: Mapping[str, float] | ArrayLike | None = None,
+        parameters: Any = None,
+        inputs: Mapping[str, Any] | None = None,
+        *,
+        t_eval: Sequence[float] | Array | None = None,
+        events: Any = None,
+        rtol: float = RTOL,
+        atol: float = ATOL,
+        **options: Any,
+    ) -> Trajectory:
+        """Integrate F = 0 by IDA of SUNDIALS, with the exact Jacobian; needs scikit-sundae.
+
+        Parameters
+        ----------
+        span, initial, parameters, inputs
+            As for ``Module.simulate``; an input is a number, a table or a function of t and x.
+        t_eval : times in order, optional
+            IDA's own steps by default.
+        events : optional
+            As for ``Module.simulate``; IDA's root finding locates them, by changes of sign between its steps (give
+            ``max_step`` where a value comes to zero and back), a reset or an impact starts it anew with consistent
+            values, a terminal event ends the run.
+        rtol, atol : float, optional
+            Tolerances of coordinates and velocities; multipliers and corrections are not controlled.
+        **options
+            Further ones of ``sksundae.ida.IDA``, such as ``max_step`` or ``max_order``.
+
+        Returns
+        -------
+        Trajectory
+            Of states, projected as those of ``simulate`` are.
+
+        Raises
+        ------
+        MissingDependencyError
+            scikit-sundae is not installed.
+        SimulationError
+            IDA gave up.
+        ZenoError
+            Events that reset the state follow each other ever faster.
+        """
+        tolerances = {"rtol": rtol, "atol": atol}
+        return integrate_dae(self._module, span, initial, parameters, inputs, t_eval, events, tolerances, options)
+
+
 def integrate_dae(
-    module: Module,
+    module: BoundModel,
     span: float | tuple[float, float] | None,
     initial: Mapping[str, float] | ArrayLike | None,
     parameters: Any,
@@ -47,7 +98,7 @@ def integrate_dae(
     tolerances: Mapping[str, Any],
     options: Mapping[str, Any],
 ) -> Trajectory:
-    """One run; see :meth:`~.dae.Dae.solve`."""
+    """One run; see :meth:`Dae.solve`."""
     ida = require("sksundae.ida", "scikit-sundae", "dae.solve")
     for name in OWN:
         if name in options:
@@ -60,7 +111,7 @@ def integrate_dae(
     tolerances = {**tolerances, "rtol": check_tolerances(module.n_x, np.inf, tolerances)["rtol"]}
     watched = Events(module.layout, events)
     x0 = find_state(bound, initial, start, forcing)
-    times = None if t_eval is None else ordered_times(t_eval, start, end, module.dae.n_y)
+    times = None if t_eval is None else ordered_times(t_eval, start, end, DaeForm(module).n_y)
     if options.get("max_step"):
         require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
     run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
@@ -76,7 +127,7 @@ class _Run:
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         forcing: Forcing,
         events: Events,
         span: tuple[float, float],
@@ -140,7 +191,7 @@ class _Run:
 
     def _part(self, t: float, x: Array, end: float, jumped: bool) -> tuple[float, Array, list[int]]:
         """Integrate to an event, or to the end of this part; the time and state there, and what happened."""
-        form, forcing, n_x = self.module.dae, self.forcing, self.module.n_x
+        form, forcing, n_x = DaeForm(self.module), self.forcing, self.module.n_x
         forcing.enter(t, end)
         y, yp = form.initial(x, t, forcing(t, x))
         nodes = np.array([t, end])
@@ -181,7 +232,7 @@ class _Run:
         """Which events happened, when, and the unknowns there."""
         return ((), (), ()) if found.i_events is None else (found.i_events, found.t_events, found.y_events)
 
-    def _solver(self, form: Dae) -> Any:
+    def _solver(self, form: DaeForm) -> Any:
         forcing, n_x, listed = self.forcing, self.module.n_x, self.listed
 
         start, end = self.span

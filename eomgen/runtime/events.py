@@ -21,7 +21,7 @@ from .names import check_names, require_time_and_state, unknown
 from .tapes import Formula, is_formula, record_tape
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
     from .signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
@@ -155,7 +155,7 @@ class Events:
             "resets": self.layout.metadata.get("resets", []) if self.model else [],
         }
 
-    def listed(self, module: Module, forcing: Forcing) -> list[Event]:
+    def listed(self, module: BoundModel, forcing: Forcing) -> list[Event]:
         """The same as functions f(t, x), for SciPy's methods."""
         kernel = module.kernels.timed("events", nan=True) if self.model else None
         found: list[Event] = []
@@ -167,7 +167,7 @@ class Events:
             found.append(Event(formula.function(p), event.name, event.terminal, event.direction))
         return [*found, *self.functions]
 
-    def reset(self, module: Module, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
+    def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
         """The state after the events that happened at time t."""
         after = np.array(x, dtype=float)
         for i in fired:

@@ -13,7 +13,7 @@ import numpy as np
 from .late import eager
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 DEPTH = 6  #: of objects within objects that are looked into
 
@@ -83,7 +83,7 @@ def _attributes(value: Any) -> dict[str, Any]:
     return found
 
 
-def code_digest(module: Module) -> str:
+def code_digest(module: BoundModel) -> str:
     """SHA-256 of the file of a module's code, or of its metadata where it has no file."""
     core: Any = eager(module.core)
     file = getattr(core, "__file__", None)

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, UsageError
+from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
@@ -30,7 +30,7 @@ from .late_rank import require_rank
 from .names import UnknownNameError, unknown
 
 if TYPE_CHECKING:
-    from .module import Module
+    pass
 
 
 class Given(NamedTuple):
@@ -382,19 +382,3 @@ class Initial:
             if name in self.layout.q:
                 result[self.layout.q.index(name)] = value
         return result
-
-
-def start_from(module: Module, t: float, p: Any, u: Any) -> Initial:
-    """The assembly of a module with other parameters and inputs, if given.
-
-    Raises
-    ------
-    UsageError
-        A number where parameters or inputs are meant, since a coordinate bears the name p or u.
-    """
-    for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
-        scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
-        if scalar and name in module.layout.q + module.layout.loops + module.layout.v:
-            kind = "velocity" if name in module.layout.v else "coordinate"
-            raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
-    return Initial((module if p is None and u is None else module.bind(p, u)).kernels, t)

@@ -19,12 +19,13 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .room import require_steps
 from .run import Run
+from .run_arguments import check_method, declare, own_step
 from .signals import Forcing
-from .simulate import check_method, declare, simulate
+from .simulate import simulate
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
 
@@ -36,7 +37,7 @@ class Integrator:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With parameters and inputs bound.
     method : str
         A method of :func:`~.simulate.simulate`.
@@ -47,7 +48,7 @@ class Integrator:
 
     Attributes
     ----------
-    module : Module
+    module : BoundModel
     method : str
 
     Raises
@@ -59,7 +60,7 @@ class Integrator:
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         method: str,
         rtol: float,
         atol: Any,
@@ -193,10 +194,28 @@ class Integrator:
         return f"<Integrator of {self.module.name}: {self.method}, rtol {self._options['rtol']:g}>"
 
 
-def make_integrator(module: Module, parameters: Any, inputs: Any, **options: Any) -> Integrator:
-    """See :meth:`~.module.Module.integrator`."""
+def integrator(
+    module: BoundModel, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
+) -> Integrator:
+    """An integrator held ready, for many short integrations: control, shooting, filters, learning.
+
+    Parameters
+    ----------
+    parameters, inputs : mapping of str to float, or arrays, optional
+        As for :meth:`bind`; inputs are held.
+    method : str, optional
+    **options
+        rtol, atol, max_step, first_step, step, as for :meth:`simulate`.
+
+    Returns
+    -------
+    Integrator
+        ``integrator(t, x, h)`` -> the state at t + h; see :class:`~.integrator.Integrator`.
+    """
     check_names("option of integrator", options, OPTIONS)
     declared = declare(module)
+    method, step = own_step(module, method, options.pop("step", None))
+    options |= {"method": method, "step": step}
     given = {name: declared[name] for name in ("method", "rtol", "atol")}
     given.update({name: value for name, value in options.items() if value is not None})
     return Integrator(module if parameters is None and inputs is None else module.bind(parameters, inputs), **given)

@@ -15,7 +15,7 @@ from .paths import STEP, Path
 from .room import read_numbers
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 AMPLIFIED = 10.0  #: v_d / v_i above which a dead centre is near
 REMEMBERED = 7  #: calls that the next one is compared with, less one
@@ -55,7 +55,7 @@ class Minimal:
     n_x : int
     """
 
-    def __init__(self, module: Module) -> None:
+    def __init__(self, module: BoundModel) -> None:
         layout = module.layout
         self._module = module
         self._layout = layout

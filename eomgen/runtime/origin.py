@@ -16,13 +16,13 @@ from .signals import Signal
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
     from .signals import Forcing
 
 MANY = 1000  #: points of a table that are written out; of longer ones a digest tells
 
 
-def origin(module: Module) -> dict[str, Any]:
+def origin(module: BoundModel) -> dict[str, Any]:
     """Which model a result comes from, and what calculated it.
 
     Returns
@@ -45,7 +45,7 @@ def origin(module: Module) -> dict[str, Any]:
     }
 
 
-def inputs_of(module: Module, forcing: Forcing) -> dict[str, Any]:
+def inputs_of(module: BoundModel, forcing: Forcing) -> dict[str, Any]:
     """Every input of a run as it was given: a number, a table, a text, or the name and digest of a function."""
     found: dict[str, Any] = dict(zip(module.u_names, module.u.tolist(), strict=True))
     for name, value in forcing.values.items():

@@ -22,13 +22,13 @@ from ..numeric.scales import Array
 from .late import LateCore, eager
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 #: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
 Late = tuple[tuple[str, ...], tuple[str, str] | None]
 
 
-def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
+def reduce(module: BoundModel) -> tuple[Callable[..., BoundModel], tuple[Any, ...]]:
     """What pickle stores: how to make the module again.
 
     Raises
@@ -50,7 +50,7 @@ def reduce(module: Module) -> tuple[Callable[..., Module], tuple[Any, ...]]:
     return restore, (type(module), name, str(file), module.p, module.u, late)
 
 
-def restore(kind: type[Module], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> Module:
+def restore(kind: type[BoundModel], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> BoundModel:
     """The module of a pickle, with the rarer kernels where they had been made.
 
     Raises

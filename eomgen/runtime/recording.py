@@ -18,8 +18,8 @@ from .signals import Forcing
 from .trajectory import Residuals, Trajectory
 
 if TYPE_CHECKING:
+    from .bound_model import BoundModel
     from .change_points import ChangePoint
-    from .module import Module
 
 
 class Columns:
@@ -27,7 +27,7 @@ class Columns:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
         With the parameters and constant inputs of the run bound.
     t : (n_t,) array
     x : (n_x, n_t) array
@@ -39,7 +39,7 @@ class Columns:
 
     def __init__(
         self,
-        module: Module,
+        module: BoundModel,
         t: Array,
         x: Array,
         u: Array,
@@ -129,7 +129,7 @@ class Columns:
 
 
 def record(
-    module: Module,
+    module: BoundModel,
     forcing: Forcing,
     solution: Solution,
     method: str,
@@ -192,7 +192,7 @@ def _units(layout: Layout) -> dict[str, str]:
     return {name: layout.unit(name) for name in ("t", *_names(layout)) if layout.unit(name)}
 
 
-def describe(module: Module) -> dict[str, Any]:
+def describe(module: BoundModel) -> dict[str, Any]:
     """What the columns of any run of a module are called, where it comes from, and its parameters."""
     return {**_described(module.layout), "origin": origin(module), "parameters": dict(module._parameters)}
 
@@ -212,7 +212,7 @@ def _described(layout: Layout) -> dict[str, Any]:
     }
 
 
-def project(module: Module, t: Array, raw: Array, forcing: Forcing | None = None) -> tuple[Residuals, Array]:
+def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = None) -> tuple[Residuals, Array]:
     """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then."""
     n = module.n_q
     if not t.size or not (module.n_rows or module.layout.space):
@@ -242,7 +242,7 @@ def project(module: Module, t: Array, raw: Array, forcing: Forcing | None = None
     ), x
 
 
-def units_of(module: Module, names: Sequence[str]) -> dict[str, str]:
+def units_of(module: BoundModel, names: Sequence[str]) -> dict[str, str]:
     """Units of columns, of those that have one."""
     return {name: module.layout.unit(name) for name in ("t", *names) if module.layout.unit(name)}
 

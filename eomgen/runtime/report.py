@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..texts import html_table, visible
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 SHOWN = 12  #: names listed
 
@@ -19,7 +19,7 @@ def listed(names: Sequence[str]) -> str:
     return f"{text}, ... ({len(names)})" if len(names) > SHOWN else text or "-"
 
 
-def facts(module: Module) -> list[tuple[str, str]]:
+def facts(module: BoundModel) -> list[tuple[str, str]]:
     """Label and value of each line of the report."""
     layout, data = module.layout, module.metadata
     lines = [
@@ -53,13 +53,13 @@ def facts(module: Module) -> list[tuple[str, str]]:
     return lines
 
 
-def line(module: Module) -> str:
+def line(module: BoundModel) -> str:
     """One line."""
     n = module.n_dof
     return f"<Module {module.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{listed(module.x_names)}]>"
 
 
-def text(module: Module) -> str:
+def text(module: BoundModel) -> str:
     """Several lines of plain text."""
     lines = facts(module)
     width = max(len(label) for label, _ in lines)
@@ -67,6 +67,6 @@ def text(module: Module) -> str:
     return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
 
 
-def html(module: Module) -> str:
+def html(module: BoundModel) -> str:
     """A small table for notebooks."""
     return html_table(module.name, facts(module), module.doc)

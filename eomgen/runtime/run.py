@@ -15,14 +15,14 @@ from .progress import Progress
 from .signals import Forcing
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
     from .protocols import Timed
 
 
 class Run:
     """The right-hand side and Jacobian of one run, with NaN for recoverable failures."""
 
-    def __init__(self, module: Module, forcing: Forcing) -> None:
+    def __init__(self, module: BoundModel, forcing: Forcing) -> None:
         self.module = module
         self.forcing = forcing
         self.tangent: Timed | None = None

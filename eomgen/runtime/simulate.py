@@ -4,38 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from math import isfinite
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import AssemblyError, EvaluationError, SimulationError, SimulationInterrupted, UsageError
-from ..limits.constraints import ALIKE
-from ..limits.runs import ATOL, RTOL
-from ..numeric import algebra
-from ..numeric.scales import Array
+from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .layout import number
 from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import read_numbers, read_times, require_room, require_steps
+from .room import require_room, require_steps
 from .run import Run
+from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
 from .signals import Forcing
-from .tolerances import IMPLICIT, check_step, check_tolerances
+from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
     from .trajectory import Trajectory
 
-#: Assemblies in turn, by secant steps, with inputs that depend on the state.
-ROUNDS = 50
-DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 OPTIONS = (
     *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
     *("checkpoint", "checkpoint_every", "resume"),
@@ -43,7 +35,7 @@ OPTIONS = (
 
 
 def simulate(
-    module: Module,
+    module: BoundModel,
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, float] | ArrayLike | None = None,
     parameters: Any = None,
@@ -68,7 +60,7 @@ def simulate(
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     span : (float, float) or float, optional
         Start and end (s); the end alone for a start at 0; the model's own end by default.
     initial : mapping of str to float, or (n_x,) array, optional
@@ -151,6 +143,7 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+    method, step = own_step(module, method, step)
     step = check_method(method, step)
     declared = declare(module)
     method = declared["method"] if method is None else method
@@ -246,7 +239,7 @@ def simulate(
 
 
 def _follow_drivers(
-    module: Module,
+    module: BoundModel,
     span: float | tuple[float, float] | None,
     initial: Mapping[str, float] | ArrayLike | None,
     parameters: Any,
@@ -271,7 +264,7 @@ def _follow_drivers(
     return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
 
 
-def _led_by_inputs(module: Module, inputs: Mapping[str, Any] | None, method: Any) -> bool:
+def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
     """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
     led = Forcing(module.layout, inputs).constrained
     if led and method == "kinematic":
@@ -293,103 +286,3 @@ def _check(run: Run, solution: Solution, start: float, end: float, method: str) 
         last = solution.x[:, -1] if solution.t.size else None
         raise run.ended(reached, end, method, solution.message, last) from run.cause()
     require_end(solution, end)
-
-
-def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
-    """Start and end (s) of what a user gives as the span of a run."""
-    if span is None:
-        return 0.0, declared
-    plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
-    if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
-        return float(span[0]), float(span[1])  # type: ignore[index]
-    try:
-        if np.ndim(span) == 0:
-            return 0.0, number("the end of the span", span)
-        pair = np.asarray(span, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}") from None
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
-    return float(pair[0]), float(pair[1])
-
-
-def declare(module: Module) -> dict[str, Any]:
-    """What holds for a run where nothing is said: what the model says, or the defaults."""
-    return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
-
-
-def check_method(method: Any, step: Any) -> float | None:
-    """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
-    if (isinstance(method, str) and method == "RK4") != (step is not None):
-        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
-    return None if step is None else check_step("step", step)
-
-
-def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
-    """The times wanted, in order and within the span, or a UsageError; n numbers are kept for each."""
-    times = read_times("t_eval", t_eval, 1 + n)
-    first, last = (0, -1) if end >= start else (-1, 0)
-    if (
-        times.ndim != 1
-        or not times.size
-        or not min(start, end) <= times[first] <= times[last] <= max(start, end)
-        or not (times[1:] > times[:-1] if end >= start else times[1:] < times[:-1]).all()
-    ):
-        raise UsageError(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
-    return times
-
-
-def find_state(
-    module: Module, initial: Mapping[str, float] | ArrayLike | None, t: float, forcing: Forcing | None = None
-) -> Array:
-    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected.
-
-    Raises
-    ------
-    AssemblyError
-        The loops do not close, or the inputs on which they depend change with the state that they give.
-    """
-    if forcing is not None and forcing.constrained:
-        layout = module.layout
-        places = layout.constraint_inputs
-
-        def assemble(u: Array) -> tuple[Array, Array]:
-            """The state at inputs u, and the inputs at this state."""
-            x = find_state(module.bind(None, u), initial, t)
-            found = forcing(t, x)
-            forcing.require_finite()
-            return x, found
-
-        u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
-        forcing.require_finite()
-        secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
-        for _ in range(ROUNDS):
-            x, found = assemble(u)
-            gap = (found - u)[places]
-            if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
-                return x
-            if before is not None:  # Broyden's update: the slope that explains the last step
-                move, change = before
-                secant += np.outer(gap - change - secant @ move, move) / (move @ move)
-            move = algebra.lstsq(secant, -gap, rcond=None)
-            if not np.isfinite(move).all() or not move.any():
-                break
-            before, u = (move, gap), found.copy()
-            u[places] = found[places] - gap + move
-        names = ", ".join(layout.u[i] for i in places)
-        given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
-        raise AssemblyError(
-            f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
-            f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
-            "give initial values nearer to such a state, or write the inputs in t",
-            [],
-        )
-    if initial is None:
-        return module.x0(t=t)
-    if isinstance(initial, Mapping):
-        return module.x0(initial, t=t)
-    x = np.array(read_numbers("initial", initial))
-    if x.shape != (module.n_x,):
-        names = ", ".join(module.x_names)
-        raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
-    return module.project(x, t=t)

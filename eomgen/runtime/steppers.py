@@ -16,10 +16,10 @@ from .names import require
 from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
-    from .module import Module
+    from .bound_model import BoundModel
 
 
-def find_solver(module: Module, name: str) -> Any:
+def find_solver(module: BoundModel, name: str) -> Any:
     """The compiled stepper of a module by name; SciPy's own where the module was made without a compiler."""
     core = eager(module.core)
     if name in getattr(core, "methods", ()):
@@ -132,8 +132,29 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
-def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
-    """See :meth:`~.module.Module.step`."""
+def step(module: BoundModel, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
+    """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
+
+    Parameters
+    ----------
+    t, h : float
+        Time and size of the step (s).
+    x : (n_x,) array
+    u : (n_u,) array, optional
+        Inputs, held over the step.
+    out : (n_x,) array, optional
+        Takes the result; it may be x.
+
+    Returns
+    -------
+    (n_x,) array
+        The state at t + h; loops drift at the order of the step, see :meth:`project`.
+
+    Raises
+    ------
+    UsageError
+        Events of the model reset its state, which a step does not watch.
+    """
     if module.layout.n_events and Events(module.layout, None).resets:
         raise UsageError(
             f"events of {module.name} reset its state, and a single step watches none; simulate over (t, t + h)"

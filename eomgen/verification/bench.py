@@ -20,7 +20,7 @@ from .truth import System, Truth
 if TYPE_CHECKING:
     from ..derivation import Equations
     from ..program.terms import SystemTerms
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 DEEP = 3  #: states that are looked at in many digits
 
@@ -30,13 +30,13 @@ class Bench:
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     equations : Equations
         What it was made from.
     cases : sequence of Case
     """
 
-    def __init__(self, module: Module, equations: Equations, cases: Sequence[Case]) -> None:
+    def __init__(self, module: BoundModel, equations: Equations, cases: Sequence[Case]) -> None:
         self.module, self.equations, self.cases = module, equations, list(cases)
         self.layout = module.layout
         self.kinematics = equations.kinematics

@@ -15,7 +15,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 SPREAD = 0.03  #: relative spread of parameters
 ANGLE, LENGTH = 0.4, 0.2  #: spread of coordinates: rad, and parts of the model's length
@@ -47,12 +47,12 @@ class Case(NamedTuple):
         return self.x[self.n_q :]
 
 
-def random_cases(module: Module, count: int, seed: int = 0) -> list[Case]:
+def random_cases(module: BoundModel, count: int, seed: int = 0) -> list[Case]:
     """States that move, on the constraints.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     count : int
     seed : int
 
@@ -67,7 +67,7 @@ def random_cases(module: Module, count: int, seed: int = 0) -> list[Case]:
     return found
 
 
-def draw(module: Module, rng: np.random.Generator, geometric: Array, number: int) -> Case:
+def draw(module: BoundModel, rng: np.random.Generator, geometric: Array, number: int) -> Case:
     """One state; parameters that keep the loops closed are tried first, then those that do not touch them."""
     t = float(rng.uniform(0.0, LATEST))
     spread = 1.0 + SPREAD * rng.standard_normal(module.n_p).clip(-2.0, 2.0)
@@ -84,12 +84,12 @@ def draw(module: Module, rng: np.random.Generator, geometric: Array, number: int
     return Case(number, 0.0, module.project(x, t=0.0), a, module.p, module.u, module.n_q)
 
 
-def _sizes(module: Module, kinds: tuple[str, ...]) -> Array:
+def _sizes(module: BoundModel, kinds: tuple[str, ...]) -> Array:
     length = float(module.metadata.get("length_scale") or 1.0)
     return np.array([length if kind == "length" else 1.0 for kind in kinds])
 
 
-def _geometric(module: Module, rng: np.random.Generator) -> Array:
+def _geometric(module: BoundModel, rng: np.random.Generator) -> Array:
     """Which parameters the holonomic constraints depend on."""
     here = np.zeros(module.n_p, dtype=bool)
     if not module.n_rows:
@@ -110,7 +110,7 @@ def _geometric(module: Module, rng: np.random.Generator) -> Array:
     return here
 
 
-def _state(module: Module, rng: np.random.Generator, t: float, p: Array, u: Array) -> Array | None:
+def _state(module: BoundModel, rng: np.random.Generator, t: float, p: Array, u: Array) -> Array | None:
     """A closed state that can be evaluated, or None."""
     layout = module.layout
     q_kinds = layout.coordinate_kinds
@@ -132,7 +132,7 @@ def _state(module: Module, rng: np.random.Generator, t: float, p: Array, u: Arra
     return None
 
 
-def _closed(module: Module, x: Array, t: float, p: Array, u: Array) -> bool:
+def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     """Whether all rows hold, redundant ones too, no axis is flipped, and the rank is that of the reference."""
     q, layout = x[: module.n_q], module.layout
     if not module.n_rows:

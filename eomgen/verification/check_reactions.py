@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..analysis.reactions import reactions
 from ..frames import GROUND
 from ..joints import Continuous, Prismatic, Revolute
 from ..numeric.scales import Array
@@ -56,7 +57,7 @@ def _reactions(bench: Bench) -> Finding:
     for k, truth in enumerate(bench.truths):
         case = truth.case
         a = bench.rhs(case)[module.n_q :]
-        wrenches = module.reactions(case.t, case.x, p=case.p, u=case.u)
+        wrenches = reactions(module, case.t, case.x, p=case.p, u=case.u)
         missing, size = _unbalanced(bench, truth, a, wrenches)
         loads = np.array([[np.abs(wrenches[:, :3]).max(initial=0.0)] * 3 + [np.abs(wrenches).max(initial=0.0)] * 3])
         C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)

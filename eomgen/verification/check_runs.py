@@ -18,7 +18,10 @@ from ..graph.traverse import reachable
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.events import Events
+from ..runtime.integrator import integrator
 from ..runtime.names import require
+from ..runtime.simulate import simulate
+from ..runtime.steppers import step
 from .bench import Bench
 from .cases import Case
 from .comparison import Comparison, size_of
@@ -163,9 +166,9 @@ def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> F
         for _ in range(SMALLEST):
             try:
                 if method == "RK4":
-                    end = bound.project(bound.step(case.t, case.x, h), t=case.t + h)
+                    end = bound.project(step(bound, case.t, case.x, h), t=case.t + h)
                 else:
-                    stepper = bound.integrator(method=method, rtol=LOOSE, atol=LOOSE, first_step=h, max_step=h)
+                    stepper = integrator(bound, method=method, rtol=LOOSE, atol=LOOSE, first_step=h, max_step=h)
                     end = stepper(case.t, case.x, h)
                 errors.append(float(np.abs(end - judge(h)).max()))
             except EomgenError:
@@ -192,7 +195,7 @@ def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
     size = size_of(expected)
     for method in methods:
         rtol = 1e-10
-        end = bound.integrator(method=method, rtol=rtol, atol=1e-3 * rtol * size)(case.t, case.x, h)
+        end = integrator(bound, method=method, rtol=rtol, atol=1e-3 * rtol * size)(case.t, case.x, h)
         found.add(0, end - expected, 1e3 * rtol * size, size, [f"{method} {name}" for name in bench.layout.x])
     found.cases = 1
     return found.finding()
@@ -204,7 +207,7 @@ def _energy(bench: Bench, h: float) -> Finding:
     found = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
     rtol = 1e-10
-    run = bound.simulate((case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=1e-13)
+    run = simulate(bound, (case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=1e-13)
     residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))
                  for t, x in zip(run.t, run.x.T, strict=True)]  # fmt: skip
     found.add(0, [max(residuals, default=0.0)], [1e-10], 1.0, ["loops"])

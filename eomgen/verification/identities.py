@@ -15,6 +15,7 @@ from ..limits.rounding import EPS
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
+from ..runtime.minimal import Minimal
 from ..runtime.signal_rates import moving_inputs
 from .cases import CLOSED, Case
 from .comparison import Comparison, failed, size_of
@@ -22,16 +23,16 @@ from .differences import extrapolate
 from .finding import Finding
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 #: Rounding of a kernel relative to its largest entry, where the size of the terms behind it is not known: sums of some
 #: hundred products.  Checks that know the graph have bounds of their own.
 KERNEL = 256.0 * EPS
 
-Check = Callable[["Module", Sequence[Case]], Finding]
+Check = Callable[["BoundModel", Sequence[Case]], Finding]
 
 
-def identities(module: Module, cases: Sequence[Case]) -> list[Finding]:
+def identities(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     """All of them; one that cannot be carried out fails."""
     found = []
     for name, check in CHECKS.items():
@@ -45,15 +46,15 @@ def identities(module: Module, cases: Sequence[Case]) -> list[Finding]:
     return found
 
 
-def _mass(module: Module, c: Case) -> Array:
+def _mass(module: BoundModel, c: Case) -> Array:
     return module.mass_matrix(c.q, p=c.p, u=c.u, t=c.t)
 
 
-def _jacobian(module: Module, c: Case) -> Array:
+def _jacobian(module: BoundModel, c: Case) -> Array:
     return module.constraint_jacobian(c.q, p=c.p, u=c.u, t=c.t)
 
 
-def _definite(module: Module, cases: Sequence[Case]) -> Finding:
+def _definite(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """The matrix of the degrees of freedom, each scaled to a unit diagonal."""
     check = "embedded_mass_matrix: symmetric, positive definite"
     if not module.n_dof or module.layout.given_rates:
@@ -69,7 +70,7 @@ def _definite(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _kinetic(module: Module, cases: Sequence[Case]) -> Finding:
+def _kinetic(module: BoundModel, cases: Sequence[Case]) -> Finding:
     check = "energy: T = v M v / 2"
     if not module.n_bodies:
         return Finding.skipped(check, "there are no bodies")
@@ -81,7 +82,7 @@ def _kinetic(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _inverse(module: Module, cases: Sequence[Case]) -> Finding:
+def _inverse(module: BoundModel, cases: Sequence[Case]) -> Finding:
     found = Comparison("inverse_dynamics: M a + h")
     for c in cases:
         M, h = _mass(module, c), module.bias(c.t, c.x, p=c.p, u=c.u)
@@ -91,12 +92,12 @@ def _inverse(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _rates(module: Module, q: Array, v: Array) -> Array:
+def _rates(module: BoundModel, q: Array, v: Array) -> Array:
     space = module.layout.space
     return v if space is None else space.rates(q, v)
 
 
-def _slopes(module: Module, cases: Sequence[Case]) -> Finding:
+def _slopes(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """C_q N of each velocity; C of Euler parameters off their unit length is a function like any other."""
     check = "constraint_jacobian: extrapolated differences"
     if not module.n_rows or module.layout.given_rates:
@@ -113,11 +114,11 @@ def _slopes(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _along_q(module: Module, c: Case, way: Array) -> Callable[[float], Array]:
+def _along_q(module: BoundModel, c: Case, way: Array) -> Callable[[float], Array]:
     return lambda s: module.constraints(c.q + s * way, p=c.p, u=c.u, t=c.t, rows="all")
 
 
-def _projection(module: Module, cases: Sequence[Case]) -> Finding:
+def _projection(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """Projected twice is projected once; loops are closed there, and at ``x0``."""
     found, scales = Comparison("project: idempotent, loops closed, as x0 leaves them"), module.layout.scales
     for c in cases:
@@ -131,7 +132,7 @@ def _projection(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _balance(module: Module, cases: Sequence[Case]) -> Finding:
+def _balance(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """B^T (M a + h) = 0, B the motions that the constraints leave (their null space by singular values)."""
     found = Comparison("rhs: forces in balance along free motions")
     for c in cases:
@@ -161,12 +162,12 @@ def _condition(M: Array, C: Array, scale: Array) -> float:
     return float(own * (algebra.cond((C * scale) / rows[:, None]) if len(C) else 1.0))
 
 
-def condition_at(module: Module, c: Case) -> float:
+def condition_at(module: BoundModel, c: Case) -> float:
     """By how much solving for accelerations at a case magnifies rounding."""
     return _condition(_mass(module, c), _jacobian(module, c), module.layout.scales.q)
 
 
-def _holding(module: Module, cases: Sequence[Case]) -> Finding:
+def _holding(module: BoundModel, cases: Sequence[Case]) -> Finding:
     """d/dt (C_q v + C_t) = 0 along x' = rhs, inputs moving at their rates where those are inputs too."""
     check = "rhs: constraints go on holding"
     if not module.n_rows or not module.layout.projects:
@@ -184,7 +185,7 @@ def _holding(module: Module, cases: Sequence[Case]) -> Finding:
     return found.finding()
 
 
-def _along_x(module: Module, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
+def _along_x(module: BoundModel, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
     u_rate = moving_inputs(module.layout, c.u)
 
     def f(s: float) -> Array:
@@ -194,7 +195,7 @@ def _along_x(module: Module, c: Case, rate: Array, pace: float) -> Callable[[flo
     return f
 
 
-def _minimal(module: Module, cases: Sequence[Case]) -> Finding:
+def _minimal(module: BoundModel, cases: Sequence[Case]) -> Finding:
     check, layout = "minimal: the same accelerations", module.layout
     try:
         layout.require_minimal_form()
@@ -207,7 +208,7 @@ def _minimal(module: Module, cases: Sequence[Case]) -> Finding:
     found = Comparison(check)
     for c in cases:
         bound = module.bind(c.p, c.u)
-        minimal = bound.minimal
+        minimal = Minimal(bound)
         minimal.reset(c.q)
         full = minimal.reduce(bound.rhs(c.t, c.x))
         own = minimal.rhs(c.t, minimal.reduce(c.x))

@@ -19,14 +19,14 @@ from .finding import Finding
 from .identities import KERNEL, condition_at
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 CASES = 2  #: states that are tried
 STEPS = (FIRST_STEP, SHORTER * FIRST_STEP)
 NAMES = {"jacobian": "x", "input_jacobian": "u", "parameter_jacobian": "p"}  #: kernel -> what it differentiates by
 
 
-def jacobians(module: Module, cases: Sequence[Case]) -> list[Finding]:
+def jacobians(module: BoundModel, cases: Sequence[Case]) -> list[Finding]:
     """One finding for each Jacobian of the complete right-hand side that the module has."""
     found = []
     for name, by in NAMES.items():
@@ -41,7 +41,7 @@ def jacobians(module: Module, cases: Sequence[Case]) -> list[Finding]:
     return found
 
 
-def _compare(module: Module, check: str, name: str, by: str, cases: Sequence[Case]) -> Finding:
+def _compare(module: BoundModel, check: str, name: str, by: str, cases: Sequence[Case]) -> Finding:
     found, layout = Comparison(check), module.layout
     names = {"x": layout.x, "u": module.u_names, "p": module.p_names}[by]
     left_out: set[str] = set()
@@ -70,7 +70,7 @@ def _compare(module: Module, check: str, name: str, by: str, cases: Sequence[Cas
     return found.finding()
 
 
-def _scales(module: Module, c: Case, by: str) -> Array:
+def _scales(module: BoundModel, c: Case, by: str) -> Array:
     """Sizes of the variables, over which differences are taken."""
     layout = module.layout
     if by == "x":
@@ -81,7 +81,7 @@ def _scales(module: Module, c: Case, by: str) -> Array:
     return np.where(values != 0.0, np.abs(values), 1.0) * (1.0 if by == "u" else 0.2)
 
 
-def _along(module: Module, c: Case, by: str, j: int, scale: float) -> Callable[[float], Array]:
+def _along(module: BoundModel, c: Case, by: str, j: int, scale: float) -> Callable[[float], Array]:
     def f(s: float) -> Array:
         given = {"x": np.array(c.x), "u": np.array(c.u), "p": np.array(c.p)}
         given[by][j] += s * scale

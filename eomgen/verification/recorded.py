@@ -18,12 +18,12 @@ from .comparison import FAILED, Comparison, size_of
 from .finding import Finding
 
 if TYPE_CHECKING:
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
 
 FILE = "selftest.json"  #: in the folder of the package
 
 
-def recorded_findings(module: Module, file: Path | None = None) -> list[Finding]:
+def recorded_findings(module: BoundModel, file: Path | None = None) -> list[Finding]:
     """One finding for each kernel with figures; none where there is no package, a breach where its file is no use."""
     place = Path(__file__).parents[1] / FILE if file is None else file
     if not place.is_file():
@@ -44,7 +44,7 @@ def _unusable(why: str) -> Finding:
     return Finding("recorded figures", FAILED, 0.0, note=f"{why}; install it again, or generate it anew")
 
 
-def _compare(module: Module, name: str, figures: list[dict[str, Any]], states: list[dict[str, Any]]) -> Finding:
+def _compare(module: BoundModel, name: str, figures: list[dict[str, Any]], states: list[dict[str, Any]]) -> Finding:
     found = Comparison(f"{name}: recorded figures")
     for number, (state, figure) in enumerate(zip(states, figures, strict=True)):
         given = {key: np.array(value, dtype=float) for key, value in state.items()}
@@ -54,7 +54,7 @@ def _compare(module: Module, name: str, figures: list[dict[str, Any]], states: l
     return found.finding()
 
 
-def _call(module: Module, name: str, given: dict[str, Array]) -> Array:
+def _call(module: BoundModel, name: str, given: dict[str, Array]) -> Array:
     q, v, t = given["q"], given["v"], float(given["t"])
     p, u = given["p"], given["u"]
     takes = KERNELS[name][0]

@@ -23,7 +23,7 @@ from .recorded import recorded_findings
 
 if TYPE_CHECKING:
     from ..derivation import Equations
-    from ..runtime.module import Module
+    from ..runtime.bound_model import BoundModel
     from .cases import Case
 
 STATES = 6  #: random states
@@ -33,12 +33,12 @@ GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivative
 KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 
-def verify(module: Module, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
+def verify(module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
     """Compare a module with several independent calculations, and with variants of its model where that is known.
 
     Parameters
     ----------
-    module : Module
+    module : BoundModel
     states : int
         Number of random states.
     seed : int
@@ -66,7 +66,7 @@ def verify(module: Module, *, states: int = STATES, seed: int = 0, seconds: floa
     return Verification(module.name, tuple(found), perf_counter() - start)
 
 
-def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
+def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
     """What the module says of itself, and what follows from its equations."""
     if isinstance(states, bool) or not isinstance(states, int) or states < 1:
         raise UsageError(f"verify: states is {states!r}; it is the number of random states, a whole number from 1")
@@ -84,7 +84,7 @@ def _of_module(module: Module, states: int, seed: int) -> list[Finding]:
     return found
 
 
-def _of_fixed_bodies(module: Module) -> list[Finding]:
+def _of_fixed_bodies(module: BoundModel) -> list[Finding]:
     """Of a model without coordinates: its poses."""
     R = module.poses(np.empty(0))[:, :3, :3]
     worst = float(np.abs(R @ np.moveaxis(R, 1, 2) - np.eye(3)).max(initial=0.0))
@@ -96,14 +96,14 @@ def _of_fixed_bodies(module: Module) -> list[Finding]:
 
 
 def verify_model(
-    model: Any, module: Module, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS
+    model: Any, module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS
 ) -> Verification:
     """:func:`verify` of a module, and what concerns the model that it was made from.
 
     Parameters
     ----------
     model : Model
-    module : Module
+    module : BoundModel
     states, seed : int
     seconds : float
         Time for all of it; variants have what is left, and at least :data:`LEAST`.
@@ -114,7 +114,7 @@ def verify_model(
     return Verification(module.name, tuple(found), perf_counter() - start)
 
 
-def _variants(module: Module, model: Any, seed: int, seconds: float) -> list[Finding]:
+def _variants(module: BoundModel, model: Any, seed: int, seconds: float) -> list[Finding]:
     """Variants of a model or description; left out where it is not known or has no motion to compare."""
     check = "variants: the same mechanism described differently"
     if model is None:
@@ -140,7 +140,7 @@ def _only_in_c(equations: Equations | None) -> str:
     return f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it" if blind else ""
 
 
-def _with_equations(module: Module, equations: Equations, cases: list[Case]) -> list[Finding]:
+def _with_equations(module: BoundModel, equations: Equations, cases: list[Case]) -> list[Finding]:
     """All groups; one that cannot be carried out fails."""
     why = _only_in_c(equations)
     if why:

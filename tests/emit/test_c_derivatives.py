@@ -38,8 +38,8 @@ def differences(library, system, x, t, what):
 
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_of_the_right_hand_side(case, systems, compiled):
+    from eomgen.api.module import Module
     from eomgen.compilation.numpy_module import load_numpy
-    from eomgen.runtime import Module
 
     system = CASES[case](systems)
     library = compiled(system)

@@ -277,9 +277,9 @@ def test_twin_files_that_do_not_fit_are_told(sources: Path) -> None:
 def test_long_models_in_several_files_call_functions_too(sources: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from dataclasses import replace
 
+    from eomgen.api.module import Module
     from eomgen.compilation import Options, compile_sources, load_core
     from eomgen.emit import c_parts
-    from eomgen.runtime.module import Module
 
     m = pendulum("-9.81*swing(q) - soft(q_dot)", full(sources))
     x = np.array([0.4, 0.3])

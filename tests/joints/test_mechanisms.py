@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import eomgen as eg
+from eomgen.api.module import Module
 from eomgen.errors import ModelError
-from eomgen.runtime.module import Module
 
 BEND = np.pi / 6
 

@@ -12,7 +12,7 @@ import pytest
 from judges import first
 
 import eomgen as eg
-from eomgen.runtime.module import Module
+from eomgen.api.module import Module
 
 FREE = [f"f_{k}" for k in ("x", "y", "z", "1", "2", "3")]
 TURNED = (0.3, -0.4, 0.5)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.runtime import Module, NumpyCore
+from eomgen.api.module import Module
+from eomgen.runtime import NumpyCore
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eomgen.api.module import Module
 from eomgen.errors import (
     AssemblyError,
     NonFiniteError,
@@ -16,7 +17,7 @@ from eomgen.errors import (
     SingularMassMatrixError,
     UsageError,
 )
-from eomgen.runtime import Module, NumpyCore
+from eomgen.runtime import NumpyCore
 
 REFERENCES = Path(__file__).parents[1] / "reference"
 

@@ -53,7 +53,8 @@ def test_loop_angles_do_not_jump(crank, models):
     def wrapped(t, x, u, c):
         return np.array([np.arctan2(np.sin(x[0]), np.cos(x[0])), x[3], x[6]])
 
-    from eomgen.runtime import Module, NumpyCore
+    from eomgen.api.module import Module
+    from eomgen.runtime import NumpyCore
 
     m = Module(NumpyCore(models.crank_metadata(), blocks | {"loop_coordinates": wrapped}))
     traj = m.simulate(0.6, {"theta": 0.3, "theta_dot": 40.0})

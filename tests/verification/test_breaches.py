@@ -14,9 +14,9 @@ import pytest
 import eomgen as eg
 import eomgen.emit
 import eomgen.program.collect as collect
+from eomgen.api.module import Module
 from eomgen.derivation import Equations
 from eomgen.forces.elements import Spring
-from eomgen.runtime.module import Module
 from eomgen.verification import Verification
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

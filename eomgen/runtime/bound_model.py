@@ -1,35 +1,32 @@
-"""Stage runtime: a core (compiled extension or NumPy) -> Module, the calls a user makes."""
+"""Stage runtime: a core (compiled extension or NumPy) with parameters and inputs bound -> BoundModel, its own calls.
+
+What every analysis and every run takes.  :class:`~..api.module.Module` is the same with the calls that load those.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
-from .analyses import Analyses
 from .assembled import Assembled
-from .forms import Forms
 from .kernels import Kernels, Projection, Rows
-from .kinematic_analyses import KinematicAnalyses
 from .layout import Layout
 from .momenta import Momenta
+from .refusals import Refusal
 from .room import read_numbers
 
 if TYPE_CHECKING:
-    from ..ensembles.ensemble import Ensemble
-    from .integrator import Integrator
-    from .minimal import Minimal
     from .paths import Path
     from .protocols import Core, Motion, State, Timed
-    from .trajectory import Trajectory
 
 
-class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
+class BoundModel(Assembled, Momenta):
     """A model ready to be evaluated and simulated.
 
     ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
@@ -150,7 +147,7 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         """A copy of the inputs bound, (n_u,)."""
         return np.array(self.kernels.context.u)
 
-    def bind(self, p: Any = None, u: Any = None) -> Module:
+    def bind(self, p: Any = None, u: Any = None) -> Self:
         """The same model with other parameters and inputs.
 
         Parameters
@@ -180,6 +177,37 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         from .pickling import reduce
 
         return reduce(self)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, in the order of :meth:`reactions`."""
+        return tuple(self.kernels.layout.metadata.get("joint_names", ()))
+
+    @property
+    def constraint_labels(self) -> tuple[str, ...]:
+        """Names of all constraint rows, in the order of :meth:`multipliers`."""
+        return self.kernels.layout.constraint_labels
+
+    # derivatives
+
+    @cached_property
+    def input_jacobian(self) -> Timed:
+        """``input_jacobian(t, x)`` -> (n_x, n_u), the derivative of the complete rhs by the inputs."""
+        return self._derivative("input_jacobian")
+
+    @cached_property
+    def parameter_jacobian(self) -> Timed:
+        """``parameter_jacobian(t, x)`` -> (n_x, n_p), the derivative of the complete rhs by the parameters.
+
+        The projection is part of the rhs: where parameters move the constraints, the state is taken along to the
+        nearest one on them.  Exact at states on the constraints; others are projected first.
+        """
+        return self._derivative("parameter_jacobian")
+
+    def _derivative(self, name: str) -> Timed:
+        layout = self.kernels.layout
+        refused = layout.given_rates or not layout.projects
+        return cast("Timed", Refusal(layout)) if refused else self.kernels.timed(name)
 
     # kinematics
 
@@ -233,156 +261,3 @@ class Module(Assembled, Analyses, KinematicAnalyses, Forms, Momenta):
         path, reference = self._path
         start = None if guess is None else read_numbers("guess", guess)
         return motions(path, reference, (q_i, v_i, a_i), start, read_numbers("t", t))
-
-    @cached_property
-    def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
-        from .minimal import Minimal
-
-        self.layout.require_minimal_form()
-        return Minimal(self)
-
-    # integration
-
-    def simulate(
-        self,
-        span: float | tuple[float, float] | None = None,
-        initial: Mapping[str, float] | ArrayLike | None = None,
-        parameters: Any = None,
-        inputs: Mapping[str, Any] | None = None,
-        *,
-        method: Any = None,
-        **options: Any,
-    ) -> Trajectory:
-        """Integrate the equations of motion; see :func:`~.simulate.simulate` for all arguments.
-
-        Parameters
-        ----------
-        span : (float, float) or float, optional
-            Start and end (s); the end alone for a start at 0; the model's own end by default.
-        initial : mapping of str to float, or (n_x,) array, optional
-            Named values as for :meth:`x0`, or a state.
-        parameters : mapping of str to float, or (n_p,) array, optional
-        inputs : mapping of str to number, (times, values) or callable f(t, x), optional
-        method : str or OdeSolver subclass, optional
-        **options
-            rtol, atol, t_eval, events, dense_output, max_step, first_step, progress.
-
-        Returns
-        -------
-        Trajectory
-        """
-        from .simulate import simulate
-
-        return simulate(self, span, initial, parameters, inputs, **self._stepped(method=method, **options))
-
-    def simulate_many(
-        self,
-        span: float | tuple[float, float] | None = None,
-        initial: Mapping[str, Any] | ArrayLike | None = None,
-        parameters: Mapping[str, Any] | ArrayLike | None = None,
-        inputs: Mapping[str, Any] | ArrayLike | None = None,
-        **options: Any,
-    ) -> Ensemble:
-        """Integrate many runs on all processors, or on a cluster; see
-        :func:`~..ensembles.simulate_many.simulate_many`.
-
-        Parameters
-        ----------
-        span : (float, float) or float, optional
-        initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional
-        parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
-        **options
-            count, method, rtol, atol, t_eval, reduce, threads, cluster, store, block, max_steps, max_step, first_step,
-            progress.
-
-        Returns
-        -------
-        Ensemble
-        """
-        from ..ensembles.simulate_many import simulate_many
-
-        return simulate_many(self, span, initial, parameters, inputs, **self._stepped(**options))
-
-    def _stepped(self, **options: Any) -> dict[str, Any]:
-        """Options of a run, RK4 with the model's own step where the model says so and nothing else is given."""
-        own = self.metadata.get("simulation", {}).get("step")
-        if own is not None and self.n_dof and options.get("method") in (None, "RK4"):
-            options["method"] = "RK4"
-            options["step"] = own if options.get("step") is None else options["step"]
-        return options
-
-    def integrator(
-        self, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
-    ) -> Integrator:
-        """An integrator held ready, for many short integrations: control, shooting, filters, learning.
-
-        Parameters
-        ----------
-        parameters, inputs : mapping of str to float, or arrays, optional
-            As for :meth:`bind`; inputs are held.
-        method : str, optional
-        **options
-            rtol, atol, max_step, first_step, step, as for :meth:`simulate`.
-
-        Returns
-        -------
-        Integrator
-            ``integrator(t, x, h)`` -> the state at t + h; see :class:`~.integrator.Integrator`.
-        """
-        from .integrator import make_integrator
-
-        return make_integrator(self, parameters, inputs, **self._stepped(method=method, **options))
-
-    def step(self, t: float, x: ArrayLike, h: float, u: Any = None, out: Array | None = None) -> Array:
-        """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
-
-        Parameters
-        ----------
-        t, h : float
-            Time and size of the step (s).
-        x : (n_x,) array
-        u : (n_u,) array, optional
-            Inputs, held over the step.
-        out : (n_x,) array, optional
-            Takes the result; it may be x.
-
-        Returns
-        -------
-        (n_x,) array
-            The state at t + h; loops drift at the order of the step, see :meth:`project`.
-
-        Raises
-        ------
-        UsageError
-            Events of the model reset its state, which a step does not watch.
-        """
-        from .steppers import march
-
-        return march(self, t, x, h, u, out)
-
-    def report(self) -> str:
-        """What the model is made of, as text."""
-        from .report import text
-
-        return text(self)
-
-    def __getattr__(self, name: str) -> Any:
-        if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-            from .steppers import find_solver
-
-            return find_solver(self, name)
-        if (own := getattr(type(self), name, None)) is not None:
-            return own.__get__(self)  # a property that this model does not have: once more, for its own reason
-        calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
-        raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
-
-    def __repr__(self) -> str:
-        from .report import line
-
-        return line(self)
-
-    def _repr_html_(self) -> str:
-        from .report import html
-
-        return html(self)

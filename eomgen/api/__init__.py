@@ -1,0 +1,1 @@
+"""What a user holds: a model, its equations, its module."""

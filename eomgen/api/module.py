@@ -1,0 +1,104 @@
+"""What a user holds: a BoundModel with every run and analysis as a method; each loads when it is first called."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import import_module
+from types import MethodType
+from typing import TYPE_CHECKING, Any
+
+from ..runtime.bound_model import BoundModel
+from ..runtime.refusals import require_velocities
+
+if TYPE_CHECKING:
+    from ..runtime.canonical import Canonical
+    from ..runtime.dae_solution import Dae
+    from ..runtime.minimal import Minimal
+
+#: Method -> where the function is, whose first argument is the model; method and function are of one name.
+CALLS = {
+    "simulate": "runtime.simulate",
+    "simulate_many": "ensembles.simulate_many",
+    "integrator": "runtime.integrator",
+    "step": "runtime.steppers",
+    "verify": "verification.verify",
+    "linearise": "analysis.linear",
+    "modes": "analysis.modes",
+    "equilibrium": "analysis.equilibrium",
+    "sensitivities": "analysis.sensitivities",
+    "multipliers": "analysis.constrained",
+    "reactions": "analysis.reactions",
+    "undetermined_reactions": "analysis.reactions",
+    "driving_forces": "analysis.reactions",
+    "actuator_forces": "analysis.drive",
+    "impact": "analysis.impact",
+    "simulate_impacts": "analysis.impact_run",
+    "consistent": "analysis.consistent",
+    "kinematic_analysis": "analysis.kinematic",
+    "motion_range": "analysis.reaching",
+    "workspace": "analysis.workspace",
+    "report": "runtime.report",
+}
+
+
+class Call:
+    """A function of another part of the package as a method, which is loaded when it is asked for."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __get__(self, model: Any, kind: type[Any]) -> Any:
+        part = import_module(f"..{CALLS[self.name]}", __package__)
+        function = getattr(part, self.name)
+        return function if model is None else MethodType(function, model)
+
+
+class Module(BoundModel):  # noqa: D101
+    __doc__ = BoundModel.__doc__
+
+    @cached_property
+    def minimal(self) -> Minimal:
+        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
+        from ..runtime.minimal import Minimal
+
+        self.layout.require_minimal_form()
+        return Minimal(self)
+
+    @cached_property
+    def canonical(self) -> Canonical:
+        """Hamilton's equations on [q; p], of a model derived by ``hamilton``; see :class:`~.canonical.Canonical`."""
+        from ..runtime.canonical import Canonical
+
+        return Canonical(self)
+
+    @cached_property
+    def dae(self) -> Dae:
+        """F(t, y, y') = 0 with multipliers, for differential-algebraic solvers; see :class:`~.dae.Dae`."""
+        from ..runtime.dae_solution import Dae
+
+        require_velocities(self.layout)
+        return Dae(self)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
+            from ..runtime.steppers import find_solver
+
+            return find_solver(self, name)
+        if (own := getattr(type(self), name, None)) is not None:
+            return own.__get__(self)  # a property that this model does not have: once more, for its own reason
+        calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
+        raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
+
+    def __repr__(self) -> str:
+        from ..runtime.report import line
+
+        return line(self)
+
+    def _repr_html_(self) -> str:
+        from ..runtime.report import html
+
+        return html(self)
+
+
+for _name in CALLS:
+    setattr(Module, _name, Call(_name))

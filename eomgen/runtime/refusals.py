@@ -1,0 +1,58 @@
+"""Stage runtime: what a model cannot be asked, and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UnavailableError
+
+if TYPE_CHECKING:
+    from ..numeric.scales import Array
+    from .layout import Layout
+
+
+def require_velocities(layout: Layout) -> None:
+    """Refuse a model whose q' is given as functions of other velocities.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if getattr(layout, "given_rates", False):
+        raise UnavailableError(
+            f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
+            "other analyses are not derived; rhs, jacobian, simulate and linearise are there"
+        )
+
+
+def require_projection(layout: Layout) -> None:
+    """Refuse a model whose right-hand side holds constraints by Baumgarte's stabilisation.
+
+    Raises
+    ------
+    UnavailableError
+    """
+    if not layout.projects:
+        raise UnavailableError(
+            f"model {layout.name!r} was derived with baumgarte=, so its right-hand side does not project, and its "
+            "derivatives by inputs and parameters are not derived; derive without baumgarte for analyses"
+        )
+
+
+class Refusal:
+    """In place of a kernel that a model cannot have: says why when it is called."""
+
+    failure: tuple[int, float, Array] | None = None
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Refuse.
+
+        Raises
+        ------
+        UsageError
+        """
+        require_velocities(self.layout)
+        require_projection(self.layout)

@@ -1,0 +1,135 @@
+"""Stage runtime: what a user asks of a run -> its span, times, method, step and first state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import AssemblyError, UsageError
+from ..limits.constraints import ALIKE
+from ..limits.runs import ATOL, RTOL
+from ..numeric import algebra
+from ..numeric.scales import Array
+from .layout import number
+from .room import read_numbers, read_times
+from .signals import Forcing
+from .tolerances import check_step
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
+#: Assemblies in turn, by secant steps, with inputs that depend on the state.
+ROUNDS = 50
+
+
+def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+    """Start and end (s) of what a user gives as the span of a run."""
+    if span is None:
+        return 0.0, declared
+    plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
+    if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
+        return float(span[0]), float(span[1])  # type: ignore[index]
+    try:
+        if np.ndim(span) == 0:
+            return 0.0, number("the end of the span", span)
+        pair = np.asarray(span, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"span must be (start, end) in seconds, not {span!r}") from None
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
+    return float(pair[0]), float(pair[1])
+
+
+def declare(module: BoundModel) -> dict[str, Any]:
+    """What holds for a run where nothing is said: what the model says, or the defaults."""
+    return {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+
+
+def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
+    """Method and step of a run: RK4 with the model's own step where it has one and nothing else is given."""
+    own = module.metadata.get("simulation", {}).get("step")
+    if own is None or not module.n_dof or method not in (None, "RK4"):
+        return method, step
+    return "RK4", own if step is None else step
+
+
+def check_method(method: Any, step: Any) -> float | None:
+    """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
+    if (isinstance(method, str) and method == "RK4") != (step is not None):
+        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    return None if step is None else check_step("step", step)
+
+
+def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Array:
+    """The times wanted, in order and within the span, or a UsageError; n numbers are kept for each."""
+    times = read_times("t_eval", t_eval, 1 + n)
+    first, last = (0, -1) if end >= start else (-1, 0)
+    if (
+        times.ndim != 1
+        or not times.size
+        or not min(start, end) <= times[first] <= times[last] <= max(start, end)
+        or not (times[1:] > times[:-1] if end >= start else times[1:] < times[:-1]).all()
+    ):
+        raise UsageError(f"t_eval must be times in order within the span ({start:.6g}, {end:.6g})")
+    return times
+
+
+def find_state(
+    module: BoundModel, initial: Mapping[str, float] | ArrayLike | None, t: float, forcing: Forcing | None = None
+) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected.
+
+    Raises
+    ------
+    AssemblyError
+        The loops do not close, or the inputs on which they depend change with the state that they give.
+    """
+    if forcing is not None and forcing.constrained:
+        layout = module.layout
+        places = layout.constraint_inputs
+
+        def assemble(u: Array) -> tuple[Array, Array]:
+            """The state at inputs u, and the inputs at this state."""
+            x = find_state(module.bind(None, u), initial, t)
+            found = forcing(t, x)
+            forcing.require_finite()
+            return x, found
+
+        u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
+        forcing.require_finite()
+        secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
+        for _ in range(ROUNDS):
+            x, found = assemble(u)
+            gap = (found - u)[places]
+            if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
+                return x
+            if before is not None:  # Broyden's update: the slope that explains the last step
+                move, change = before
+                secant += np.outer(gap - change - secant @ move, move) / (move @ move)
+            move = algebra.lstsq(secant, -gap, rcond=None)
+            if not np.isfinite(move).all() or not move.any():
+                break
+            before, u = (move, gap), found.copy()
+            u[places] = found[places] - gap + move
+        names = ", ".join(layout.u[i] for i in places)
+        given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
+        raise AssemblyError(
+            f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
+            f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
+            "give initial values nearer to such a state, or write the inputs in t",
+            [],
+        )
+    if initial is None:
+        return module.x0(t=t)
+    if isinstance(initial, Mapping):
+        return module.x0(initial, t=t)
+    x = np.array(read_numbers("initial", initial))
+    if x.shape != (module.n_x,):
+        names = ", ".join(module.x_names)
+        raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")
+    return module.project(x, t=t)
