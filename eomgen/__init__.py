@@ -11,8 +11,8 @@ from time import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .describe import Model as Model
-    from .describe import from_sympy as from_sympy
+    from .api.model import Model as Model
+    from .api.model import from_sympy as from_sympy
     from .loading import load as load
     from .runtime import Signal as Signal
     from .runtime import load_trajectory as load_trajectory
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 _STARTED = time()  #: files of eomgen that are newer than this are not the code that runs
 
-_HOMES = {"Model": "describe", "from_sympy": "describe", "load": "loading"}
+_HOMES = {"Model": "api.model", "from_sympy": "api.model", "load": "loading"}
 _HOMES |= {"Signal": "runtime", "load_trajectory": "runtime"}
 _ERRORS = (
     "AssemblyError",

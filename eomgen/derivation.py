@@ -1,4 +1,4 @@
-"""What ``Model.derive`` returns: the derived equations, to read, to count and to compile."""
+"""What a derivation gives: the equations, to read and to count; :class:`~.api.equations.Equations` compiles them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,13 @@ from .records import dataclass
 from .texts import html_text
 
 if TYPE_CHECKING:
-    from .api.module import Module
     from .program.choice import Choice
 
 READABLE = 400  #: operations up to which equations are shown written out
 
 
 @dataclass(frozen=True)
-class Equations:
+class Derivation:
     """The derived equations of motion of a model.
 
     Attributes
@@ -179,34 +178,7 @@ class Equations:
         """Named subexpressions of a large mass matrix and force, in order: (symbol, expression); empty when small."""
         return self._raised[0]
 
-    # -- on the road -------------------------------------------------------------------------------------------------
-    def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
-        """Generate code, compile it and load it.
-
-        Parameters
-        ----------
-        target : {'cython', 'numpy'}
-            ``numpy`` needs no compiler and is slower.
-        kernels : names of kernels, optional
-            Only these (see the README's table of calls); all by default, the rarer ones when they are first called.
-        **options
-            Fields of :class:`eomgen.compilation.Options`, such as ``optimize`` or ``native``.
-
-        Returns
-        -------
-        Module
-
-        Raises
-        ------
-        ModelError
-            A parameter has no value, or a coordinate has no inertia behind it.
-        ToolchainError
-            No compiler, or it failed.
-        """
-        from . import pipeline
-
-        return pipeline.compile_equations(self, target=target, kernels=kernels, **options)
-
+    # -- display
     def __str__(self) -> str:
         lines = [f"equations of {self.name}, method {self.method}, independent {', '.join(self.independent) or 'none'}"]
         for name, operations in self.operations.items():

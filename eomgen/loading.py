@@ -6,7 +6,8 @@ import os
 from contextlib import suppress
 from typing import Any
 
-from .describe import Model, load_yaml
+from .api.model import Model
+from .describe import describe_yaml_file
 from .errors import ModelError, UsageError
 from .numeric.inertia import CHECKS, word_of_check
 
@@ -61,7 +62,7 @@ def load(
         )
     if robot:
         raise UsageError(f"{os.fspath(path)}: {', '.join(robot)}: options of robot files, not of model files")
-    model = load_yaml(path, allow_native=allow_native)
+    model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)
         if word is None:

@@ -9,14 +9,13 @@ import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from . import __version__
-from .derivation import Equations
+from .derivation import Derivation
 from .equations import GIVEN, METHODS, take_given
 from .equations.digits_kept import note_lost_digits
 from .equations.positive import require_inertia
@@ -27,9 +26,8 @@ from .kinematics.mobility import Mobility, judge
 from .kinematics.report import MechanismReport, report
 
 if TYPE_CHECKING:
-    from .api.module import Module
+    from .describe.builder import Builder
     from .describe.mechanism import Mechanism
-    from .describe.model import Model
     from .program.choice import Choice
     from .program.program import Program
     from .runtime.protocols import Core
@@ -75,11 +73,11 @@ def choose_method(mechanism: Mechanism, method: str) -> str:
 
 @np.errstate(all="ignore")  # results are looked at, and what is not finite is refused by name
 def derive(
-    model: Model,
+    model: Builder,
     method: str = "auto",
     independent: Sequence[str] | None = None,
     baumgarte: tuple[float, float] | None = None,
-) -> Equations:
+) -> Derivation:
     """Derive the equations of motion of a model.
 
     Parameters
@@ -124,7 +122,7 @@ def derive(
             tree = METHODS["embedding"](kinematics)
         else:
             tree, choice = choose(kinematics)
-    return Equations(kinematics, mobility, tree, seconds, choice)
+    return Derivation(kinematics, mobility, tree, seconds, choice)
 
 
 def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float]) -> Kinematics:
@@ -160,7 +158,7 @@ def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
 
 
 @np.errstate(all="ignore")
-def check(model: Model) -> MechanismReport:
+def check(model: Builder) -> MechanismReport:
     """Everything that can be wrong with a model before code is generated.
 
     Raises
@@ -177,7 +175,7 @@ def check(model: Model) -> MechanismReport:
 
 
 @np.errstate(all="ignore")
-def build(equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
+def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None) -> Program:
     """The functions to generate for a target."""
     from .describe.digest import model_digest
     from .program import Limits
@@ -205,20 +203,17 @@ def build(equations: Equations, target: str = "cython", kernels: Sequence[str] |
 
 
 @np.errstate(all="ignore")
-def compile_equations(
-    equations: Equations, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
-) -> Module:
-    """Generate, compile and load; see :meth:`eomgen.derivation.Equations.compile`."""
-    from .api.module import Module
+def compile_core(
+    equations: Derivation, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any
+) -> Core:
+    """Generate, compile and load; see :meth:`eomgen.api.equations.Equations.compile`."""
     from .program import KERNELS
     from .runtime.late import LateCore
 
     if target == "c":
         raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")
     if kernels is not None:
-        module = Module(_load(equations, build(equations, target, kernels), target, options))
-        module.equations = equations
-        return module
+        return _load(equations, build(equations, target, kernels), target, options)
     with _timed(equations.seconds, "program"):
         program = build(equations, target, [k.name for k in KERNELS if not k.late])
     core = _load(equations, program, target, options, equations.seconds)
@@ -227,13 +222,11 @@ def compile_equations(
     def load_late() -> Core:
         return _load(equations, build(equations, target, late), target, options)
 
-    module = Module(LateCore(core, late, load_late))
-    module.equations = equations
-    return module
+    return LateCore(core, late, load_late)
 
 
 def _load(
-    equations: Equations,
+    equations: Derivation,
     program: Program,
     target: str,
     options: dict[str, Any],
@@ -280,34 +273,3 @@ def _load(
             shortcut.keep(artifact)
     with _timed(seconds, "load"):
         return cast("Core", load_core(artifact))
-
-
-@np.errstate(all="ignore")
-def generate(
-    model: Model,
-    directory: Path | str,
-    method: str = "auto",
-    target: str = "cython",
-    independent: Sequence[str] | None = None,
-    baumgarte: tuple[float, float] | None = None,
-) -> Path:
-    """Write a package that stands alone into ``directory/<name>/`` and return that path.
-
-    Files of an earlier generation that are no longer needed are removed; those of others are left alone.
-
-    Raises
-    ------
-    EomgenError
-        The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
-    """
-    from .emit import emit_package
-    from .emit.write import write_package
-    from .verification.record import record
-    from .verification.recorded import FILE
-
-    equations = derive(model, method, independent, baumgarte)
-    program = build(equations, target)
-    sources = dict(emit_package(program, target))
-    if target != "c":
-        sources[FILE] = record(program)
-    return write_package(sources, Path(directory) / equations.name)

@@ -11,7 +11,7 @@ import numpy as np
 import rotations
 from mechanisms import Random, random_mechanism
 
-from eomgen import pipeline
+from eomgen.api.equations import derive
 from eomgen.forces import BodyTorque, Damper, Line, PointForce, Spring
 from eomgen.frames import GROUND, Frame, Marker
 from eomgen.graph import vectors
@@ -50,7 +50,7 @@ def tree(group: tuple[str, ...], bodies: int, rotation: str, seed: int = 0) -> R
 
 def derived(made: Random, method: str) -> Any:
     """Equations of a random mechanism, through the pipeline that models take."""
-    return pipeline.derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
+    return derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
 
 
 def basis(module: Any, q: np.ndarray) -> np.ndarray:

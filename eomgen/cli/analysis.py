@@ -27,9 +27,9 @@ from .run import complete_parameters, sort_settings
 from .screen import stage
 
 if TYPE_CHECKING:
+    from ..api.equations import Equations
+    from ..api.model import Model
     from ..api.module import Module
-    from ..derivation import Equations
-    from ..describe import Model
 
 
 class Prepared(NamedTuple):
@@ -91,13 +91,12 @@ def prepare(
     robot: dict[str, Any],
 ) -> Prepared:
     """Derive and compile a model, with settings bound."""
-    from .. import pipeline
 
     chosen = parse_settings(settings)
     with blaming_option(independent), stage("derive"):
         described = load_model(model, allow_native, robot)
         complete_parameters(described, chosen)
-        equations = pipeline.derive(described, method, independent or None)
+        equations = described.derive(method, independent or None)
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)

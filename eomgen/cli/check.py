@@ -44,9 +44,7 @@ def check(model: Path, allow_native: bool, as_json: bool, graph: Path | None, ro
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """
-    from .. import pipeline
-
-    report = pipeline.check(load_model(model, allow_native, robot))
+    report = load_model(model, allow_native, robot).check()
     if graph is not None:
         report.draw(graph)
     if as_json:

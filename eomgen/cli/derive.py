@@ -22,7 +22,7 @@ from .options import (
 from .screen import print_heading, print_json, print_table, say, stage
 
 if TYPE_CHECKING:
-    from ..derivation import Equations
+    from ..api.equations import Equations
 
 
 @click.command()
@@ -49,10 +49,9 @@ def derive(
 
     Prints the mechanism and the operations of each part of the equations.
     """
-    from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
-        derived = pipeline.derive(load_model(model, allow_native, robot), method, independent or None, baumgarte)
+        derived = load_model(model, allow_native, robot).derive(method, independent or None, baumgarte)
         parts |= derived.seconds
     if as_json:
         print_json(summary(derived) | (written(derived) if equations else {}))

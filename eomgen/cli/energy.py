@@ -14,7 +14,7 @@ from ..graph.substitute import substitute
 from ..graph.traverse import reachable
 
 if TYPE_CHECKING:
-    from ..derivation import Equations
+    from ..api.equations import Equations
     from ..kinematics import Kinematics
     from ..runtime import Trajectory
 

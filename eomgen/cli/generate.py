@@ -48,11 +48,11 @@ def generate(
     robot: dict[str, Any],
 ) -> None:
     """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
-    from .. import pipeline
+    from ..generation import generate as write_out
 
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = pipeline.generate(described, out, method, target, independent or None, baumgarte)
+        folder = write_out(described, out, method, target, independent or None, baumgarte)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
         print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})

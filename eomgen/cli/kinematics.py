@@ -94,12 +94,11 @@ def kinematics(
         require_plotting(plot)
     require_folder("--out", out)
     require_folder("--plot", plot)
-    from .. import pipeline
 
     with blaming_option(independent), stage("derive"):
         described = load_model(model, allow_native)
         complete_parameters(described, chosen)
-        equations = pipeline.derive(described, "embedding", independent or None)
+        equations = described.derive("embedding", independent or None)
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)

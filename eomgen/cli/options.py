@@ -16,7 +16,7 @@ from ..errors import ModelError, UsageError
 from ..files.writing import refuse_link
 
 if TYPE_CHECKING:
-    from ..describe import Model
+    from ..api.model import Model
 
 model_argument = click.argument("model", metavar="MODEL", type=click.Path(path_type=Path))
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

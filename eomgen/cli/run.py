@@ -30,9 +30,9 @@ from .options import (
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 
 if TYPE_CHECKING:
+    from ..api.equations import Equations
+    from ..api.model import Model
     from ..api.module import Module
-    from ..derivation import Equations
-    from ..describe import Model
     from ..runtime import Trajectory
     from .energy import EnergyBalance
 
@@ -116,12 +116,11 @@ def run(
     kept = {key: value for key, value in kept.items() if value is not None}
     if kept and checkpoint is None:
         raise UsageError("--checkpoint-every and --resume belong to --checkpoint FILE")
-    from .. import pipeline
 
     with blaming_option(independent), stage("derive") as parts:
         described = load_model(model, allow_native, robot)
         complete_parameters(described, chosen)
-        equations = pipeline.derive(described, method, independent or None, baumgarte)
+        equations = described.derive(method, independent or None, baumgarte)
         parts |= equations.seconds
     with stage("compile") as parts:
         before = set(equations.seconds)

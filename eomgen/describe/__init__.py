@@ -1,23 +1,21 @@
 """Stage describe: what the user says, in Python or in a file -> Mechanism, the frozen value every later stage reads."""
 
+from .builder import Builder
 from .description import Description
 from .fields import FORCE as FORCE_FIELDS
 from .handles import BodyHandle, JointHandle, MarkerHandle
 from .mechanism import Mechanism
-from .model import Model
 from .schema import model_schema
-from .sympy_method import from_sympy
-from .yaml_file import load_yaml
+from .yaml_file import describe_yaml_file
 
 __all__ = [
     "FORCE_FIELDS",
     "BodyHandle",
+    "Builder",
     "Description",
     "JointHandle",
     "MarkerHandle",
     "Mechanism",
-    "Model",
-    "from_sympy",
-    "load_yaml",
+    "describe_yaml_file",
     "model_schema",
 ]

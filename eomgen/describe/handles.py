@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import UsageError
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
+from .described import Described
 from .description import GROUND_NAME, Entry, is_zero, items, label_of
 from .mechanism import velocity_names
 from .scope import RATES
 from .sympy_face import symbol
-
-if TYPE_CHECKING:
-    from .model import Model
 
 Triple = tuple[Any, Any, Any]
 
@@ -32,7 +30,7 @@ class MarkerHandle:
         How messages and symbols call it, e.g. ``rod.tip`` or ``crank.at(r, 0, 0)``.
     """
 
-    def __init__(self, model: Model, reference: Any) -> None:
+    def __init__(self, model: Described, reference: Any) -> None:
         self.model, self.reference = model, reference
         self.label: str = reference if isinstance(reference, str) else label_of(reference)
 
@@ -94,7 +92,7 @@ class MarkerHandle:
 class BodyHandle(MarkerHandle):
     """A body, or ground; used as a marker it stands for the frame at its origin."""
 
-    def __init__(self, model: Model, name: str, entry: Entry | None) -> None:
+    def __init__(self, model: Described, name: str, entry: Entry | None) -> None:
         super().__init__(model, name)
         self.name = name
         self._entry = entry
@@ -157,7 +155,7 @@ class JointHandle:
         Name of the joint.
     """
 
-    def __init__(self, model: Model, entry: Entry) -> None:
+    def __init__(self, model: Described, entry: Entry) -> None:
         self.model, self.name, self._entry = model, entry.name, entry
 
     def __repr__(self) -> str:

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 from .handles import BodyHandle
 
 if TYPE_CHECKING:
-    from .description import Description
+    from .described import Described
 
 
-class BodyMethods:
+class BodyMethods(Described):
     """The part of Model that adds bodies."""
-
-    _description: Description
 
     def body(
         self,
@@ -85,7 +83,7 @@ class BodyMethods:
             "display": display,
         }
         values = {key: value for key, value in given.items() if value is not None}
-        return BodyHandle(self, name, self._description.add("bodies", name, values))  # type: ignore[arg-type]
+        return BodyHandle(self, name, self._description.add("bodies", name, values))
 
     @property
     def check_inertia(self) -> bool | str:

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
-from .description import Description
+from .described import Described
 from .keywords import names_keywords
 from .references import joint_reference, marker_reference
-
-if TYPE_CHECKING:
-    from .model import Model
 
 Value = Any  # a number, a text or a SymPy expression
 Two = Sequence[Any]
 
 
 @names_keywords
-class ConstraintMethods:
+class ConstraintMethods(Described):
     """Methods of Model that add constraints.
 
     Where a joint is asked for, a handle, its name, or a coordinate (symbol or name) will do.  Sizes are pairs in the
     order of the joints.  Angles of a pair are measured from the part that carries both axes.
     """
-
-    _description: Description
 
     def coupling(
         self, name: str, coordinates: Mapping[Any, Value] | None = None, offset: Value = None, equation: Value = None
@@ -278,7 +273,7 @@ class ConstraintMethods:
         self._description.add("constraints", name, {"type": type_name, **given})
 
     def _joint_of(self, value: Any) -> Any:
-        return joint_reference(cast("Model", self), value)
+        return joint_reference(self, value)
 
     def _marker_of(self, value: Any) -> Any:
-        return marker_reference(cast("Model", self), value)
+        return marker_reference(self, value)

@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 from ..errors import UsageError
-from .description import Description
+from .described import Described
 from .references import joint_reference, marker_reference
-
-if TYPE_CHECKING:
-    from .model import Model
 
 Value = Any  # a number, a text or a SymPy expression
 
 
-class ForceParts:
+class ForceParts(Described):
     """What the methods that add force elements share."""
-
-    _description: Description
 
     def _force(self, type_name: str, name: str, **keys: Any) -> None:
         given = {key: value for key, value in keys.items() if value is not None}
         self._description.add("forces", name, {"type": type_name, **given})
 
     def _marker(self, value: Any) -> Any:
-        return marker_reference(cast("Model", self), value)
+        return marker_reference(self, value)
 
     def _joint(self, value: Any) -> Any:
-        return joint_reference(cast("Model", self), value)
+        return joint_reference(self, value)
 
     def _pair(self, a: Any, b: Any) -> list[Any]:
         return [self._marker(a), self._marker(b)]

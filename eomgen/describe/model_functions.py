@@ -8,16 +8,14 @@ from typing import Any
 
 from ..errors import UsageError
 from .build_native import PythonTwin
-from .description import Description
+from .described import Described
 from .keywords import names_keywords
 from .sympy_face import function
 
 
 @names_keywords
-class FunctionMethods:
+class FunctionMethods(Described):
     """Methods of Model that declare functions for use in expressions: texts and SymPy."""
-
-    _description: Description
 
     def table(
         self,

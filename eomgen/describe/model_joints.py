@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any
 
 from ..joints import JOINTS
-from .description import Description
+from .described import Described
 from .fields import joint_fields
 from .handles import JointHandle
 from .keywords import check_keywords, names_keywords
 from .references import marker_reference
 
-if TYPE_CHECKING:
-    from .model import Model
-
 Axis = str | Sequence[float]
 
 
 @names_keywords
-class JointMethods:
+class JointMethods(Described):
     """Methods of Model that add joints.
 
     ``predecessor`` and ``successor`` are bodies or markers, as handles or names.  A coordinate is the motion of the
     successor relative to the predecessor, along or about the axis, which is given in the axes of the markers.
     """
-
-    _description: Description
 
     def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
         """Add a joint of any type.
@@ -47,11 +42,10 @@ class JointMethods:
         -------
         JointHandle
         """
-        model = cast("Model", self)
-        between = [marker_reference(model, predecessor), marker_reference(model, successor)]
+        between = [marker_reference(self, predecessor), marker_reference(self, successor)]
         given = {key: value for key, value in keys.items() if value is not None}
         entry = self._description.add("joints", name, {"type": type, "between": between, **given})
-        return JointHandle(model, entry)
+        return JointHandle(self, entry)
 
     def _checked(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
         """Add a joint by the method of its type, which a misspelt keyword must not pass unseen."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .described import Described
 from .handles import MarkerHandle, Triple
 from .names import COM
 from .sympy_face import symbol
 
-if TYPE_CHECKING:
-    from .model import Model
 
-
-class TotalMethods:
+class TotalMethods(Described):
     """The part of Model that names what belongs to the mechanism as a whole, as SymPy symbols for outputs."""
 
     @property
@@ -28,8 +26,7 @@ class TotalMethods:
     @property
     def centre_of_mass(self) -> MarkerHandle:
         """The centre of mass of all bodies: its ``.position``, ``.velocity`` and ``.acceleration`` in ground axes."""
-        model: Model = self  # type: ignore[assignment]
-        return MarkerHandle(model, COM)
+        return MarkerHandle(self, COM)
 
     @property
     def momentum(self) -> Triple:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import UsageError
+from .described import Described
 from .handles import JointHandle, MarkerHandle
 
-if TYPE_CHECKING:
-    from .model import Model
 
-
-def marker_reference(model: Model, value: Any) -> Any:
+def marker_reference(model: Described, value: Any) -> Any:
     """A marker, body or name as a model file refers to it; raises UsageError for a handle of another model."""
     if isinstance(value, MarkerHandle):
         _own(model, value)
@@ -21,7 +19,7 @@ def marker_reference(model: Model, value: Any) -> Any:
     return value
 
 
-def joint_reference(model: Model, value: Any) -> Any:
+def joint_reference(model: Described, value: Any) -> Any:
     """A joint, coordinate or name as a model file refers to it; raises UsageError for a handle of another model."""
     if isinstance(value, JointHandle):
         _own(model, value)
@@ -31,6 +29,6 @@ def joint_reference(model: Model, value: Any) -> Any:
     return value
 
 
-def _own(model: Model, handle: MarkerHandle | JointHandle) -> None:
+def _own(model: Described, handle: MarkerHandle | JointHandle) -> None:
     if handle.model is not model:
         raise UsageError(f"{handle!r} belongs to the model {handle.model.name!r}, not to {model.name!r}")

@@ -1,4 +1,4 @@
-"""Stage describe, model files: YAML 1.2 -> Description -> Model, without SymPy; every fault says its file and line."""
+"""Stage describe, model files: YAML 1.2 -> Description, without SymPy; every fault says its file and line."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import Any
 from ..errors import ModelError, Problem
 from .description import SECTIONS, Description, Faults
 from .fields import KINDS, MODEL, SHORT
-from .model import Model
 from .names import nearest
 from .yaml_nodes import SIZE, Document
 
 
-def load_yaml(path: str | os.PathLike[str], *, allow_native: bool = False) -> Model:
-    """A model from a YAML file.
+def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = False) -> Description:
+    """The raw data of a model file.
 
     Names are looked up when the model is checked, as in Python; faults of the file itself that leave nothing to check
     (it is not YAML, too large, not a mapping) are raised at once, others are kept and told with all the rest.
@@ -28,7 +27,7 @@ def load_yaml(path: str | os.PathLike[str], *, allow_native: bool = False) -> Mo
 
     Returns
     -------
-    Model
+    Description
 
     Raises
     ------
@@ -50,7 +49,7 @@ def load_yaml(path: str | os.PathLike[str], *, allow_native: bool = False) -> Mo
     description = describe_yaml(text, name)
     for entry in description.sections["functions"]:
         entry.trusted, entry.folder = allow_native, os.path.dirname(name)
-    return Model.from_description(description)
+    return description
 
 
 def describe_yaml(text: str, file: str = "model.yaml") -> Description:

@@ -16,7 +16,7 @@ from ..runtime.compiled import can_run
 from ..runtime.names import check_names
 from ..runtime.progress import Progress, wanted
 from ..runtime.room import require_room, require_steps
-from ..runtime.run_arguments import DEFAULTS, find_span, ordered_times
+from ..runtime.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
 from ..runtime.tolerances import check_tolerances
@@ -199,16 +199,15 @@ def _plan(
     module: BoundModel, span: Any, method: Any, t_eval: Any, tables: dict[str, Any],
     constants: tuple[str, ...], max_steps: int, step: float | None, options: dict[str, Any], watched: tuple[Any, int],
 ) -> Plan:  # fmt: skip
-    declared = {**DEFAULTS, **{k: v for k, v in module.metadata.get("simulation", {}).items() if v is not None}}
+    declared = declare(module)
     start, end = find_span(span, float(declared["end"]))
-    method = declared["method"] if method is None else method
+    method, step = own_step(module, declared["method"] if method is None else method, step)
     if not isinstance(method, str):
         raise UsageError(f"method of simulate_many must be the name of a method, not {method!r}")
     forcing = Forcing(module.layout, tables)
     forcing.require_finite()
     can_run(module, method, forcing)  # refuses what no other method stands in for
-    if (method == "RK4") != (step is not None):
-        raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
+    step = check_method(method, step)
     if step is not None:
         require_steps("step", step, start, end)
         options = {**options, "max_step": step, "first_step": step}

@@ -18,7 +18,7 @@ from .rounding import FOLDED, UNIT, bounded
 from .truth import System, Truth
 
 if TYPE_CHECKING:
-    from ..derivation import Equations
+    from ..derivation import Derivation
     from ..program.terms import SystemTerms
     from ..runtime.bound_model import BoundModel
 
@@ -31,12 +31,12 @@ class Bench:
     Parameters
     ----------
     module : BoundModel
-    equations : Equations
+    equations : Derivation
         What it was made from.
     cases : sequence of Case
     """
 
-    def __init__(self, module: BoundModel, equations: Equations, cases: Sequence[Case]) -> None:
+    def __init__(self, module: BoundModel, equations: Derivation, cases: Sequence[Case]) -> None:
         self.module, self.equations, self.cases = module, equations, list(cases)
         self.layout = module.layout
         self.kinematics = equations.kinematics

@@ -12,7 +12,7 @@ from . import bodies
 from .digits import FIRST, SECOND, Digits, Number, Numbers, context
 
 if TYPE_CHECKING:
-    from ..derivation import Equations
+    from ..derivation import Derivation
     from ..program.terms import SystemTerms
     from .cases import Case
 
@@ -24,12 +24,12 @@ class System:
 
     Parameters
     ----------
-    equations : Equations
+    equations : Derivation
     terms : SystemTerms
         Of the same equations.
     """
 
-    def __init__(self, equations: Equations, terms: SystemTerms) -> None:
+    def __init__(self, equations: Derivation, terms: SystemTerms) -> None:
         self.equations, self.terms = equations, terms
         self.kinematics = equations.kinematics
         self.mechanism = equations.kinematics.mechanism

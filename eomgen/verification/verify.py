@@ -22,7 +22,7 @@ from .jacobians import jacobians
 from .recorded import recorded_findings
 
 if TYPE_CHECKING:
-    from ..derivation import Equations
+    from ..derivation import Derivation
     from ..runtime.bound_model import BoundModel
     from .cases import Case
 
@@ -133,14 +133,14 @@ def _variants(module: BoundModel, model: Any, seed: int, seconds: float) -> list
         return [failed(check, error)]
 
 
-def _only_in_c(equations: Equations | None) -> str:
+def _only_in_c(equations: Derivation | None) -> str:
     """Why nothing but the compiled module can evaluate some equations; empty where Python can."""
     functions = equations.kinematics.graph.functions.values() if equations is not None else ()
     blind = [function.name for function in functions if function.evaluator is None]
     return f"{', '.join(blind)} is C code without a Python twin, so that nothing else can evaluate it" if blind else ""
 
 
-def _with_equations(module: BoundModel, equations: Equations, cases: list[Case]) -> list[Finding]:
+def _with_equations(module: BoundModel, equations: Derivation, cases: list[Case]) -> list[Finding]:
     """All groups; one that cannot be carried out fails."""
     why = _only_in_c(equations)
     if why:

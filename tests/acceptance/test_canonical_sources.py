@@ -13,7 +13,7 @@ import sympy
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.derivation import Equations
+from eomgen.api.equations import Equations
 from eomgen.describe.description import SECTIONS
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import Document

@@ -21,7 +21,7 @@ import models
 import numpy as np
 import pytest
 
-from eomgen import pipeline
+from eomgen.generation import generate
 
 WITHOUT_SYMPY = """
 import sys
@@ -159,7 +159,7 @@ def test_exported_package_in_a_fresh_environment(
 
 
 def test_exported_sources_name_neither_eomgen_nor_sympy(tmp_path: Path) -> None:
-    folder = pipeline.generate(models.build("slider_crank"), tmp_path)
+    folder = generate(models.build("slider_crank"), tmp_path)
     for file in folder.rglob("*.py*"):
         for line in file.read_text(encoding="utf-8").splitlines():
             words = line.split("#")[0].split()

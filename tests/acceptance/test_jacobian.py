@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from mechanisms import random_mechanism
 
-from eomgen import pipeline
+from eomgen.api.equations import derive
 
 LOOPS = ["offset_slider_crank", "powered_slider_crank", "spatial_loop"]
 REDUNDANT = ["tilted_four_bar", "skewed_four_bar", "three_cranks"]
@@ -69,7 +69,7 @@ def test_some_directions_are_transverse(module: Callable[..., Any]) -> None:
 def test_jacobian_of_random_mechanisms(seed: int, planar: bool, loop: bool) -> None:
     made = random_mechanism(seed, bodies=3, planar=planar, reverse=True, loop=loop)
     model: Any = SimpleNamespace(mechanism=lambda: made.mechanism)
-    mod = pipeline.derive(model, "embedding").compile(target="numpy")
+    mod = derive(model, "embedding").compile(target="numpy")
     if not mod.n_c:
         states = list(np.random.default_rng(seed).uniform(-1, 1, (2, mod.n_x)))
     else:

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from mechanisms import Random, random_mechanism
 from scipy.spatial.transform import Rotation
 
-from eomgen import pipeline
+from eomgen.api.equations import derive
 from eomgen.errors import ModelError
 
 METHODS = ["embedding", "lagrange"]
@@ -63,7 +63,7 @@ def test_methods_agree_on_models(module: Callable[..., Any], name: str) -> None:
 
 def derived(made: Random, method: str) -> Any:
     """Equations of a random mechanism, through the pipeline that models take."""
-    return pipeline.derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
+    return derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
 
 
 def states_of(module: Any, seed: int, count: int) -> list[np.ndarray]:

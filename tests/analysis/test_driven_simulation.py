@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.generation import generate
 
 EXAMPLE = models.EXAMPLES / "driven_slider_crank.yaml"
 
@@ -101,8 +102,7 @@ assert np.abs(run["s"] - 0.1 * np.cos(theta) - np.sqrt(0.09 - 0.01 * np.sin(thet
 
 
 def test_an_exported_package_needs_numpy_alone(tmp_path: Path) -> None:
-    from eomgen import pipeline
 
-    pipeline.generate(eg.load(EXAMPLE), tmp_path, target="numpy")
+    generate(eg.load(EXAMPLE), tmp_path, target="numpy")
     result = subprocess.run([sys.executable, "-c", ALONE], cwd=tmp_path, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr

@@ -13,7 +13,7 @@ import models
 import numpy as np
 import pytest
 
-from eomgen import pipeline
+from eomgen.generation import generate
 
 SCRIPT = """
 import json, sys
@@ -44,7 +44,7 @@ print(json.dumps(result))
 def test_a_numpy_package(compiled: Callable[..., Any], without: list[str], tmp_path: Path) -> None:
     from .conftest import spring_four_bar
 
-    pipeline.generate(spring_four_bar(), tmp_path, target="numpy")
+    generate(spring_four_bar(), tmp_path, target="numpy")
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, *without], cwd=tmp_path, capture_output=True, text=True, timeout=120
     )
@@ -86,7 +86,7 @@ def test_sensitivities_through_an_impact_with_a_signal_of_the_model(tmp_path: Pa
     m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
     m.torque("motor", "J", m.input("u", signal="-F*s**2*sin(k*t) - k*s"))
     m.event("wall", "s + 0.5 + 0.1*k", restitution=0.5)
-    pipeline.generate(m, tmp_path, target="numpy")
+    generate(m, tmp_path, target="numpy")
     done = subprocess.run([sys.executable, "-c", THROUGH], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     by_k, by_F, times = json.loads(done.stdout)

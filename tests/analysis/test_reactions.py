@@ -20,7 +20,8 @@ import pytest
 from wrenches import Balance, tangent
 
 import eomgen as eg
-from eomgen import pipeline
+from eomgen.api.equations import derive
+from eomgen.generation import generate
 
 
 def check_balance(
@@ -41,7 +42,7 @@ def check_balance(
 
 def moduled(made: Any, method: str = "auto", target: str = "numpy") -> Any:
     """A module of a random mechanism."""
-    return pipeline.derive(SimpleNamespace(mechanism=lambda: made.mechanism), method).compile(target=target)  # type: ignore[arg-type]
+    return derive(SimpleNamespace(mechanism=lambda: made.mechanism), method).compile(target=target)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("rotation", ["euler_angles", "euler_parameters"])
@@ -201,7 +202,7 @@ print(json.dumps([y.tolist() for y in found]))
 
 
 def test_an_exported_package_has_them_with_numpy_alone(tmp_path: Path, compiled: Callable[..., Any]) -> None:
-    pipeline.generate(models.build("slider_crank"), tmp_path, target="numpy")
+    generate(models.build("slider_crank"), tmp_path, target="numpy")
     done = subprocess.run([sys.executable, "-c", ALONE], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert done.returncode == 0, done.stderr
     mod = compiled("slider_crank")

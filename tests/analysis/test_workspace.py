@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.generation import generate
 
 TURN = 2 * np.pi
 BODY = {"mass": 1, "inertia": (0.1, 0.1, 0.1)}
@@ -269,9 +270,8 @@ def test_tables_files_and_pictures(arm: eg.Module, tmp_path: Path) -> None:
 
 
 def test_an_exported_package_has_it(arm: eg.Module, tmp_path: Path) -> None:
-    from eomgen import pipeline
 
-    pipeline.generate(planar_arm(), tmp_path, target="numpy")
+    generate(planar_arm(), tmp_path, target="numpy")
     script = (
         "import sys; sys.modules['sympy'] = sys.modules['eomgen'] = None\n"
         "import arm\nprint(arm.workspace({'q1': (0, 3, 13), 'q2': (0.1, 3, 13)}, ['x', 'y']).area())"

@@ -12,7 +12,7 @@ import pytest
 
 import eomgen as eg
 from eomgen.describe import Description
-from eomgen.pipeline import generate
+from eomgen.generation import generate
 
 TARGETS = ["numpy", pytest.param("cython", marks=pytest.mark.slow)]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.describe import Model, load_yaml
+from eomgen import Model, load
 from eomgen.errors import ModelError, Problem
 
 SLIDER_CRANK = """\
@@ -91,7 +91,7 @@ def problems_of(write: Write) -> Find:
 
     def problems_of(text: str) -> list[Problem]:
         try:
-            load_yaml(write(text)).mechanism()
+            load(write(text)).mechanism()
         except ModelError as error:
             return list(error.problems)
         return []

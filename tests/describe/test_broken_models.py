@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from eomgen.describe import Model, load_yaml
+from eomgen import Model, load
 from eomgen.errors import ModelError
 
 # piece of the slider-crank, what it becomes, then line, path, message and remedy (parts of them)
@@ -189,7 +189,7 @@ def test_all_faults_come_at_once_in_the_order_of_the_file(change, problems_of, s
 
 def test_a_parameter_may_lack_a_value_until_it_is_needed(change, write) -> None:
     path = write(change("  l: {value: 0.35, unit: m}", "  l: {unit: m}").replace("{value: 1.0, unit: kg}", ""))
-    m = load_yaml(path).mechanism()
+    m = load(path).mechanism()
     with pytest.raises(ModelError) as caught:
         m.require_values()
     first, second = caught.value.problems

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sympy
 
-from eomgen.describe import Mechanism, Model, load_yaml
+from eomgen import Model, load
+from eomgen.describe import Mechanism
 from eomgen.forces import Actuator, JointCoordinate, Line, Spring
 from eomgen.frames import GROUND
 from eomgen.graph import Expr, evaluate, vectors
@@ -30,7 +31,7 @@ def fingerprint(m: Mechanism) -> list[float]:
 
 
 def test_python_and_yaml_agree(slider_crank: Model, slider_crank_text: str, write) -> None:
-    a, b = slider_crank.mechanism(), load_yaml(write(slider_crank_text)).mechanism()
+    a, b = slider_crank.mechanism(), load(write(slider_crank_text)).mechanism()
     np.testing.assert_allclose(fingerprint(a), fingerprint(b), rtol=1e-14)
     assert {p.name: p.value for p in a.parameters} == {p.name: p.value for p in b.parameters}
     for m in (a, b):
@@ -61,7 +62,7 @@ def test_python_and_yaml_agree(slider_crank: Model, slider_crank_text: str, writ
 
 def test_the_file_says_where_things_stand(slider_crank_text: str, write) -> None:
     path = write(slider_crank_text)
-    m = load_yaml(path).mechanism()
+    m = load(path).mechanism()
     assert m.lines["joints.D.axis"] == (str(path), 19)
     problem = m.problem("joints.D.coordinate.x", "is odd")
     assert (problem.file, problem.line) == (str(path), 19)

@@ -6,7 +6,8 @@ import pytest
 import sympy
 from sympy.physics.mechanics import dynamicsymbols
 
-from eomgen.describe import Mechanism, Model
+from eomgen import Model
+from eomgen.describe import Mechanism
 from eomgen.errors import ModelError
 from eomgen.graph import evaluate
 

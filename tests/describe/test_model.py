@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import sympy
 
-from eomgen.describe import Mechanism, Model
+from eomgen import Model
+from eomgen.describe import Mechanism
 from eomgen.describe.fields import BODY, FORCE, INPUT, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
 from eomgen.errors import ModelError, UsageError
 from eomgen.forces import Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Turn

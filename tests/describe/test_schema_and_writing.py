@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from eomgen.describe import Model, load_yaml, model_schema
+from eomgen import Model, load
+from eomgen.describe import model_schema
 from eomgen.describe.fields import FORCE, MODEL
 from eomgen.describe.sympy_text import sympy_text
 from eomgen.describe.write_yaml import _text
@@ -74,7 +75,7 @@ def examples() -> list[Path]:
 def test_the_shipped_examples(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert faults(text) == []
-    m = load_yaml(path)
+    m = load(path)
     mechanism = m.mechanism()
     mechanism.require_values()
     assert mechanism.name == path.stem
@@ -86,7 +87,7 @@ def test_a_written_model_reads_back(slider_crank: Model, write) -> None:
     slider_crank.parameter("third")
     text = slider_crank.to_yaml()
     assert faults(text) == []
-    again = load_yaml(write(text))
+    again = load(write(text))
     assert again.to_yaml() == text
     a, b = slider_crank.mechanism(), again.mechanism()
     assert [(p.name, p.value, p.unit, p.doc) for p in a.parameters] == [
@@ -99,7 +100,7 @@ def test_a_written_model_reads_back(slider_crank: Model, write) -> None:
 
 def test_save(slider_crank: Model, tmp_path: Path) -> None:
     slider_crank.save(tmp_path / "m.yaml")
-    assert load_yaml(tmp_path / "m.yaml").mechanism().name == "slider_crank"
+    assert load(tmp_path / "m.yaml").mechanism().name == "slider_crank"
 
 
 def test_a_lagrangian_can_be_written(write) -> None:
@@ -107,7 +108,7 @@ def test_a_lagrangian_can_be_written(write) -> None:
     m = Model.from_lagrangian(
         "p", q.diff() ** 2 / 2 - sympy.cos(q), [q], forces={q: sympy.exp(-q)}, constraints=[q - 1]
     )
-    again = load_yaml(write(m.to_yaml())).mechanism().lagrangian
+    again = load(write(m.to_yaml())).mechanism().lagrangian
     assert again is not None
     assert evaluate([again.expression, *again.forces], {"q": 0.0, "q_dot": 2.0}) == [1.0, 1.0]
 

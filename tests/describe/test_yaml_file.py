@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from eomgen.describe import load_yaml, yaml_nodes
+from eomgen import load
+from eomgen.describe import yaml_nodes
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import DEPTH, SIZE, scalar
 from eomgen.errors import ModelError, UsageError
-from eomgen.loading import load
 
 REFUSED = {
     "alias": ("name: a\ngravity: &g [0, 0, 0]\nindependent: *g\n", 2, "the anchor &g"),
@@ -58,7 +58,7 @@ def test_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "large.yaml"
     path.write_text("# " + "x" * SIZE)
     with pytest.raises(ModelError, match="too large"):
-        load_yaml(path)
+        load(path)
     monkeypatch.setattr(yaml_nodes, "NODES", 1000)
     many = "name: a\nindependent: [" + "a, " * 1000 + "a]\n"
     with pytest.raises(ModelError, match="too many values"):
@@ -69,7 +69,7 @@ def test_not_text(tmp_path: Path) -> None:
     path = tmp_path / "binary.yaml"
     path.write_bytes(b"name: a\ndoc: \xff\xfe\n")
     with pytest.raises(ModelError, match=r"binary.yaml:2: file: is not UTF-8 text"):
-        load_yaml(path)
+        load(path)
 
 
 def test_load_goes_by_the_suffix(tmp_path: Path, slider_crank_text: str) -> None:
@@ -96,7 +96,7 @@ def test_scalars_of_yaml_1_2() -> None:
 def test_ground_may_have_markers(change, write) -> None:
     text = change("  slider: {mass: m_s}", "  slider: {mass: m_s}\n  ground: {markers: {wall: [0.5, 0, 0]}}")
     text = text.replace("{body: ground, at: [0.5, 0, 0]}", "ground.wall")
-    m = load_yaml(write(text)).mechanism()
+    m = load(write(text)).mechanism()
     assert m.forces[0].name == "motor"
     assert m.forces[1].path.start.label == "ground.wall"  # type: ignore[attr-defined]
     assert len(m.bodies) == 3
@@ -115,7 +115,7 @@ lagrangian:
 outputs: {height: -l*cos(theta), theta: theta}
 initial: {theta: pi/3}
 """
-    m = load_yaml(write(text)).mechanism()
+    m = load(write(text)).mechanism()
     assert m.lagrangian is not None
     assert m.lagrangian.coordinates == ("theta",)
     assert m.lagrangian.forces == (m.graph.symbol("tau"),)
@@ -136,7 +136,6 @@ class Refuse:
         if name.partition(".")[0] in ("sympy", "scipy", "matplotlib", "pandas", "jinja2"):
             raise ImportError(name + " is refused here")
 sys.meta_path.insert(0, Refuse())
-from eomgen.loading import load
 from eomgen.errors import ModelError
 m = load(sys.argv[1])
 print(m.mechanism().name, m.joints["A"].coordinate_names, len(m.to_yaml()) > 100)

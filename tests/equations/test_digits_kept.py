@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen import pipeline
+from eomgen.api.equations import derive
 from eomgen.program.collect import collect_terms
 from eomgen.verification.digits import Digits, context, solve
 
@@ -32,7 +32,7 @@ def chain(masses: Sequence[float], lengths: Sequence[float]) -> eg.Model:
 
 def exact(model: eg.Model, x: np.ndarray) -> list[Any]:
     """Accelerations of a tree with 60 digits."""
-    equations = pipeline.derive(model, "lagrange")
+    equations = derive(model, "lagrange")
     terms = collect_terms(equations.kinematics, equations.mobility, equations.tree)
     mp, n = context(), terms.n_v
     values = {name: mp.mpf(float(v)) for name, v in zip((*terms.q, *terms.v), x, strict=True)}

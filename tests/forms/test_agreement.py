@@ -17,7 +17,7 @@ import pytest
 from mechanisms import Random, random_mechanism
 
 import eomgen as eg
-from eomgen import pipeline
+from eomgen.api.equations import derive
 from eomgen.equations import METHODS
 from eomgen.errors import EvaluationError
 
@@ -64,7 +64,7 @@ def test_every_form_on_further_models(name: str) -> None:
 
 
 def derived(made: Random, method: str) -> Any:
-    return pipeline.derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
+    return derive(SimpleNamespace(mechanism=lambda: made.mechanism), method)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -11,7 +11,7 @@ import models
 import numpy as np
 import pytest
 
-from eomgen import pipeline
+from eomgen.generation import generate
 
 ALONE = """
 import json, sys
@@ -39,7 +39,7 @@ print(json.dumps(result))
 def test_a_package_of_each_kind_stands_alone(
     tmp_path: Path, name: str, method: str, baumgarte: tuple[float, float] | None
 ) -> None:
-    pipeline.generate(models.build(name), tmp_path, method, "numpy", baumgarte=baumgarte)
+    generate(models.build(name), tmp_path, method, "numpy", baumgarte=baumgarte)
     done = subprocess.run(
         [sys.executable, "-c", ALONE.format(name=name)], cwd=tmp_path, capture_output=True, text=True, timeout=120
     )

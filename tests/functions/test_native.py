@@ -18,6 +18,7 @@ from eomgen import pipeline
 from eomgen.compilation.native_faults import blame_source
 from eomgen.emit import emit_c
 from eomgen.errors import ModelError, ToolchainError, UsageError
+from eomgen.generation import generate
 
 
 def pendulum(law: str, native: Any = None) -> eg.Model:
@@ -188,14 +189,14 @@ def test_packages_carry_the_function(sources: Path, tmp_path: Path) -> None:
     m = pendulum("-9.81*swing(q) - soft(q_dot)", native)
     x = np.array([0.4, 0.3])
     expected = m.compile().rhs(0, x)
-    c = pipeline.generate(m, tmp_path / "c", target="c")
+    c = generate(m, tmp_path / "c", target="c")
     (c / "main.c").write_text(re.search(r"```c\n(.*?)```", (c / "README.md").read_text(), re.S).group(1))  # type: ignore[union-attr]
     flags = "CFLAGS=-O1 -std=c99 -fPIC -Wall -Wextra -Werror -Wconversion"
     subprocess.run(["make", "-s", "all", flags], cwd=c, check=True)
     assert {"swinging_tables.c", "swinging_native_swing.c"} <= {p.name for p in c.iterdir()}
-    numpy = pipeline.generate(m, tmp_path / "numpy", target="numpy")
+    numpy = generate(m, tmp_path / "numpy", target="numpy")
     assert (numpy / "native_swing.py").read_text() == (sources / "laws.py").read_text()
-    cython = pipeline.generate(m, tmp_path / "cython", target="cython")
+    cython = generate(m, tmp_path / "cython", target="cython")
     build = [sys.executable, "setup.py", "-q", "build_ext", "--inplace", "--build-lib", str(tmp_path / "lib")]
     environment = {**os.environ, "CFLAGS": "-O0"}
     done = subprocess.run(build, cwd=cython, env=environment, capture_output=True, text=True, check=False)
@@ -215,7 +216,7 @@ def test_packages_carry_the_function(sources: Path, tmp_path: Path) -> None:
 def test_a_package_cannot_carry_a_callable(sources: Path, tmp_path: Path) -> None:
     m = pendulum("-swing(q)", full(sources, python=math.sin))
     with pytest.raises(UsageError, match="needs its Python twin as a file"):
-        pipeline.generate(m, tmp_path / "numpy", target="numpy")
+        generate(m, tmp_path / "numpy", target="numpy")
     with pytest.raises(UsageError, match="cannot be written to a model file"):
         m.to_yaml()
 

@@ -17,7 +17,7 @@ import numpy as np
 import eomgen as eg
 from eomgen.compilation.cython_layer import HEADERS
 from eomgen.layer import read_header, read_layer
-from eomgen.pipeline import build, derive
+from eomgen.pipeline import build
 from eomgen.program import KERNELS, Program
 
 DRIVER = Path(__file__).with_name("c_code_driver.c")
@@ -71,7 +71,7 @@ def installed(*names: str) -> list[str]:
 
 def program_of(name: str, method: str, kernels: str = "all") -> Program:
     """An example by a method: ``all`` functions, as target c has them, or target cython's: ``now`` or ``late``."""
-    equations = derive(eg.load(EXAMPLES / name), method)
+    equations = eg.load(EXAMPLES / name).derive(method)
     if kernels == "all":
         return build(equations, "c")
     now = build(equations, "cython", [k.name for k in KERNELS if not k.late])

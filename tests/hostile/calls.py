@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import sympy
 
-from eomgen.describe.model import Model
+from eomgen import Model
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.errors import EomgenError
 

@@ -11,7 +11,7 @@ from hostile.nasty_texts import NASTY
 
 import eomgen as eg
 from eomgen import pipeline
-from eomgen.derivation import Equations
+from eomgen.api.equations import Equations
 from eomgen.describe import fields, fields_constraints, force_fields
 from eomgen.describe.field import Field
 from eomgen.describe.yaml_file import describe_yaml

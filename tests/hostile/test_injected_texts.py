@@ -19,6 +19,7 @@ import eomgen as eg
 from eomgen import pipeline, texts
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.emit import emit_package
+from eomgen.generation import generate
 
 
 def test_every_text_field_is_among_those_that_are_filled() -> None:
@@ -131,7 +132,7 @@ def test_a_package_with_every_text_installs_and_runs(tmp_path: Any) -> None:
 
     text = "\n".join(NASTY[key] for key in NASTY if not key.startswith("long"))
     model = model_of(described(text, "everything"))
-    folder = pipeline.generate(model, tmp_path, target="numpy")
+    folder = generate(model, tmp_path, target="numpy")
     target = tmp_path / "installed"
     words = ["pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(target), str(folder)]
     done = subprocess.run([sys.executable, "-m", *words], capture_output=True, text=True, check=False)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from eomgen.describe.model import Model
+from eomgen import Model
 from eomgen.errors import EomgenError
 from eomgen.verification import Finding
 from eomgen.verification.variants import CHANGES, NotApplicable

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 import eomgen as eg
-from eomgen.describe.model import Model
+from eomgen import Model
 from eomgen.kinematics import analyse, find_topology
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.describe.model import Model
+from eomgen import Model
 from eomgen.errors import ModelError
 
 

@@ -139,7 +139,7 @@ def test_python_and_model_files_know_the_data(tmp_path: Path) -> None:
     m.revolute("a", m.ground, rotor, limits={"lower": -1, "effort": 3}, dry_friction=0.1, armature=J)
     ball = m.body("ball", mass=2, inertia=(1, 1, 1))
     m.joint("planar", "b", rotor, ball, limits={"lower": [-1, -2, None], "upper": [1, 2, 3]})
-    for model in (m, eg.describe.load_yaml(save(m, tmp_path))):
+    for model in (m, eg.load(save(m, tmp_path))):
         module = model.compile(target="numpy", kernels=["mass_matrix", "energy"])
         assert module.limits["a"] == {"lower": -1.0, "effort": 3.0}
         assert module.limits["b_3"] == {"upper": 3.0}

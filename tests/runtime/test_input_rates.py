@@ -14,7 +14,7 @@ import sympy as sp
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 
 import eomgen as eg
-from eomgen.pipeline import generate
+from eomgen.generation import generate
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 th, th_dot, l, x, y, x_dot, y_dot = sp.symbols("th th_dot l x y x_dot y_dot")

@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import DOP853
 
 import eomgen as eg
-from eomgen import pipeline
+from eomgen.generation import generate
 
 G, E, END = 9.81, 0.9, 2.0
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -36,7 +36,7 @@ def ball(**floor: Any) -> eg.Model:
 def modules(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """By target; ``exported``: a package of the NumPy target, imported from its own folder."""
     folder = tmp_path_factory.mktemp("exported")
-    pipeline.generate(ball(), folder, target="numpy")
+    generate(ball(), folder, target="numpy")
     sys.path.insert(0, str(folder))
     try:
         package = importlib.import_module("ball")

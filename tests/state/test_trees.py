@@ -13,11 +13,10 @@ from judges import Bodies, RigidBodies
 from mechanisms import Random, random_mechanism
 
 import eomgen as eg
-from eomgen.derivation import Equations
+from eomgen.api.equations import Equations
 from eomgen.equations import METHODS
 from eomgen.kinematics import analyse
 from eomgen.kinematics.mobility import judge
-from eomgen.pipeline import compile_equations
 
 STEPS = {
     "revolute": "RZ",
@@ -32,7 +31,7 @@ STEPS = {
 
 def module_of(made: Random, method: str = "embedding", target: str = "numpy") -> Any:
     kinematics = analyse(made.mechanism)
-    return compile_equations(Equations(kinematics, judge(kinematics), METHODS[method](kinematics)), target)
+    return Equations(kinematics, judge(kinematics), METHODS[method](kinematics)).compile(target)
 
 
 def random_state(module: Any, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

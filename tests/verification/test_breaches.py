@@ -14,8 +14,8 @@ import pytest
 import eomgen as eg
 import eomgen.emit
 import eomgen.program.collect as collect
+from eomgen.api.equations import Equations
 from eomgen.api.module import Module
-from eomgen.derivation import Equations
 from eomgen.forces.elements import Spring
 from eomgen.verification import Verification
 

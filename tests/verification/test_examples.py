@@ -13,6 +13,7 @@ import sympy as sp
 
 import eomgen as eg
 from eomgen.cli import main
+from eomgen.generation import generate
 from eomgen.verification import Finding, Verification
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -140,7 +141,7 @@ def selftest(folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_an_exported_package_tests_itself_with_numpy_alone(tmp_path: Path) -> None:
-    package = eg.pipeline.generate(eg.load(EXAMPLES / "four_bar.yaml"), tmp_path, target="numpy")
+    package = generate(eg.load(EXAMPLES / "four_bar.yaml"), tmp_path, target="numpy")
     assert (package / "selftest.json").stat().st_size < 30_000
     fine = selftest(tmp_path)
     assert fine.returncode == 0, fine.stdout + fine.stderr

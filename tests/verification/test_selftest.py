@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.generation import generate
 from eomgen.verification.cases import random_cases
 from eomgen.verification.finding import Finding
 from eomgen.verification.jacobians import jacobians
@@ -22,7 +23,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 @pytest.fixture(scope="module")
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = eg.load(EXAMPLES / "four_bar.yaml")
-    return eg.pipeline.generate(model, tmp_path_factory.mktemp("selftest"), target="numpy")
+    return generate(model, tmp_path_factory.mktemp("selftest"), target="numpy")
 
 
 @pytest.fixture(scope="module")

@@ -11,27 +11,28 @@ from typing import Any
 
 import numpy as np
 
-from ... import pipeline
-from ...describe.model import Model
+from ...describe.builder import Builder
 from ...equations import METHODS
 from ...errors import EomgenError, ToolchainError, UsageError
+from ...generation import generate
 from ...numeric import algebra
+from ...runtime.minimal import Minimal
 from ..finding import Finding
 from .compare import Worst, compare_module, refused, states_of
 from .frames import values_of
 from .geometry import parameters_of_geometry
 from .inputs import input_findings
-from .states import Original, compiled
+from .states import Original, compiled, compiled_model
 from .variant import Variant
 from .visit import copied
 
-Call = Callable[[str, Model, Original, Any], Finding]
+Call = Callable[[str, Builder, Original, Any], Finding]
 
 
 def _guarded(call: Call) -> Call:
     """A refusal as a finding."""
 
-    def run(check: str, model: Model, original: Original, random: Any) -> Finding:
+    def run(check: str, model: Builder, original: Original, random: Any) -> Finding:
         try:
             return call(check, model, original, random)
         except ToolchainError as why:
@@ -43,7 +44,7 @@ def _guarded(call: Call) -> Call:
 
 
 def _method(method: str) -> Call:
-    def run(check: str, model: Model, original: Original, random: Any) -> Finding:
+    def run(check: str, model: Builder, original: Original, random: Any) -> Finding:
         bare = any(original.description.values.get(key) is not None for key in ("lagrangian", "equations"))
         if bare:
             return Finding.skipped(check, "the equations are given")
@@ -53,12 +54,12 @@ def _method(method: str) -> Call:
     return _guarded(run)
 
 
-def _compiled(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _compiled(check: str, model: Builder, original: Original, random: Any) -> Finding:
     module = compiled(original.description, target="cython")
     return compare_module(check, original, Variant(original.description), module)
 
 
-def _independent(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _independent(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """Other independent coordinates, the best conditioned of some random choices."""
     own = original.module
     if not own.n_rows or not own.n_dof or own.n_q != own.n_v:
@@ -80,7 +81,7 @@ def _independent(check: str, model: Model, original: Original, random: Any) -> F
     return compare_module(check, original, Variant(original.description), module)
 
 
-def _parameters(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _parameters(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """Parameters declared wrong, and given at run time.
 
     Parameters that stand in places and sizes keep their values where there are loops: freedoms are judged there.
@@ -98,7 +99,7 @@ def _parameters(check: str, model: Model, original: Original, random: Any) -> Fi
     return compare_module(check, original, Variant(made), module, p=p)
 
 
-def _minimal(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _minimal(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """Accelerations of the independent coordinates by the strictly minimal form."""
     own = original.module
     if not own.n_dof:
@@ -106,7 +107,7 @@ def _minimal(check: str, model: Model, original: Original, random: Any) -> Findi
     if len(own.x_names) != own.n_q + own.n_v:
         return Finding.skipped(check, "the model has states of its own")
     try:
-        minimal = own.minimal
+        minimal = Minimal(own)
     except UsageError as why:
         return Finding.skipped(check, str(why))
     worst, errors = Worst(check), np.zeros(original.states.shape[1])
@@ -120,9 +121,9 @@ def _minimal(check: str, model: Model, original: Original, random: Any) -> Findi
     return worst.finding(len(errors))
 
 
-def _yaml(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _yaml(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """The model as it was given against its plain form, which went through the text of a model file."""
-    module = model.compile(target="numpy")
+    module = compiled_model(model)
     if sorted(module.x_names) != sorted(original.module.x_names):
         return Finding(check, np.inf, 0.0, note=f"states {module.x_names} instead of {original.module.x_names}")
     states = states_of(original, Variant(original.description), module)
@@ -134,11 +135,11 @@ def _yaml(check: str, model: Model, original: Original, random: Any) -> Finding:
     return worst.finding(len(errors))
 
 
-def _exported(check: str, model: Model, original: Original, random: Any) -> Finding:
+def _exported(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """A package written to a folder and imported from there."""
-    made = Model.from_description(original.description)
+    made = Builder.from_description(original.description)
     with TemporaryDirectory() as folder:
-        root = pipeline.generate(made, folder, target="numpy")
+        root = generate(made, folder, target="numpy")
         package = _imported(Path(root))
         try:
             variant = Variant(original.description)

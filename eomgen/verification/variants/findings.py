@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...describe.builder import Builder
 from ...describe.description import Description
-from ...describe.model import Model
 from ...errors import EomgenError
 from ..finding import NOT_REACHED, Finding
 from .calls import CALLS
@@ -68,13 +68,13 @@ RUN = "short runs"  #: of all changes at once, and of another cut
 
 
 def variant_findings(
-    model: Model | Description, *, seed: int = 0, seconds: float = 10.0, only: str | None = None
+    model: Builder | Description, *, seed: int = 0, seconds: float = 10.0, only: str | None = None
 ) -> list[Finding]:
     """Try every change on a model.
 
     Parameters
     ----------
-    model : Model or Description
+    model : Builder or Description
     seed : int
         Of the random turns, orders and states.
     seconds : float
@@ -94,7 +94,7 @@ def variant_findings(
         The model itself is refused.
     """
     end = perf_counter() + seconds
-    made = model if isinstance(model, Model) else Model.from_description(model)
+    made = model if isinstance(model, Builder) else Builder.from_description(model)
     try:
         original = original_of(made, seed)
     except NotApplicable as why:
@@ -115,7 +115,7 @@ def variant_findings(
     return findings
 
 
-def _found(name: str, check: str, model: Model, original: Original, random: Any) -> Finding:
+def _found(name: str, check: str, model: Builder, original: Original, random: Any) -> Finding:
     if name == RUN:
         return run_findings(check, original, {"all at once": all_at_once}, random)
     if name in CALLS:
@@ -123,7 +123,7 @@ def _found(name: str, check: str, model: Model, original: Original, random: Any)
     return compare(check, original, CHANGES[name], random, name in REACTIONS)
 
 
-def original_of(model: Model, seed: int, motion_only: bool = False) -> Original:
+def original_of(model: Builder, seed: int, motion_only: bool = False) -> Original:
     """The plain form of a model with probes, observed; every change starts from it."""
     try:
         base = plain(model)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...runtime.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
 from .states import Original, compiled
@@ -17,7 +18,7 @@ from .variant import Variant
 from .visit import copied
 
 if TYPE_CHECKING:
-    from ...describe.model import Model
+    from ...describe.builder import Builder
 
 #: Tolerances of the runs, and what two runs with them may differ by, relative to the size of the state.
 RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
@@ -39,7 +40,7 @@ class Line(NamedTuple):
         return Line(self.slope, 0.0)
 
 
-def input_findings(check: str, model: Model, original: Original, random: Any) -> Finding:
+def input_findings(check: str, model: Builder, original: Original, random: Any) -> Finding:
     """All ways to give the inputs of a model."""
     entries = original.description.sections["inputs"]
     if not entries:
@@ -57,13 +58,13 @@ def input_findings(check: str, model: Model, original: Original, random: Any) ->
     course = {name: Line(start[name], slope[name]) for name in start}
     table = {name: (times, start[name] + slope[name] * times) for name in start}
     runs = {
-        "function": original.module.simulate((0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),
-        "table": original.module.simulate((0.0, end), x, inputs=table, t_eval=times, rtol=RTOL, atol=ATOL),
+        "function": simulate(original.module, (0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),
+        "table": simulate(original.module, (0.0, end), x, inputs=table, t_eval=times, rtol=RTOL, atol=ATOL),
     }
     made = copied(original.description)
     for entry in made.sections["inputs"]:
         entry.values["signal"] = f"{start[entry.name]!r} + {slope[entry.name]!r}*t"
-    runs["text"] = compiled(made).simulate((0.0, end), x, t_eval=times, rtol=RTOL, atol=ATOL)
+    runs["text"] = simulate(compiled(made), (0.0, end), x, t_eval=times, rtol=RTOL, atol=ATOL)
     worst, where = (0.0, "") if still.left_out else (still.worst * RUNS / still.limit, still.where)
     for way in ("table", "text"):
         size = np.abs(runs["function"].x).max(axis=1, initial=1.0)

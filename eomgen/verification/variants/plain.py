@@ -1,4 +1,4 @@
-"""Stage verification, the plain form: Model or Description -> numbers, texts and mappings only, defaults written out.
+"""Stage verification, the plain form: Builder or Description -> numbers, texts and mappings only, defaults written out.
 
 A round trip through the text of a model file makes it plain, whether the model came from Python, YAML or a robot's
 file.  Data that enter no equation (shapes, limits) are left out.
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ...describe.builder import Builder
 from ...describe.description import GROUND_NAME, Description, Entry
-from ...describe.model import Model
 from ...describe.write_yaml import yaml_text
 from ...describe.yaml_file import describe_yaml
 from .visit import Visitor, visit
@@ -20,7 +20,7 @@ _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
 _DATA = {"joints": ("limits", "dry_friction"), "bodies": ("display",)}
 
 
-def plain(model: Model | Description) -> Description:
+def plain(model: Builder | Description) -> Description:
     """The plain form of a model.
 
     Raises
@@ -28,7 +28,7 @@ def plain(model: Model | Description) -> Description:
     UsageError
         It has values that no model file can hold, such as functions of Python.
     """
-    given = model.description if isinstance(model, Model) else model
+    given = model.description if isinstance(model, Builder) else model
     result = describe_yaml(yaml_text(given))
     folders = {entry.name: entry for entry in given.sections["functions"]}
     for entry in result.sections["functions"]:

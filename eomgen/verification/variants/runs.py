@@ -9,6 +9,7 @@ import numpy as np
 
 from ...describe.description import Description
 from ...errors import EomgenError
+from ...runtime.simulate import simulate
 from ..finding import Finding
 from .compare import FREE_CONSTANT, refused
 from .cuts import cut_another
@@ -51,7 +52,7 @@ def run_findings(
 
 
 def _run(module: Any, x: Any, end: float) -> Any:
-    return module.simulate((0.0, end), x, t_eval=np.linspace(0.0, end, TIMES), rtol=RTOL, atol=ATOL)
+    return simulate(module, (0.0, end), x, t_eval=np.linspace(0.0, end, TIMES), rtol=RTOL, atol=ATOL)
 
 
 def _difference(original: Original, variant: Variant, first: Any, second: Any) -> tuple[float, str]:

@@ -9,18 +9,21 @@ The limit is :data:`ROUNDINGS` times the sum of the two.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ... import pipeline
+from ...analysis.reactions import reactions
+from ...describe.builder import Builder
 from ...describe.description import Description
-from ...describe.model import Model
 from ...errors import EomgenError
 from ...limits.rounding import EPS
 from ...numeric import algebra
 from ...numeric.scales import Array
 from ...records import dataclass
+from ...runtime.bound_model import BoundModel
 from .frames import length_of
 from .probes import ANGULAR, LINEAR, PLACE, SPEED, SPIN
 from .variant import kinds_of, velocities_of
@@ -72,9 +75,16 @@ class Original:
         return result
 
 
-def compiled(description: Description, **options: Any) -> Any:
+def compiled(description: Description, **options: Any) -> BoundModel:
     """A module of a description, by default of the target that needs no compiler."""
-    return Model.from_description(description).compile(**{"target": "numpy", **options})
+    return compiled_model(Builder.from_description(description), **options)
+
+
+def compiled_model(
+    model: Builder, method: str = "auto", independent: Sequence[str] | None = None, target: str = "numpy"
+) -> BoundModel:
+    """A module of a model, by default of the target that needs no compiler."""
+    return BoundModel(pipeline.compile_core(pipeline.derive(model, method, independent), target))
 
 
 def observe(
@@ -108,7 +118,7 @@ def reactions_of(module: Any, states: Array) -> Array | None:
     """Reactions (n_joints, 6, k), None where there are none."""
     if module.metadata.get("wrenches") is None:
         return None
-    return np.asarray(module.reactions(0.0, states))
+    return reactions(module, 0.0, states)
 
 
 def sample(module: Any, description: Description, length: float, random: Any, count: int) -> Array:

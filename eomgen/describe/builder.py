@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from ..graph.shown import shown
 from ..joints import JOINTS
 from . import FORCE_FIELDS
 from .build import build
@@ -19,7 +17,7 @@ from .model_forces import ForceMethods
 from .model_functions import FunctionMethods
 from .model_joints import JointMethods
 from .model_totals import TotalMethods
-from .sympy_face import name_of, symbol
+from .sympy_face import symbol
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -30,7 +28,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, FunctionMethods, TotalMethods):
+class Builder(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, FunctionMethods, TotalMethods):
     """A mechanism under description.
 
     Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
@@ -51,7 +49,7 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
     Examples
     --------
     >>> import sympy
-    >>> m = Model("pendulum", gravity=(0, -9.81, 0))
+    >>> m = Builder("pendulum", gravity=(0, -9.81, 0))
     >>> l = m.parameter("l", 0.5, unit="m")
     >>> bob = m.body("bob", mass=1, com=(0, -l, 0))
     >>> theta = m.revolute("hinge", m.ground, bob, coordinate="theta").coordinate
@@ -80,7 +78,7 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
             description.values["independent"] = Names(independent)
 
     @classmethod
-    def from_description(cls, description: Description) -> Model:
+    def from_description(cls, description: Description) -> Self:
         """A model around raw data, as the readers of model files make it."""
         model = cls.__new__(cls)
         model._start(description)
@@ -97,20 +95,13 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
         constraints: Sequence[Any] = (),
         parameters: Mapping[Any, Any] | None = None,
         inputs: Mapping[Any, Any] | None = None,
-    ) -> Model:
+    ) -> Self:
         """A model from a bare Lagrangian; see :func:`eomgen.describe.lagrangian.describe_lagrangian`."""
         from .lagrangian import describe_lagrangian
 
         return cls.from_description(
             describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
         )
-
-    @classmethod
-    def from_sympy(cls, method: Any, name: str = "system", **options: Any) -> Model:
-        """A model from equations that SymPy's mechanics formed; see :func:`eomgen.from_sympy`, with its arguments."""
-        from .sympy_method import describe_method
-
-        return cls.from_description(describe_method(method, name, **options))
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:
@@ -247,11 +238,6 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
 
     # -- settings -------------------------------------------------------------------------------------------------
     @property
-    def name(self) -> str:
-        """Name of the model."""
-        return shown(self._description.values.get("name", ""))
-
-    @property
     def initial(self) -> Any:
         """Initial values by coordinate or ``<coordinate>_dot``: ``m.initial(theta=0.3)``, ``m.initial["theta"]``."""
         return self._description.values["initial"]
@@ -289,11 +275,6 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
 
     # -- what comes next ------------------------------------------------------------------------------------------
     @property
-    def description(self) -> Description:
-        """The raw data, in the layout of the model file."""
-        return self._description
-
-    @property
     def notes(self) -> tuple[str, ...]:
         """What an import left out or changed, and what was only to be noted, one sentence each."""
         return tuple(self._description.notes)
@@ -316,40 +297,6 @@ class Model(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Function
             The model has faults; ``.problems`` lists all of them.
         """
         return build(self._description)
-
-    def check(self) -> Any:
-        """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
-        from .. import pipeline
-
-        return pipeline.check(self)
-
-    def derive(
-        self,
-        method: str = "auto",
-        independent: Sequence[Any] | None = None,
-        baumgarte: tuple[float, float] | None = None,
-    ) -> Any:
-        """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
-        from .. import pipeline
-
-        if independent is not None:
-            independent = [name_of(q) for q in ([independent] if isinstance(independent, str) else independent)]
-        return pipeline.derive(self, method, independent, baumgarte)
-
-    def compile(
-        self,
-        method: str = "auto",
-        target: str = "cython",
-        independent: Sequence[Any] | None = None,
-        baumgarte: tuple[float, float] | None = None,
-        **options: Any,
-    ) -> Any:
-        """Derive, generate and compile a module; see ``eomgen.pipeline.compile_equations``."""
-        from .. import pipeline
-
-        module = pipeline.compile_equations(self.derive(method, independent, baumgarte), target=target, **options)
-        module.description = deepcopy(self._description)  # the model may change later
-        return module
 
     def to_yaml(self) -> str:
         """The model as the text of a model file."""

@@ -1,0 +1,55 @@
+"""What a user holds: derived equations, to read, to count and to compile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from .. import pipeline
+from ..derivation import Derivation
+from .module import Module
+
+if TYPE_CHECKING:
+    from ..describe.builder import Builder
+
+
+class Equations(Derivation):  # noqa: D101
+    __doc__ = Derivation.__doc__
+
+    def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
+        """Generate code, compile it and load it.
+
+        Parameters
+        ----------
+        target : {'cython', 'numpy'}
+            ``numpy`` needs no compiler and is slower.
+        kernels : names of kernels, optional
+            Only these (see the README's table of calls); all by default, the rarer ones when they are first called.
+        **options
+            Fields of :class:`eomgen.compilation.Options`, such as ``optimize`` or ``native``.
+
+        Returns
+        -------
+        Module
+
+        Raises
+        ------
+        ModelError
+            A parameter has no value, or a coordinate has no inertia behind it.
+        ToolchainError
+            No compiler, or it failed.
+        """
+        module = Module(pipeline.compile_core(self, target, kernels, **options))
+        module.equations = self
+        return module
+
+
+def derive(
+    model: Builder,
+    method: str = "auto",
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+) -> Equations:
+    """Derive the equations of motion of a model; see :func:`eomgen.pipeline.derive`."""
+    d = pipeline.derive(model, method, independent, baumgarte)
+    return Equations(d.kinematics, d.mobility, d.tree, d.seconds, d.choice)

@@ -1,0 +1,114 @@
+"""What a user holds: a mechanism under description, which can be checked, derived and compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from typing import TYPE_CHECKING, Any
+
+from .. import pipeline
+from ..describe.builder import Builder
+from ..describe.sympy_face import name_of
+from .equations import Equations, derive
+
+if TYPE_CHECKING:
+    from ..kinematics.report import MechanismReport
+    from .module import Module
+
+
+class Model(Builder):  # noqa: D101
+    __doc__ = Builder.__doc__
+
+    @classmethod
+    def from_sympy(cls, method: Any, name: str = "system", **options: Any) -> Model:
+        """A model from equations that SymPy's mechanics formed; see :func:`eomgen.from_sympy`, with its arguments."""
+        from ..describe.sympy_method import describe_method
+
+        return cls.from_description(describe_method(method, name, **options))
+
+    def check(self) -> MechanismReport:
+        """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
+        return pipeline.check(self)
+
+    def derive(
+        self,
+        method: str = "auto",
+        independent: Sequence[Any] | None = None,
+        baumgarte: tuple[float, float] | None = None,
+    ) -> Equations:
+        """Derive the equations of motion; see ``eomgen.pipeline.derive``."""
+        if independent is not None:
+            independent = [name_of(q) for q in ([independent] if isinstance(independent, str) else independent)]
+        return derive(self, method, independent, baumgarte)
+
+    def compile(
+        self,
+        method: str = "auto",
+        target: str = "cython",
+        independent: Sequence[Any] | None = None,
+        baumgarte: tuple[float, float] | None = None,
+        **options: Any,
+    ) -> Module:
+        """Derive, generate and compile a module; see :meth:`~.equations.Equations.compile`."""
+        module = self.derive(method, independent, baumgarte).compile(target, **options)
+        module.description = deepcopy(self._description)  # the model may change later
+        return module
+
+
+def from_sympy(
+    method: Any,
+    name: str = "system",
+    parameters: Mapping[Any, Any] | None = None,
+    inputs: Mapping[Any, Any] | Sequence[Any] = (),
+    outputs: Mapping[str, Any] | None = None,
+    initial: Mapping[Any, Any] | None = None,
+    specified: Mapping[Any, Any] | None = None,
+    potential_energy: Any = None,
+    guess: Mapping[Any, Any] | None = None,
+) -> Model:
+    """A model from equations of motion that SymPy's mechanics has formed.
+
+    Coordinates, speeds, constants and inputs bear SymPy's names.  Configuration constraints and constraints of
+    velocities are kept as constraints, so that the module projects states, assembles initial values and takes any
+    independent coordinates; constraints of velocities that are derivatives of others are left out.  The multipliers of
+    the constraints become outputs ``lam1``, ``lam2``, ... in the order of the model's constraints, which is SymPy's:
+    M v' + C_q^T lam = f.  Noncontributing forces of auxiliary speeds become outputs too.
+
+    Parameters
+    ----------
+    method : KanesMethod, LagrangesMethod, System or JointsMethod
+        Of ``sympy.physics.mechanics``, with its equations formed.
+    name : str, optional
+        Identifier; the generated module bears it.
+    parameters : mapping, optional
+        Values of constants, by symbol or name.  Every constant becomes a parameter, those left out without a value.
+    inputs : mapping or sequence, optional
+        Symbols that are given over time, with the value that holds while none is given.  Functions of time that are
+        neither coordinates nor speeds are inputs anyway, their derivatives further ones (``f_dot`` of ``f``).
+    outputs : mapping of str to sympy.Expr, optional
+        Further named results, in anything the equations know and accelerations ``u'``.
+    initial : mapping, optional
+        Initial values of coordinates and speeds, by symbol or name.
+    specified : mapping, optional
+        Functions of time to replace by expressions in t: ``{f(t): a*sin(w*t)}``; derivatives follow.
+    potential_energy : sympy.Expr, optional
+        Potential energy (J), where SymPy's bodies do not have it.
+    guess : mapping, optional
+        Where assembly begins to look for coordinates that are not given, by symbol or name: it picks the branch.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    UsageError
+        Another object, or its equations are not formed yet.
+    ModelError
+        Names that clash or are not those of anything in the equations.
+    """
+    from ..describe.sympy_method import describe_method
+
+    return Model.from_description(
+        describe_method(method, name, parameters, inputs, outputs, initial, specified, potential_energy, guess)
+    )

@@ -1,0 +1,44 @@
+"""Model -> a package that stands alone, in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .emit import emit_package
+from .emit.write import write_package
+from .pipeline import build, derive
+from .verification.record import record
+from .verification.recorded import FILE
+
+if TYPE_CHECKING:
+    from .describe.builder import Builder
+
+
+@np.errstate(all="ignore")
+def generate(
+    model: Builder,
+    directory: Path | str,
+    method: str = "auto",
+    target: str = "cython",
+    independent: Sequence[str] | None = None,
+    baumgarte: tuple[float, float] | None = None,
+) -> Path:
+    """Write a package that stands alone into ``directory/<name>/`` and return that path.
+
+    Files of an earlier generation that are no longer needed are removed; those of others are left alone.
+
+    Raises
+    ------
+    EomgenError
+        The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
+    """
+    equations = derive(model, method, independent, baumgarte)
+    program = build(equations, target)
+    sources = dict(emit_package(program, target))
+    if target != "c":
+        sources[FILE] = record(program)
+    return write_package(sources, Path(directory) / equations.name)
