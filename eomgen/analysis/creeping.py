@@ -14,8 +14,9 @@ import numpy as np
 from ..limits.rounding import EPS
 from ..limits.statics import CLOSE
 from ..numeric import algebra
+from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .newton import CONTRACTS, LONGEST, largest
+from .newton import CONTRACTS, LONGEST
 
 if TYPE_CHECKING:
     from .search import Point, Search

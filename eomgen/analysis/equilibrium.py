@@ -15,6 +15,7 @@ from ..runtime.layout import number
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_numbers
+from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
 
@@ -90,7 +91,7 @@ def equilibrium(
             f"{rows} held coordinates need as many unknowns to be in balance, given: {', '.join(unknowns)}; without "
             "unknowns what is held is supported"
         )
-    point, steps = search.run(q)
+    point, steps = find_balance(search, q)
     return describe(search, point.module, point.q, point.unknowns, steps)
 
 

@@ -7,72 +7,25 @@ the equations matters then: a stiff spring stretched by the curvature of a step 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..limits.rounding import EPS, TINY
-from ..limits.statics import ARRIVED, CLOSE, SHORTEST
+from ..limits.rounding import TINY
+from ..limits.statics import ARRIVED, SHORTEST
 from ..numeric import algebra
+from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .rounding import BALANCED
+from .linear_step import Solver
 
 if TYPE_CHECKING:
     from .search import Point, Search
 
 STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
-RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 STIFFEST = 1e16  #: largest damping of a step
 POLISHED = 8  #: most steps after the correction has reached rounding
 CONTRACTS = 0.5  #: part of a correction that the next one may be
-
-
-class Linear(NamedTuple):
-    """Equations near an iterate: J by scaled variables, which move the tree and change unknowns."""
-
-    J: Array  #: (m, k)
-    moved: Array  #: (n_v, k) scaled displacements; the first n_z of length 1, at right angles
-    changed: Array  #: (j, k) changes of the unknowns
-    sizes: Array  #: (m,) of the terms in each row
-    noise: float  #: relative error of J
-    flow: Array | None  #: (n_v, n_z) how what drives the tree changes along them
-
-
-class Solver:
-    """Solutions of least norm with one J, rows divided by the sizes of their terms."""
-
-    def __init__(self, linear: Linear) -> None:
-        self.linear = linear
-        self.sizes = np.where(linear.sizes > 0.0, linear.sizes, 1.0)
-        self.J = linear.J / self.sizes[:, None]
-        self.U, values, self.V = algebra.svd(self.J, full_matrices=False)
-        self.kept = values > linear.noise
-        self.inverse = np.where(self.kept, 1.0 / np.where(self.kept, values, 1.0), 0.0)
-
-    def solve(self, residual: Array) -> Array:
-        """The correction."""
-        return np.asarray(-self.V.T @ (self.inverse * (self.U.T @ (residual / self.sizes))))
-
-    def shown(self, change: Array) -> Array:
-        """The correction as a scaled displacement of the tree and a change of scaled unknowns."""
-        return np.concatenate([self.linear.moved @ change, change[self.J.shape[1] - len(self.linear.changed) :]])
-
-    def arrived(self, residual: Array, change: Array, numbers: float) -> bool:
-        """Whether no correction and no residual is left but for rounding.
-
-        numbers: scaled size of what the position is made of.
-        """
-        rounding = BALANCED * numbers
-        left = residual / self.sizes + self.J @ change
-        answers = np.abs(self.V.T) @ (self.inverse[:, None] * np.abs(self.U.T))
-        limit = max(ARRIVED, min(CLOSE, rounding * float(answers.sum(axis=1).max(initial=0.0))))
-        return largest(self.shown(change)) <= limit and largest(left) <= rounding
-
-
-def largest(values: Array) -> float:
-    """Largest magnitude, 0 of none."""
-    return float(np.abs(values).max(initial=0.0))
 
 
 def newton(search: Search, point: Point, plain: bool = False, reach: float = np.inf) -> tuple[Point, int, bool]:

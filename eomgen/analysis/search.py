@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError, EquilibriumError, EvaluationError, PartitionError, UsageError
-from ..limits.statics import DIFFERENCES, MOVING
+from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
+from ..limits.statics import DIFFERENCES
 from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
-from .creeping import creep
-from .newton import RANK, Linear, marquardt, newton
+from .linear_step import RANK, Linear
 from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-
-REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
 
 
 class Point(NamedTuple):
@@ -191,63 +188,6 @@ class Search:
             return None
         finite = np.isfinite(there.here.a).all() and np.isfinite(there.here.tree).all()
         return there if finite else None
-
-    def run(self, q: Array) -> tuple[Point, int]:
-        """From a position: each way in turn until one leads to balance.
-
-        Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
-        leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
-        Marquardt find.
-
-        Raises
-        ------
-        EquilibriumError
-        """
-        start = self.at(q, self.initial_unknowns())
-        first, steps, found = newton(self, start, reach=REACH)
-        if found:
-            return first, steps
-        ways: list[Callable[[], tuple[Point, int, bool]]] = [
-            lambda: newton(self, start),
-            lambda: newton(self, start, plain=True),
-            lambda: marquardt(self, start),
-        ]
-        if not self.names:
-            ways.insert(0, lambda: creep(self, start))
-        ends = [start, first]
-        for way in ways:
-            point, more, found = way()
-            ends.append(point)
-            steps += more
-            if not found:
-                point, more, found = newton(self, point)
-                steps += more
-            if found:
-                return point, steps
-        raise self._failure(min(ends, key=lambda end: float(np.abs(self.residual(end.here, end.here)).max())))
-
-    def _failure(self, point: Point) -> EquilibriumError:
-        here, layout = point.here, self.layout
-        names = [layout.freedoms[k] for k in here.velocities]
-        left = dict(zip(names, here.forces.tolist(), strict=True))
-        where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
-        head = f"no equilibrium of {layout.name!r} found from this guess: "
-        rates = np.abs(here.v / layout.scales.q)[here.surplus]
-        if rates.size and rates.max() > MOVING:
-            worst = int(here.surplus[rates.argmax()])
-            return EquilibriumError(
-                f"{head}nonholonomic constraints move {layout.freedoms[worst]} at a rate of {here.v[worst]:.6g} even "
-                f"where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
-                "side vanish somewhere",
-                left,
-            )
-        scaled = np.abs(here.forces * layout.scales.q[here.velocities])
-        worst = int(scaled.argmax())
-        return EquilibriumError(
-            f"{head}the generalized force along {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
-            "another guess, or hold a coordinate that nothing balances",
-            left,
-        )
 
 
 def _orthonormal(Z: Array) -> tuple[Array, Array]:

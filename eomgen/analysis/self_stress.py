@@ -18,7 +18,7 @@ from ..limits.statics import SEEN
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .constrained import States
-from .reactions import GROUND, Geometry, along_free, free_of, shift, transmitted
+from .joint_wrenches import GROUND, Geometry, along_free, free_of, shift, transmitted
 
 
 def bases(table: dict[str, Any], geometry: Geometry, length: float) -> list[Array]:

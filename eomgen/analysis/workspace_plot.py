@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import UsageError
 from ..runtime.names import require
 
-if TYPE_CHECKING:
-    from .workspace import Workspace
-
 MARKS = {"stop": ("x", "tab:red"), "change point": ("^", "tab:orange"), "outputs": (".", "black")}
 
 
-def plot_workspace(ws: Workspace, by: str, ax: Any = None, figure: Any = None) -> Any:
+class Coloured(Protocol):
+    """What a :class:`~.workspace.Workspace` is drawn from."""
+
+    name: str
+    of: tuple[str, ...]
+    over: Any
+    units: Any
+    singularities: Any
+
+    @property
+    def reached(self) -> Any: ...
+
+    def __getitem__(self, name: str) -> Any: ...
+
+
+def plot_workspace(ws: Coloured, by: str, ax: Any = None, figure: Any = None) -> Any:
     """Draw a workspace; see :meth:`.workspace.Workspace.plot`."""
     colour = ws[by]
     if colour.dtype.kind not in "fb":
@@ -49,7 +61,7 @@ def plot_workspace(ws: Workspace, by: str, ax: Any = None, figure: Any = None) -
     return np.array(panels)
 
 
-def _draw(ws: Workspace, panel: Any, places: list[Any], colour: Any, cells: bool) -> Any:
+def _draw(ws: Coloured, panel: Any, places: list[Any], colour: Any, cells: bool) -> Any:
     """Points, or cells of the grid itself, in colour."""
     reached = ws.reached
     if cells:
@@ -61,7 +73,7 @@ def _draw(ws: Workspace, panel: Any, places: list[Any], colour: Any, cells: bool
     return panel.scatter(*flat, c=colour.ravel()[order].astype(float), s=size, linewidths=0)
 
 
-def _mark(ws: Workspace, panel: Any, names: tuple[str, ...]) -> None:
+def _mark(ws: Coloured, panel: Any, names: tuple[str, ...]) -> None:
     """Singular positions on the grid."""
     for kind, (marker, colour) in MARKS.items():
         same = [one for one in ws.singularities if one.kind == kind]

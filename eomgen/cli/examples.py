@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import difflib
 import re
-from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
@@ -16,22 +15,7 @@ from ..files.writing import write_whole
 from .failures import reports_failures
 from .options import json_option
 from .screen import print_json, print_table, say
-
-
-def example_files() -> dict[str, Traversable]:
-    """Every example by what to call it: a model file by its name alone, a Python script with its suffix."""
-    found = {}
-    for file in sorted(files("eomgen.examples").iterdir(), key=lambda f: f.name):
-        if file.name.endswith(".yaml"):
-            found[file.name.removesuffix(".yaml")] = file
-        elif file.name.endswith(".urdf") or (file.name.endswith(".py") and not file.name.startswith("_")):
-            found[file.name] = file
-    return found
-
-
-def example_names() -> list[str]:
-    """What the examples are called."""
-    return list(example_files())
+from .shipped import example_files
 
 
 def describe_example(file: Traversable) -> str:

@@ -239,7 +239,7 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
 def _missing(path: Path) -> str:
     if path.is_dir():
         return f"{path} is a folder; name a model file in it"
-    from .examples import example_names
+    from .shipped import example_names
 
     if path.stem in example_names():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..runtime.names import require
 from ..texts import visible
 
-if TYPE_CHECKING:
-    from .ensemble import Ensemble
+
+class Columns(Protocol):
+    """What an :class:`~.ensemble.Ensemble` is drawn from."""
+
+    t: Any
+    count: int
+    names: tuple[str, ...]
+    reduced: dict[str, Any]
+
+    def __getitem__(self, name: str) -> Any: ...
+
+    def unit(self, name: str) -> str: ...
 
 
-def draw(ensemble: Ensemble, name: str, ax: Any, limit: int) -> Any:
+def draw(ensemble: Columns, name: str, ax: Any, limit: int) -> Any:
     """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
     values = ensemble[name]
     if ax is None:

@@ -169,8 +169,8 @@ def simulate_many(
 
 
 def _run(
-    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]], missing: list[int],
-    threads: int, client: Any, watch: Callable[[float], None] | None,
+    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, parts: list[tuple[int, int]],
+    missing: list[int], threads: int, client: Any, watch: Callable[[float], None] | None,
 ) -> Iterator[tuple[int, Kept]]:  # fmt: skip
     if client is None:
         return run_local(module, cases, plan, reduction, parts, missing, threads, watch)

@@ -14,7 +14,8 @@ import numpy as np
 from ..errors import EvaluationError
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
-from ..kinematics.mobility import ConstraintFunctions, Mobility
+from ..kinematics.constraint_functions import ConstraintFunctions
+from ..kinematics.mobility import Mobility
 from ..limits.inertia import WORTH_A_WORD
 from ..limits.rounding import EPS, TINY
 from ..numeric import algebra

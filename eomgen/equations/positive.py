@@ -8,7 +8,8 @@ from ..describe.mechanism import Mechanism
 from ..errors import EvaluationError, ModelError, PartitionError, Problem
 from ..graph.evaluate import compile_evaluator
 from ..kinematics import Kinematics
-from ..kinematics.mobility import ConstraintFunctions, Mobility
+from ..kinematics.constraint_functions import ConstraintFunctions
+from ..kinematics.mobility import Mobility
 from ..limits.inertia import LEAST
 from ..limits.rounding import TINY
 from ..numeric import algebra

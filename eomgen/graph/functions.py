@@ -6,15 +6,12 @@ one argument, ``map(1,0)`` the derivative of ``map`` along its first.  The chain
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from ..errors import ModelError, Problem
 from ..numeric.functions import Curve, Orders, Surface, Twin
 from ..records import dataclass
-
-if TYPE_CHECKING:
-    from .core import Graph
 
 
 @dataclass(frozen=True)
@@ -99,9 +96,3 @@ class Function:
 def raised(orders: Orders, i: int) -> Orders:
     """The orders with one derivative more along argument i."""
     return (*orders[:i], orders[i] + 1, *orders[i + 1 :])
-
-
-def call_partials(g: Graph, node: tuple[Any, ...], active: Sequence[bool]) -> list[int]:
-    """Partial derivatives of a call with respect to its arguments (zero where not active)."""
-    function, orders = g.calls[node[0]]
-    return [g.call(function, raised(orders, i), node[1:]) if wanted else g.zero.id for i, wanted in enumerate(active)]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from .core import Graph
-from .functions import call_partials
+from .functions import raised
 
 #: Operations that take one of several branches; what a branch not taken does must not leak into the derivative.
 BRANCHING = frozenset({"select", "min", "max"})
@@ -75,7 +76,7 @@ def partials(g: Graph, i: int, active: Sequence[bool]) -> list[int]:
     node = g.nodes[i]
     operation, a = node[0], node[1]
     if operation in g.calls:
-        return call_partials(g, node, active)
+        return _call_partials(g, node, active)
     zero = g.zero.id
     slope = SLOPES.get(operation)
     if slope is not None:
@@ -104,3 +105,9 @@ def choice(g: Graph, i: int) -> tuple[int, int, int]:
         return node[1], node[2], node[3]
     a, b = node[1], node[2]
     return (g.make("le", a, b) if node[0] == "min" else g.make("le", b, a)), a, b
+
+
+def _call_partials(g: Graph, node: tuple[Any, ...], active: Sequence[bool]) -> list[int]:
+    """Partial derivatives of a call with respect to its arguments (zero where not active)."""
+    function, orders = g.calls[node[0]]
+    return [g.call(function, raised(orders, i), node[1:]) if wanted else g.zero.id for i, wanted in enumerate(active)]

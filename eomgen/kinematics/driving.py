@@ -19,7 +19,7 @@ from ..limits.constraints import CONTRADICTION
 from ..numeric import Assembly, rank
 
 if TYPE_CHECKING:
-    from .mobility import ConstraintFunctions
+    from .constraint_functions import ConstraintFunctions
 
 Array = NDArray[np.float64]
 FIRST = 1e-3  #: part of the span in the first step of a walk

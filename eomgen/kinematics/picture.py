@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from ..errors import MissingDependencyError, UsageError
 from ..files.writing import save_figure
-
-if TYPE_CHECKING:
-    from .report import MechanismReport
 
 TREE, CUT, ELEMENT, BODY = "#1f4e79", "#c0392b", "#7d5ba6", "#eaf1f8"
 WIDE, HIGH = 1.5, 1.35  #: inches for a body beside and above another
@@ -25,7 +22,26 @@ class Places(NamedTuple):
     layers: int
 
 
-def place(report: MechanismReport) -> Places:
+class Counted(Protocol):
+    """What a :class:`~.report.MechanismReport` is drawn from."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def tree(self) -> list[dict[str, str]]: ...
+    @property
+    def joints(self) -> list[dict[str, Any]]: ...
+    @property
+    def elements(self) -> list[dict[str, Any]]: ...
+    @property
+    def loop_joints(self) -> list[str]: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+    @property
+    def independent(self) -> list[str]: ...
+
+
+def place(report: Counted) -> Places:
     """Bodies in the layer of their distance to ground in the tree, each above the middle of what it carries."""
     carried: dict[str, list[str]] = {"ground": []}
     for branch in report.tree:
@@ -49,7 +65,7 @@ def place(report: MechanismReport) -> Places:
     return Places(found, max(columns, 1), layers)
 
 
-def draw(report: MechanismReport, file: str | Path | None = None, ax: Any = None) -> Any:
+def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any:
     """Draw it; see :meth:`.report.MechanismReport.draw`."""
     try:
         from matplotlib.figure import Figure
@@ -135,7 +151,7 @@ def _element(ax: Any, places: Places, element: dict[str, Any], index: int, font:
                 color=ELEMENT, zorder=5)  # fmt: skip
 
 
-def _finish(ax: Any, report: MechanismReport, middle: float, half: float, layers: int) -> None:
+def _finish(ax: Any, report: Counted, middle: float, half: float, layers: int) -> None:
     """Title, legend and limits."""
     freedoms = report.degrees_of_freedom
     words = f"{freedoms} degree{'' if freedoms == 1 else 's'} of freedom"

@@ -8,22 +8,21 @@ inertias of drives, equality constraints, and actuators on joints.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from ..errors import ModelError, UsageError
-from ..limits.files import LARGEST
+from ..errors import UsageError
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf
+from .mjcf_compiled import Compiled
 from .mjcf_constructs import find_mjcf
 from .mjcf_equalities import read_equalities
-from .mjcf_fields import FINITE, NOTED
-from .mjcf_files import Lines, Scan
+from .mjcf_fields import NOTED
+from .mjcf_files import Scan
 from .mjcf_text import Text
 from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
-from .robot import Joint, Link, Options, Place, Robot
+from .robot import Joint, Link, Options, Robot
 from .xml_text import Element
 
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
@@ -49,39 +48,8 @@ def read_mjcf(root: Element, options: Options) -> Robot:
     return robot
 
 
-class _Reader:
+class _Reader(Compiled):
     """Reads a compiled model into a Robot."""
-
-    def __init__(self, m: Any, root: Element, lines: Lines) -> None:
-        self.m, self.root, self.lines = m, root, lines
-        self.robot = Robot(root.attributes.get("model") or "robot", root.file)
-        self.names = {kind: [self.name(kind, k) for k in range(len(m.names[kind]))] for kind in ("body", "joint")}
-
-    def name(self, kind: str, k: int) -> str:
-        """The name of an element; one made from its kind and number if it has none."""
-        return self.m.names[kind][k] or f"{'equality' if kind == 'eq' else kind}{k}"
-
-    def off(self, *flags: str) -> bool:
-        """Whether the file disables one of these parts of the physics, by the words of mjtDisableBit."""
-        return any(self.m.opt.disableflags & self.m.flags.get(flag, 0) for flag in flags)
-
-    def _check(self) -> None:
-        """Refuse numbers that are not finite or far too large, which MuJoCo takes."""
-        for key, what in FINITE.items():
-            values = getattr(self.m.opt if key == "gravity" else self.m, key, 0.0)
-            if not (np.abs(values) <= LARGEST).all():
-                remedy = f"at most {LARGEST:g}, so that products stay finite"
-                problem = self.root.problem("mujoco", f"{what} ({key}) come out too large or not finite", remedy)
-                self.robot.problems.append(problem)
-        if self.robot.problems:
-            raise ModelError(self.robot.problems)
-
-    def place(self, name: str, *tags: str) -> Place:
-        """Where an element of a name is; the model's first line if it has none."""
-        for tag in tags:
-            if (tag, name) in self.lines:
-                return self.lines[tag, name]
-        return self.root.file, self.root.line
 
     def read(self) -> Robot:
         self._check()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from .robot import Drive, Place
 
 if TYPE_CHECKING:
-    from .mjcf import _Reader
+    from .mjcf_compiled import Compiled
 
 _JOINT, _JOINT_IN_PARENT, _TENDON = 0, 1, 3  # mjtTrn
 _FIXED_GAIN, _AFFINE_BIAS, _NO_BIAS = 0, 1, 0  # mjtGain, mjtBias
@@ -22,7 +22,7 @@ _WRAP_JOINT = 1  # mjtWrap
 Parts = tuple[tuple[str, float], ...]
 
 
-def read_actuators(reader: _Reader) -> None:
+def read_actuators(reader: Compiled) -> None:
     """Take in actuators, and what else springs, dampers and inertias along joints and fixed tendons add."""
     m, robot = reader.m, reader.robot
     left, idle, nothing = [], [], [0.0] * m.nu
@@ -52,7 +52,7 @@ def read_actuators(reader: _Reader) -> None:
     _tendons(reader)
 
 
-def _ranges(reader: _Reader, k: int) -> dict[str, Any]:
+def _ranges(reader: Compiled, k: int) -> dict[str, Any]:
     """What the control and the force of an actuator are cut to."""
     m = reader.m
     control, output = (getattr(m, key, range(m.nu))[k] for key in ("actuator_ctrladr", "actuator_outadr"))
@@ -68,7 +68,7 @@ def _ranges(reader: _Reader, k: int) -> dict[str, Any]:
     return found
 
 
-def _actuated(reader: _Reader, k: int) -> Parts:
+def _actuated(reader: Compiled, k: int) -> Parts:
     m = reader.m
     counts = [getattr(m, key, None) for key in ("actuator_ctrlnum", "actuator_outnum")]
     if any(count is not None and count[k] != 1 for count in counts):
@@ -82,7 +82,7 @@ def _actuated(reader: _Reader, k: int) -> Parts:
     return ()
 
 
-def _resist(reader: _Reader, what: str, parts: Parts, place: Place, damping: float, armature: float) -> None:
+def _resist(reader: Compiled, what: str, parts: Parts, place: Place, damping: float, armature: float) -> None:
     """Add a damper and a rotor along L = sum c_j q_j: of one joint c^2 of each is the joint's own."""
     robot = reader.robot
     damping = 0.0 if reader.off("DAMPER") else damping
@@ -102,7 +102,7 @@ def _resist(reader: _Reader, what: str, parts: Parts, place: Place, damping: flo
         robot.notes.append(f"left out: the armature of the {what}")
 
 
-def fixed_tendon(reader: _Reader, k: int) -> Parts:
+def fixed_tendon(reader: Compiled, k: int) -> Parts:
     """Joints and coefficients of a tendon whose length is a sum of joint coordinates."""
     m = reader.m
     wraps = range(m.tendon_adr[k], m.tendon_adr[k] + m.tendon_num[k])
@@ -111,7 +111,7 @@ def fixed_tendon(reader: _Reader, k: int) -> Parts:
     return tuple((reader.names["joint"][m.wrap_objid[w]], float(m.wrap_prm[w])) for w in wraps)
 
 
-def _tendons(reader: _Reader) -> None:
+def _tendons(reader: Compiled) -> None:
     m, robot = reader.m, reader.robot
     left = []
     for k in range(m.ntendon):

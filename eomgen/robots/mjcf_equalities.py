@@ -15,13 +15,13 @@ from .robot import Loop
 from .ties import Sum, Tie
 
 if TYPE_CHECKING:
-    from .mjcf import _Reader
+    from .mjcf_compiled import Compiled
 
 CONNECT, WELD, JOINT, TENDON = 0, 1, 2, 3  # mjtEq
 _BODY, _SITE = 1, 6  # mjtObj
 
 
-def read_equalities(reader: _Reader) -> None:
+def read_equalities(reader: Compiled) -> None:
     """Take in the equality constraints that are active."""
     m, robot = reader.m, reader.robot
     for k in range(m.neq):
@@ -38,7 +38,7 @@ def read_equalities(reader: _Reader) -> None:
             robot.notes.append(f"left out: the equality {name}, which has no counterpart")
 
 
-def _loop(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Loop:
+def _loop(reader: Compiled, k: int, name: str, place: tuple[str, int]) -> Loop:
     m, bodies, data = reader.m, reader.names["body"], reader.m.eq_data[k]
     kind = "spherical" if m.eq_type[k] == CONNECT else "weld"
     ids = m.eq_obj1id[k], m.eq_obj2id[k]
@@ -56,7 +56,7 @@ def _loop(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Loop:
     return Loop(name, kind, (links[0], frames[0]), (links[1], frames[1]), place)
 
 
-def _tie(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Tie | None:
+def _tie(reader: Compiled, k: int, name: str, place: tuple[str, int]) -> Tie | None:
     """y - y(0) = c0 + c1 (x - x(0)) + ... + c4 (x - x(0))^4 of joint coordinates, or of lengths of fixed tendons."""
     m = reader.m
     summed = _joint if m.eq_type[k] == JOINT else _tendon
@@ -67,12 +67,12 @@ def _tie(reader: _Reader, k: int, name: str, place: tuple[str, int]) -> Tie | No
     return Tie(name, left, right, tuple(float(c) for c in m.eq_data[k][: 5 if right.parts else 1]), place)
 
 
-def _joint(reader: _Reader, j: int) -> Sum | None:
+def _joint(reader: Compiled, j: int) -> Sum | None:
     if reader.m.jnt_type[j] < 2:
         return None
     return Sum(((reader.names["joint"][j], 1.0),), -float(reader.m.qpos0[reader.m.jnt_qposadr[j]]))
 
 
-def _tendon(reader: _Reader, k: int) -> Sum | None:
+def _tendon(reader: Compiled, k: int) -> Sum | None:
     parts = fixed_tendon(reader, k)
     return Sum(parts, -float(reader.m.tendon_length0[k])) if parts else None

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from .numpy_core import NumpyCore
     from .protocols import Core
     from .signals import Signal
-    from .storage import load_trajectory
-    from .trajectory import Trajectory
+    from .trajectory import Trajectory, load_trajectory
 
 _HOMES = {
     "BoundModel": "bound_model",
@@ -24,7 +23,7 @@ _HOMES = {
     "NumpyCore": "numpy_core",
     "Signal": "signals",
     "Trajectory": "trajectory",
-    "load_trajectory": "storage",
+    "load_trajectory": "trajectory",
 }
 
 __all__ = ["BoundModel", "Core", "Minimal", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]

@@ -12,7 +12,7 @@ from functools import partial
 from importlib import import_module, machinery, util
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import ToolchainError, UsageError
 from ..files.entry import MANIFEST, read_entry
@@ -21,14 +21,11 @@ from ..files.source import find_module, load_source
 from ..numeric.scales import Array
 from .late import LateCore, eager
 
-if TYPE_CHECKING:
-    from .bound_model import BoundModel
-
 #: Names of all kernels of a module that makes some of them late, and the name and file of the code of those.
 Late = tuple[tuple[str, ...], tuple[str, str] | None]
 
 
-def reduce(module: BoundModel) -> tuple[Callable[..., BoundModel], tuple[Any, ...]]:
+def reduce(module: Any) -> tuple[Callable[..., Any], tuple[Any, ...]]:
     """What pickle stores: how to make the module again.
 
     Raises
@@ -50,7 +47,7 @@ def reduce(module: BoundModel) -> tuple[Callable[..., BoundModel], tuple[Any, ..
     return restore, (type(module), name, str(file), module.p, module.u, late)
 
 
-def restore(kind: type[BoundModel], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> BoundModel:
+def restore(kind: type[Any], name: str, file: str, p: Array, u: Array, late: Late | None = None) -> Any:
     """The module of a pickle, with the rarer kernels where they had been made.
 
     Raises

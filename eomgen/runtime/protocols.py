@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .layout import Layout
 
 
 class Timed(Protocol):
@@ -52,6 +55,47 @@ class Motion(Protocol):
         out: Array | None = None,
         t: ArrayLike = 0.0,
     ) -> Array: ...
+
+
+class Columns(Protocol):
+    """A trajectory as what draws and writes it sees it; see :class:`~.trajectory.Trajectory`."""
+
+    t: Array
+    x: Array
+    metadata: dict[str, Any]
+    t_events: Any
+    x_events: Any
+
+    def __getitem__(self, name: str) -> Array: ...
+
+    def to_numpy(self) -> Array: ...
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+
+    @property
+    def units(self) -> dict[str, str]: ...
+
+    @property
+    def has_energies(self) -> bool: ...
+
+    @property
+    def energies(self) -> Array: ...
+
+
+class Driven(Protocol):
+    """The inputs of a run, as what judges their rates sees them; see :class:`~.signals.Forcing`."""
+
+    layout: Layout
+    base: Array
+    values: dict[str, Any]
+    derived: dict[str, tuple[str, int, Any]]
+    unsettled: frozenset[str]
+    span: tuple[float, float] | None
+    parameters: Any
+
+    @property
+    def constants(self) -> dict[str, float]: ...
 
 
 class Core(Protocol):

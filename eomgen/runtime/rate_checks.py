@@ -16,7 +16,7 @@ from .signal_rates import TableRate, find_jump
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .signals import Forcing
+    from .protocols import Driven
 
 OfTime = Callable[[float], float]
 NONE = np.empty(0)  #: no state
@@ -24,7 +24,7 @@ BLOCKS, CELLS = 16, 16  #: a run is compared on so many parts, each of so many i
 BESIDE = DIFFERENCE  #: part of a run over which an input and its rate are compared beside one time
 
 
-def require_agreement(forcing: Forcing, start: float, end: float) -> None:
+def require_agreement(forcing: Driven, start: float, end: float) -> None:
     """Refuse rates that are not those of the inputs beside which they are given, and rates bound of held inputs.
 
     What depends on the state is not compared: how it changes is known along the motion only.
@@ -66,7 +66,7 @@ def require_agreement(forcing: Forcing, start: float, end: float) -> None:
                     )
 
 
-def _of_time(forcing: Forcing, name: str) -> OfTime | None:
+def _of_time(forcing: Driven, name: str) -> OfTime | None:
     """An input as a function of time; None if it reads the state."""
     value: Any = forcing.values[name]
     if isinstance(value, float):

@@ -20,7 +20,7 @@ from .layout import Layout, number
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .signals import Forcing
+    from .protocols import Driven
 
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
 
@@ -128,7 +128,7 @@ def jumps(times: Array, pieces: Array, values: Array, order: int) -> Array:
     return np.asarray(times[np.abs(right - left) > CONTINUOUS * size])
 
 
-def require_smooth(forcing: Forcing, start: float, end: float) -> None:
+def require_smooth(forcing: Driven, start: float, end: float) -> None:
     """Refuse tables that jump where their rates are needed, and texts that do not change as their rates say.
 
     Raises

@@ -11,10 +11,9 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
-from .arrays import BROKEN, read_arrays
 
 if TYPE_CHECKING:
-    from .trajectory import Trajectory
+    from .protocols import Columns
 
 FORMAT = "eomgen trajectory 1"
 
@@ -60,7 +59,7 @@ def table_path(path: str | Path, what: str) -> Path:
     return target
 
 
-def save(trajectory: Trajectory, path: str | Path) -> Path:
+def save(trajectory: Columns, path: str | Path) -> Path:
     """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
     target = table_path(path, "a trajectory is")
     names = trajectory.names
@@ -87,53 +86,6 @@ def save(trajectory: Trajectory, path: str | Path) -> Path:
     return target
 
 
-def load_trajectory(path: str | Path) -> Trajectory:
-    """Read a trajectory that :meth:`Trajectory.save` wrote to an .npz file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Trajectory
-        With all columns and ``metadata``; without dense output.
-
-    Raises
-    ------
-    UsageError
-        The file holds something else.
-    FileNotFoundError
-    """
-    from .trajectory import Residuals, Trajectory
-
-    source = Path(path)
-    if not source.suffix and not source.exists():
-        source = source.with_suffix(".npz")
-    try:
-        arrays = read_arrays(source)
-        header = json.loads(str(arrays["header"]))
-        if header.pop("format") != FORMAT:
-            raise ValueError("another format")
-        names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
-        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
-            raise ValueError("columns that do not fit each other")
-        Residuals(**header["residuals"])
-    except FileNotFoundError:
-        raise
-    except (*BROKEN, RecursionError) as error:
-        raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
-    count = sum(key.startswith("t_events_") for key in arrays)
-    return Trajectory(
-        arrays["t"],
-        arrays["x"],
-        Stored(names, arrays["columns"], arrays.get("energies")),
-        header,
-        [arrays[f"t_events_{k}"] for k in range(count)],
-        [arrays[f"x_events_{k}"] for k in range(count)],
-    )
-
-
-def _head(trajectory: Trajectory, name: str) -> str:
+def _head(trajectory: Columns, name: str) -> str:
     unit = trajectory.units.get(name, "")
     return f"{name} [{unit}]" if unit else name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .arrays import BROKEN, read_arrays
 from .events import Named
 from .names import require, unknown
 from .room import read_numbers
+from .storage import FORMAT, Stored, save
 
 if TYPE_CHECKING:
     import pandas
@@ -132,8 +135,6 @@ class Trajectory:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
-        from .storage import Stored
-
         columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
@@ -232,8 +233,6 @@ class Trajectory:
         Path
             The file written.
         """
-        from .storage import save
-
         return save(self, path)
 
     def plot(self, *names: str, ax: Any = None) -> Any:
@@ -258,3 +257,48 @@ class Trajectory:
         from .plotting import plot
 
         return plot(self, names or tuple(self.metadata["q_names"]), ax)
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """Read a trajectory that :meth:`Trajectory.save` wrote to an .npz file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Trajectory
+        With all columns and ``metadata``; without dense output.
+
+    Raises
+    ------
+    UsageError
+        The file holds something else.
+    FileNotFoundError
+    """
+    source = Path(path)
+    if not source.suffix and not source.exists():
+        source = source.with_suffix(".npz")
+    try:
+        arrays = read_arrays(source)
+        header = json.loads(str(arrays["header"]))
+        if header.pop("format") != FORMAT:
+            raise ValueError("another format")
+        names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
+        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
+            raise ValueError("columns that do not fit each other")
+        Residuals(**header["residuals"])
+    except FileNotFoundError:
+        raise
+    except (*BROKEN, RecursionError) as error:
+        raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
+    count = sum(key.startswith("t_events_") for key in arrays)
+    return Trajectory(
+        arrays["t"],
+        arrays["x"],
+        Stored(names, arrays["columns"], arrays.get("energies")),
+        header,
+        [arrays[f"t_events_{k}"] for k in range(count)],
+        [arrays[f"x_events_{k}"] for k in range(count)],
+    )

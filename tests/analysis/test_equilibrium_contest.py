@@ -15,7 +15,7 @@ import eomgen as eg
 from benchmarks.equilibria import PEERS, Balance, judge
 from benchmarks.rest_models import FAMILIES
 from eomgen.analysis import search
-from eomgen.cli.examples import example_files
+from eomgen.cli.shipped import example_files
 
 
 def elastic_pendulum() -> Any:

@@ -142,7 +142,7 @@ def test_virtual_work_of_constraints_body_by_body(name: str, compiled: Callable[
     module = compiled(name)
     states = np.array(judges.random_states(module, 4, 3, position=0.05)).T
     from eomgen.analysis.constrained import prepare
-    from eomgen.analysis.reactions import joint_table, place
+    from eomgen.analysis.joint_wrenches import joint_table, place
     from eomgen.analysis.self_stress import element_wrenches
 
     prepared = prepare(module, 0.0, states)

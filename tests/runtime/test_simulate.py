@@ -333,7 +333,8 @@ def test_progress_goes_to_stderr_only_when_asked(pendulum, capsys):
 def test_without_scipy_the_message_says_what_to_install(models):
     code = (
         "import sys; sys.modules['scipy'] = None; sys.modules['scipy.integrate'] = None\n"
-        "import importlib.util; from eomgen.api.module import Module; from eomgen.runtime import NumpyCore; from eomgen.errors import *\n"
+        "import importlib.util; from eomgen.api.module import Module\n"
+        "from eomgen.runtime import NumpyCore; from eomgen.errors import *\n"
         f"spec = importlib.util.spec_from_file_location('hand', {models.__file__!r})\n"
         "hand = importlib.util.module_from_spec(spec); spec.loader.exec_module(hand)\n"
         "m = Module(NumpyCore(hand.crank_metadata(), hand.crank_blocks())); m.x0(); m.kinematics([1.0])\n"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import EomgenError, ModelError
-from ...kinematics.flaws import IDLE
+from ...kinematics.idle_rows import IDLE
 from ...limits.rounding import EPS
 from ..comparison import NO_LIMIT
 from ..finding import Finding

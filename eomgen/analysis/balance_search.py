@@ -1,0 +1,75 @@
+"""Analysis: a position and what is held -> the way that leads to balance, each in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import EquilibriumError
+from ..limits.statics import MOVING
+from ..numeric.scales import Array
+from .creeping import creep
+from .newton import marquardt, newton
+from .search import Point, Search
+
+REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
+
+
+def find_balance(search: Search, q: Array) -> tuple[Point, int]:
+    """From a position: each way in turn until one leads to balance.
+
+    Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
+    leads to a stable equilibrium; the others find what is far, what plain Newton finds, and what Levenberg and
+    Marquardt find.
+
+    Raises
+    ------
+    EquilibriumError
+    """
+    start = search.at(q, search.initial_unknowns())
+    first, steps, found = newton(search, start, reach=REACH)
+    if found:
+        return first, steps
+    ways: list[Callable[[], tuple[Point, int, bool]]] = [
+        lambda: newton(search, start),
+        lambda: newton(search, start, plain=True),
+        lambda: marquardt(search, start),
+    ]
+    if not search.names:
+        ways.insert(0, lambda: creep(search, start))
+    ends = [start, first]
+    for way in ways:
+        point, more, found = way()
+        ends.append(point)
+        steps += more
+        if not found:
+            point, more, found = newton(search, point)
+            steps += more
+        if found:
+            return point, steps
+    raise _failure(search, min(ends, key=lambda end: float(np.abs(search.residual(end.here, end.here)).max())))
+
+
+def _failure(search: Search, point: Point) -> EquilibriumError:
+    here, layout = point.here, search.layout
+    names = [layout.freedoms[k] for k in here.velocities]
+    left = dict(zip(names, here.forces.tolist(), strict=True))
+    where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
+    head = f"no equilibrium of {layout.name!r} found from this guess: "
+    rates = np.abs(here.v / layout.scales.q)[here.surplus]
+    if rates.size and rates.max() > MOVING:
+        worst = int(here.surplus[rates.argmax()])
+        return EquilibriumError(
+            f"{head}nonholonomic constraints move {layout.freedoms[worst]} at a rate of {here.v[worst]:.6g} even "
+            f"where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
+            "side vanish somewhere",
+            left,
+        )
+    scaled = np.abs(here.forces * layout.scales.q[here.velocities])
+    worst = int(scaled.argmax())
+    return EquilibriumError(
+        f"{head}the generalized force along {names[worst]} is still {here.forces[worst]:.6g} at {where}; give "
+        "another guess, or hold a coordinate that nothing balances",
+        left,
+    )

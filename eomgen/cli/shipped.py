@@ -1,0 +1,22 @@
+"""Stage cli: the models shipped with eomgen, by name."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+
+def example_files() -> dict[str, Traversable]:
+    """Every example by what to call it: a model file by its name alone, a Python script with its suffix."""
+    found = {}
+    for file in sorted(files("eomgen.examples").iterdir(), key=lambda f: f.name):
+        if file.name.endswith(".yaml"):
+            found[file.name.removesuffix(".yaml")] = file
+        elif file.name.endswith(".urdf") or (file.name.endswith(".py") and not file.name.startswith("_")):
+            found[file.name] = file
+    return found
+
+
+def example_names() -> list[str]:
+    """What the examples are called."""
+    return list(example_files())

@@ -1,0 +1,77 @@
+"""Stage kinematics: constraints that hold nothing, or are not finite at a position -> errors that name them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..constraints import RollingDisc
+from ..constraints.rolling import LYING
+from ..errors import AssemblyError, ModelError
+from ..graph.rounding import vanishing
+from ..graph.substitute import substitute, symbols_of
+from .constraint_functions import Array, ConstraintFunctions
+from .flaws import place_of
+from .kinematics import Kinematics
+
+IDLE = "holds nothing"  #: what is said of rows without slopes
+
+
+def require_finite(functions: ConstraintFunctions, q: Array) -> None:
+    """Refuse a position at which a constraint or its slope is not a number, or so large that its square is none.
+
+    Raises
+    ------
+    AssemblyError
+        Names the rows.
+    """
+    if not functions.m:
+        return
+    C, J = functions.position(q)
+    with np.errstate(over="ignore", invalid="ignore"):  # rows whose squares overflow have no length, and no rank
+        finite = np.isfinite(np.column_stack([J**2, [*C, *[0.0] * (len(J) - len(C))]])).all(axis=1)
+    if finite.all():
+        return
+    k = functions.kinematics
+    bad = [k.constraints.labels[functions.rows[i]] for i in np.flatnonzero(~finite)]
+    discs = {c.name for c in k.mechanism.constraints if isinstance(c, RollingDisc)}
+    place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
+    what = f"{', '.join(bad)}: not finite at the initial configuration {place}"
+    if all(label.partition(".")[0] in discs for label in bad):
+        raise AssemblyError(f"{what}: {LYING}; tilt it in initial or guess", bad)
+    raise AssemblyError(f"{what}; give another one in initial or guess", bad)
+
+
+def refuse_idle_rows(kinematics: Kinematics, numbers: Mapping[str, float]) -> None:
+    """Refuse constraints of which no slope is found at any position, where they are all there is.
+
+    Such are a relation whose factors cancel, one that nothing proves to be an identity, and one that is a square.  Rows
+    of joints whose slopes vanish identically with the given parameters are no fault: a body may be held twice.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+    numbers : mapping of str to float
+        Values of the parameters.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints and the parameters whose values cancel.
+    """
+    c, graph = kinematics.constraints, kinematics.graph
+    known = {graph.symbol(name): graph.constant(numbers[name]) for name in kinematics.parameter_names}
+    problems = []
+    for label, row, written in zip(c.labels, c.jacobian, c.written, strict=True):
+        slopes = [x for x in row if not x.is_zero]
+        if (written and slopes) or not all(vanishing(substitute(slopes, known))):
+            used = sorted(symbols_of(slopes) & set(kinematics.parameter_names))
+            what = f"{label} {IDLE} at all positions that were tried: its slopes are 0"
+            remedy = "take it away"
+            if used:
+                what = f"{label} {IDLE} with the declared {', '.join(used)}: its factors are 0 or cancel"
+                remedy = "declare values with which it acts, as freedoms are judged at these, or take it away"
+            problems.append(kinematics.mechanism.problem(place_of(kinematics.mechanism, label), what, remedy))
+    if problems:
+        raise ModelError(problems)
