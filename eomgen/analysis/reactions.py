@@ -15,14 +15,13 @@ from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
 from .constrained import States, evaluate, prepare, solve_multipliers
-from .joint_wrenches import along_free, free_of, joint_table, on_successor, place, shift, transmitted
+from .joint_wrenches import GROUND, along_free, free_of, joint_table, on_successor, place, shift, transmitted
 from .self_stress import remove_self_stress
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 CHUNK = 4_000_000  #: numbers held at once
-GROUND = -1
 
 
 def find_reactions(

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
 from ..joints import JOINTS
-from . import FORCE_FIELDS
 from .build import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
+from .fields import FORCE as FORCE_FIELDS
 from .fields_constraints import CONSTRAINT
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods

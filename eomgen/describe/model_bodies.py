@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from .described import Described
 from .handles import BodyHandle
-
-if TYPE_CHECKING:
-    from .described import Described
 
 
 class BodyMethods(Described):
