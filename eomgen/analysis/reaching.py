@@ -54,7 +54,6 @@ class MotionRange(NamedTuple):
         return self.stops == (None, None)
 
 
-@np.errstate(all="ignore")
 def motion_range(
     module: BoundModel,
     name: str,
@@ -92,7 +91,17 @@ def motion_range(
     require_velocities(module.layout)
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
+    with np.errstate(all="ignore"):
+        return _walk_both_ways(module, name, initial, t, within)
 
+
+def _walk_both_ways(
+    module: BoundModel,
+    name: str,
+    initial: Mapping[str, float] | ArrayLike | None,
+    t: float,
+    within: tuple[float, float] | None,
+) -> MotionRange:
     layout = module.layout
     if layout.n_h < layout.n_c:
         layout.require_minimal_form()

@@ -242,7 +242,6 @@ def _measures(J: Array) -> tuple[Array, Array, Array, Array]:
     return smallest, largest, product, quotient
 
 
-@np.errstate(all="ignore")
 def workspace(
     module: BoundModel,
     over: Mapping[str, Any],
@@ -294,9 +293,10 @@ def workspace(
     require_velocities(module.layout)
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
-    grid = read_grid(module, over, of, limits, points)
-    stage = Stage(module, grid, initial, t)
-    reader = Reader(stage)
-    reader.require_positions(stage.q, stage.t)
-    filled = flood(stage)
-    return Workspace(module, grid, filled, judge(stage, reader, filled))
+    with np.errstate(all="ignore"):
+        grid = read_grid(module, over, of, limits, points)
+        stage = Stage(module, grid, initial, t)
+        reader = Reader(stage)
+        reader.require_positions(stage.q, stage.t)
+        filled = flood(stage)
+        return Workspace(module, grid, filled, judge(stage, reader, filled))

@@ -11,9 +11,30 @@ from ..runtime.bound_model import BoundModel
 from ..runtime.refusals import require_velocities
 
 if TYPE_CHECKING:
+    from ..analysis.consistent import consistent as _consistent
+    from ..analysis.constrained import multipliers as _multipliers
+    from ..analysis.drive import actuator_forces as _actuator_forces
+    from ..analysis.equilibrium import equilibrium as _equilibrium
+    from ..analysis.impact import impact as _impact
+    from ..analysis.impact_run import simulate_impacts as _simulate_impacts
+    from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
+    from ..analysis.linear import linearise as _linearise
+    from ..analysis.modes import modes as _modes
+    from ..analysis.reaching import motion_range as _motion_range
+    from ..analysis.reactions import driving_forces as _driving_forces
+    from ..analysis.reactions import reactions as _reactions
+    from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
+    from ..analysis.sensitivities import sensitivities as _sensitivities
+    from ..analysis.workspace import workspace as _workspace
+    from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..runtime.canonical import Canonical
     from ..runtime.dae_solution import Dae
+    from ..runtime.integrator import integrator as _integrator
     from ..runtime.minimal import Minimal
+    from ..runtime.report import report as _report
+    from ..runtime.simulate import simulate as _simulate
+    from ..runtime.steppers import step as _step
+    from ..verification.verify import verify as _verify
 
 #: Method -> where the function is, whose first argument is the model; method and function are of one name.
 CALLS = {
@@ -55,6 +76,29 @@ class Call:
 
 class Module(BoundModel):  # noqa: D101
     __doc__ = BoundModel.__doc__
+
+    if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
+        simulate = _simulate
+        simulate_many = _simulate_many
+        integrator = _integrator
+        step = _step
+        verify = _verify
+        linearise = _linearise
+        modes = _modes
+        equilibrium = _equilibrium
+        sensitivities = _sensitivities
+        multipliers = _multipliers
+        reactions = _reactions
+        undetermined_reactions = _undetermined_reactions
+        driving_forces = _driving_forces
+        actuator_forces = _actuator_forces
+        impact = _impact
+        simulate_impacts = _simulate_impacts
+        consistent = _consistent
+        kinematic_analysis = _kinematic_analysis
+        motion_range = _motion_range
+        workspace = _workspace
+        report = _report
 
     @cached_property
     def minimal(self) -> Minimal:

@@ -112,7 +112,7 @@ def run(
     require_folder("--out", out)
     require_folder("--plot", plot)
     require_folder("--checkpoint", checkpoint)
-    kept = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
+    kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
     kept = {key: value for key, value in kept.items() if value is not None}
     if kept and checkpoint is None:
         raise UsageError("--checkpoint-every and --resume belong to --checkpoint FILE")

@@ -59,7 +59,7 @@ def line(module: BoundModel) -> str:
     return f"<Module {module.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{listed(module.x_names)}]>"
 
 
-def text(module: BoundModel) -> str:
+def report(module: BoundModel) -> str:
     """Several lines of plain text."""
     lines = facts(module)
     width = max(len(label) for label, _ in lines)
