@@ -116,7 +116,7 @@ def integrate_dae(
         require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
     run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
-    warn_of_unknown([event.name for event in run.listed if not event.known])
+    warn_of_unknown([event.name for event in run.listed if not event.known], 2)
     solution = run.solution()
     require_end(solution, end)
     return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)

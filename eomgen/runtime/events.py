@@ -253,7 +253,7 @@ def _times(name: str, given: Any) -> int:
     )
 
 
-def warn_of_unknown(names: Sequence[str], depth: int = 2) -> None:
+def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
     """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
     if names:
         warnings.warn(

@@ -136,6 +136,7 @@ class Refuse:
         if name.partition(".")[0] in ("sympy", "scipy", "matplotlib", "pandas", "jinja2"):
             raise ImportError(name + " is refused here")
 sys.meta_path.insert(0, Refuse())
+from eomgen import load
 from eomgen.errors import ModelError
 m = load(sys.argv[1])
 print(m.mechanism().name, m.joints["A"].coordinate_names, len(m.to_yaml()) > 100)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
+from eomgen.api.module import Module
 from eomgen.errors import ToolchainError
 from eomgen.runtime import pickling
 from eomgen.runtime.late import eager
@@ -60,7 +61,7 @@ def test_rarer_kernels_go_along_once_they_are_made() -> None:
 
 def test_a_module_whose_code_has_gone_says_so(tmp_path: Path) -> None:
     with pytest.raises(ToolchainError, match=r"gone: .*_core\.py; compile the model again"):
-        pickling.restore(eg.runtime.Module, "eomgen._gone", str(tmp_path / "_core.py"), np.zeros(1), np.zeros(1))
+        pickling.restore(Module, "eomgen._gone", str(tmp_path / "_core.py"), np.zeros(1), np.zeros(1))
 
 
 def test_a_module_made_by_hand_says_why_it_cannot(pendulum) -> None:
