@@ -17,7 +17,7 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.room import read_numbers, require_room
+from ..runtime.room import read_number, read_numbers, require_room, shown
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -86,15 +86,10 @@ def read_range(module: Module, t: ArrayLike | None, named: Mapping[str, Any]) ->
 
 
 def _column(name: str, value: Any) -> Array:
-    try:
-        if np.iscomplexobj(value):
-            raise TypeError
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None
+    array = read_numbers(name, value)
     require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
-        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
+        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
     return array
 
 
@@ -149,7 +144,7 @@ def start_from(module: Module, initial: Mapping[str, float] | ArrayLike | None, 
             return t0, Initial(module.kernels, t0).assembled({})
     here = Initial(module.kernels, t0)
     if isinstance(initial, Mapping):
-        given = here.sort({name: float(value) for name, value in initial.items()})
+        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
         if given.rates:
             raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)

@@ -14,6 +14,7 @@ from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
+from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
@@ -252,7 +253,7 @@ def find_workspace(
 ) -> Workspace:
     """See :meth:`~..runtime.kinematic_analyses.KinematicAnalyses.workspace`."""
     grid = read_grid(module, over, of, limits, points)
-    stage = Stage(module, grid, initial, t)
+    stage = Stage(module, grid, initial, read_number("t", t))
     reader = Reader(stage)
     reader.require_positions(stage.q, stage.t)
     filled = flood(stage)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
-from ..runtime.room import require_room
+from ..runtime.room import read_count, read_numbers, require_room
 from ..runtime.simulate import find_state
 
 if TYPE_CHECKING:
@@ -97,7 +97,9 @@ def collect_cases(
     UsageError
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
-    lengths: dict[str, int] = {} if count is None else {"count": _count(count)}
+    lengths: dict[str, int] = (
+        {} if count is None else {"count": read_count("count must be a whole number of runs", count)}
+    )
     p = _bound("parameter", module.p_names, module.p, parameters, lengths)
     u = _bound("input", module.u_names, module.u, inputs, lengths)
     states, values = None, {}
@@ -209,12 +211,6 @@ def _bound(what: str, names: tuple[str, ...], base: Array, given: Any, lengths: 
     return result
 
 
-def _count(given: Any) -> int:
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
-        raise UsageError(f"count must be a whole number of runs, not {given!r}")
-    return int(given)
-
-
 def _require_one_length(lengths: Mapping[str, int]) -> None:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
@@ -241,10 +237,7 @@ def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
 
 
 def _floats(what: str, given: Any) -> Array:
-    try:
-        array = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{what} must be numbers, not {given!r}") from None
+    array = np.array(read_numbers(what, given))
     if not np.isfinite(array).all():
         first = np.argwhere(~np.isfinite(array))[0].tolist()
         raise UsageError(f"{what} must be finite; entry {first} is {array[tuple(first)]}")

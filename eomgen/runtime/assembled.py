@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
-from .layout import Layout, number
-from .room import read_numbers
+from .layout import Layout
+from .names import require_mapping
+from .room import read_number, read_numbers
 
 if TYPE_CHECKING:
     from .initial import Initial
@@ -59,8 +60,6 @@ class Assembled:
         UsageError
             An unknown name.
         """
-        if values is not None and not isinstance(values, Mapping):
-            raise UsageError(f"x0 takes values by name, as in x0({self.x_names[0]}=0.3), not {values!r}")
         initial = self._initial(t, p, u)
         given = initial.sort(_numbers(values, named))
         q = initial.assembled(given.positions)
@@ -157,5 +156,7 @@ class Assembled:
 
 
 def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:
+    if values is not None:
+        require_mapping("initial values", values)
     merged = {**(values or {}), **named}
-    return {name: number(name, value) for name, value in merged.items()}
+    return {name: read_number(name, value) for name, value in merged.items()}

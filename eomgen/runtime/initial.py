@@ -28,6 +28,7 @@ from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
 from .names import UnknownNameError, unknown
+from .room import read_number
 
 if TYPE_CHECKING:
     from .module import Module
@@ -393,8 +394,8 @@ def start_from(module: Module, t: float, p: Any, u: Any) -> Initial:
         A number where parameters or inputs are meant, since a coordinate bears the name p or u.
     """
     for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
-        scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
+        scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
         if scalar and name in module.layout.q + module.layout.loops + module.layout.v:
             kind = "velocity" if name in module.layout.v else "coordinate"
             raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
-    return Initial((module if p is None and u is None else module.bind(p, u)).kernels, t)
+    return Initial((module if p is None and u is None else module.bind(p, u)).kernels, read_number("t", t))

@@ -19,12 +19,11 @@ from ..numeric.scales import Array
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .layout import number
 from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import read_numbers, read_times, require_room, require_steps
+from .room import as_real, read_number, read_numbers, read_times, require_room, require_steps, shown
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -141,7 +140,7 @@ def simulate(
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to go on from")
-    if method == "kinematic" or (method is None and not module.n_dof):
+    if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
         if is_driven(module) and not _led_by_inputs(module, inputs, method):
@@ -302,14 +301,11 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
     if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
         return float(span[0]), float(span[1])  # type: ignore[index]
-    try:
-        if np.ndim(span) == 0:
-            return 0.0, number("the end of the span", span)
-        pair = np.asarray(span, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}") from None
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
+    pair = as_real(span)
+    if pair is not None and not pair.ndim:
+        return 0.0, read_number("the end of the span", span)
+    if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
+        raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}")
     return float(pair[0]), float(pair[1])
 
 

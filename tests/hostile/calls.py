@@ -84,7 +84,6 @@ class Calls:
 
     name = "calls"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = (TypeError, ValueError)
     #: NumPy's of a complex array given for a real one, SciPy's of options that a solver does not know.
     unjudged: tuple[type[Warning], ...] = (np.exceptions.ComplexWarning, UserWarning)
 

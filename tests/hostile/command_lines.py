@@ -122,7 +122,6 @@ class CommandLines:
 
     name = "command_lines"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
