@@ -89,6 +89,8 @@ def prepare(module: Module, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = 
         raise UsageError(
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
         )
+    if not state.size and layout.n_x:
+        raise UsageError(f"x of shape {state.shape} holds no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
     time = read_numbers("t", t)

@@ -17,7 +17,7 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.room import read_number, read_numbers, require_room, shown
+from ..runtime.room import read_flag, read_number, read_numbers, require_room, shown
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -99,6 +99,7 @@ def analyse(
     """Walk the range; see :meth:`~..runtime.analyses.Analyses.kinematic_analysis`."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
+    partial = read_flag("partial", partial)
     t0, y0 = float(asked.t[0]), asked.y[:, 0]
     start_t, q = start_from(module, initial, t0)
     try:

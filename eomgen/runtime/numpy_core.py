@@ -270,7 +270,7 @@ class NumpyMotion(NumpyKernel):
         parts = [self.read(part, label, n) for part, label, n in zip((q, v, a), "qva", sizes, strict=True)]
         columns = max((part.shape[1:] for part in parts), key=len)
         for part, label, n in zip(parts, "qva", sizes, strict=True):
-            if part.shape not in ((n,), (n, *columns)):
+            if part.shape not in ((n,), (n, *columns)) or part.ndim > 2:
                 raise self.misfit(label, n, part)
         x = [part if part.shape[1:] == columns else np.repeat(part[:, None], columns[0], axis=1) for part in parts]
         return self.evaluate(t, np.concatenate(x), p, u, out)

@@ -45,8 +45,8 @@ def require_steps(name: str, step: float, start: float, end: float) -> None:
 def as_real(given: Any) -> Array | None:
     """What is given as an array of floats (float64), itself if it is one; None if these are no real numbers.
 
-    Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy, in
-    lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none.
+    Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
+    in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none.
     """
     if type(given) is np.ndarray and given.dtype == np.float64:
         return given
@@ -116,6 +116,18 @@ def read_count(what: str, given: Any) -> int:
     if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
         raise UsageError(f"{what}, not {shown(given)}")
     return int(given)
+
+
+def read_flag(what: str, given: Any) -> bool:
+    """True or False.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(given, (bool, np.bool_)):
+        raise UsageError(f"{what} must be True or False, not {shown(given)}")
+    return bool(given)
 
 
 def _floats(given: Any, wanted: str) -> Array:

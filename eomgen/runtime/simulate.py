@@ -23,7 +23,7 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import as_real, read_number, read_numbers, read_times, require_room, require_steps, shown
+from .room import as_real, read_flag, read_number, read_numbers, read_times, require_room, require_steps, shown
 from .run import Run
 from .signals import Forcing
 from .tolerances import IMPLICIT, check_step, check_tolerances
@@ -150,7 +150,7 @@ def simulate(
             return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
-    step = check_method(method, step)
+    step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)
@@ -316,6 +316,8 @@ def declare(module: Module) -> dict[str, Any]:
 
 def check_method(method: Any, step: Any) -> float | None:
     """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
+    if method is not None and not isinstance(method, (str, type)):
+        raise UsageError(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
     if (isinstance(method, str) and method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     return None if step is None else check_step("step", step)
