@@ -61,6 +61,8 @@ class States(NamedTuple):
             return np.ascontiguousarray(result)
         if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != result.dtype:
             raise UsageError(f"out must be an array of shape {result.shape} and type {result.dtype}")
+        if not out.flags.writeable:
+            raise UsageError("out is read-only")
         out[...] = result
         return out
 

@@ -61,7 +61,8 @@ class Cases:
 
     def column(self, k: int) -> dict[str, Any]:
         """Parameters and inputs of one run, as ``Module.bind`` takes them."""
-        return {name: a if a.ndim == 1 else a[:, k] for name, a in (("p", self.p), ("u", self.u))}
+        given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
+        return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
 
     def digest(self) -> str:
         """SHA-256 of all of it."""

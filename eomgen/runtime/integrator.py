@@ -17,7 +17,7 @@ from .integrate import choose_solver
 from .late import eager
 from .names import check_names
 from .pace import Crawling, Pace
-from .room import read_numbers, require_steps
+from .room import read_vector, require_steps
 from .run import Run
 from .signals import Forcing
 from .simulate import check_method, declare, simulate
@@ -206,7 +206,4 @@ def _vector(label: str, given: Any, n: int) -> Any:
     """A new array (n,) of what is given, or None."""
     if given is None and label != "x":
         return None
-    values = np.array(read_numbers(label, given))
-    if values.shape != (n,):
-        raise ValueError(f"{label} must have shape ({n},), not {values.shape}")
-    return values
+    return np.array(read_vector(label, given, n))

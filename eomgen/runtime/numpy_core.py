@@ -18,7 +18,7 @@ from ..errors import STATUS, EvaluationError
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 from .numpy_drivers import Drivers
-from .room import as_real, shown
+from .room import as_real, read_vector, shown
 
 #: f(t, x, u, c) -> out
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
@@ -157,7 +157,7 @@ class NumpyKernel:
         found = as_real(value)
         if found is not None:
             return found
-        if isinstance(value, Mapping):
+        if label in ("p", "u") and isinstance(value, Mapping):
             raise self.error(BY_NAME.format(label))
         wanted = "be a real number, or (k,)" if label == "t" else f"hold real numbers, ({n},) or ({n}, k)"
         raise self.error(f"{self.label(label)} of {self.name} must {wanted}, not {shown(value)}")
@@ -292,11 +292,6 @@ def _declared(values: Any) -> list[float]:
 
 
 def _vector(value: object, n: int, label: str, error: Any) -> Array:
-    found = as_real(value)
-    if found is None or found.shape != (n,):
-        if isinstance(value, Mapping):
-            raise error(BY_NAME.format(label))
-        if found is None:
-            raise error(f"{label} must hold real numbers, ({n},), not {shown(value)}")
-        raise error(f"{label} must have shape ({n},), not {found.shape}")
-    return np.array(found)
+    if isinstance(value, Mapping):
+        raise error(BY_NAME.format(label))
+    return np.array(read_vector(label, value, n, error))

@@ -75,6 +75,21 @@ def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
     return _floats(given, f"{what} must hold real numbers")
 
 
+def read_vector(what: str, given: Any, n: int, error: type[Exception] = UsageError) -> Array:
+    """An array of n floats.
+
+    Raises
+    ------
+    error
+    """
+    found = as_real(given)
+    if found is None:
+        raise error(f"{what} must hold real numbers, ({n},), not {shown(given)}")
+    if found.shape != (n,):
+        raise error(f"{what} must have shape ({n},), not {found.shape}")
+    return found
+
+
 def read_times(what: str, given: Any, per_time: int) -> Array:
     """Times as an array of floats (n,), refused where a row of `per_time` numbers for each would not fit.
 
@@ -138,6 +153,6 @@ def _floats(given: Any, wanted: str) -> Array:
 
 
 def shown(given: Any) -> str:
-    """What was given, in a message."""
-    text = repr(given)
+    """What was given, in one line of a message."""
+    text = " ".join(repr(given).split())
     return text if len(text) <= 80 else f"{text[:80]}..."

@@ -14,7 +14,7 @@ from .events import Events
 from .kernels import fitting
 from .late import eager
 from .names import require
-from .room import read_number, read_numbers
+from .room import read_number, read_vector
 from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
@@ -134,6 +134,7 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
+@np.errstate(all="ignore")
 def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
     """See :meth:`~.module.Module.step`."""
     if module.layout.n_events and Events(module.layout, None).resets:
@@ -149,9 +150,7 @@ def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array 
                 "rhs", status, t, np.array(x, dtype=float), None, None if u is None else np.array(u, dtype=float)
             )
         return np.asarray(result)
-    t, h, start = read_number("t", t), read_number("h", h), read_numbers("x", x)
-    if start.shape != (module.n_x,):
-        raise UsageError(f"x must have shape ({module.n_x},), not {start.shape}")
+    t, h, start = read_number("t", t), read_number("h", h), read_vector("x", x, module.n_x)
     if out is not None:
         fitting(out, start.shape)
     k = [module.rhs(t, start, u=u)]

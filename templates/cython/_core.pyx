@@ -75,6 +75,7 @@ cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
     WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
+    SCALAR = -2  # in place of a number of rows
     MANY = 4096  # columns after which lanes that must be compiled first are worth it
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
@@ -120,10 +121,13 @@ cdef cnp.ndarray converted(object value, str label, object error, str name, int 
             return np.require(array, np.float64, "A")
     except (TypeError, ValueError, OverflowError):
         pass
-    if isinstance(value, dict):
+    if label in ("p", "u") and isinstance(value, dict):
         raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
-    shape = "" if n < 0 else f", ({n},)" if name is None else f", ({n},) or ({n}, k)"
-    wanted = f"be a real number{'' if name is None else ', or (k,)'}" if label == "t" else f"hold real numbers{shape}"
+    if n == SCALAR:
+        wanted = "be a number" if name is None else "be a real number, or (k,)"
+    else:
+        shape = "" if n < 0 else f", ({n},)" if name is None else f", ({n},) or ({n}, k)"
+        wanted = f"hold real numbers{shape}"
     raise error(f"{called(label, name, n)} must {wanted}, not {shown(value)}")
 
 
@@ -134,7 +138,7 @@ cdef str called(str label, str name, int n):
 
 
 cdef str shown(object value):
-    text = repr(value)
+    text = " ".join(repr(value).split())
     return text if len(text) <= 80 else text[:80] + "..."
 
 
@@ -147,9 +151,11 @@ cdef inline double moment(object t, str label, object error, str name=None) exce
             return t
         except OverflowError:
             pass
-    array = doubles(t, label, error, name)
+    array = doubles(t, label, error, name, SCALAR)
     if cnp.PyArray_NDIM(array):
-        raise error(f"{label} must be a number, not of shape {(<object>array).shape}")
+        if name is None:
+            raise error(f"{label} must be a number, not {shown(t)}")
+        raise error(f"{label} of {name} must be a number or have shape (k,), not {(<object>array).shape}")
     return (<double *>cnp.PyArray_DATA(array))[0]
 
 
@@ -350,7 +356,7 @@ cdef class Kernel:
             held.append(self.read(value, length, label, &batch.pieces[i], &columns))
         batch.time = Piece(<char *>&now, 1, 0, 0)
         if isinstance(t, (np.ndarray, list, tuple)):
-            t = doubles(t, "t", self.error, self.name)
+            t = doubles(t, "t", self.error, self.name, SCALAR)
         if isinstance(t, np.ndarray) and t.ndim > 0:
             if t.ndim > 1 or len(t) != columns:
                 raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
