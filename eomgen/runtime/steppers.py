@@ -134,7 +134,6 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
-@np.errstate(all="ignore")
 def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
     """See :meth:`~.module.Module.step`."""
     if module.layout.n_events and Events(module.layout, None).resets:
@@ -154,9 +153,10 @@ def march(module: Module, t: float, x: Any, h: float, u: Any = None, out: Array 
     if out is not None:
         fitting(out, start.shape)
     k = [module.rhs(t, start, u=u)]
-    for part in (0.5, 0.5, 1.0):
-        k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
-    after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    with np.errstate(all="ignore"):  # what overflows is told by the next evaluation
+        for part in (0.5, 0.5, 1.0):
+            k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
+        after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
     if out is None:
         return np.asarray(after)
     out[...] = after
