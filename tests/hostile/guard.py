@@ -8,6 +8,7 @@ installed; and running code that comes from those files.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import sysconfig
 from pathlib import Path
@@ -111,6 +112,8 @@ class Guard:
     def __init__(self, folder: str, cache: str) -> None:
         self.cache = os.path.realpath(cache) + os.sep
         self.folders = (os.path.realpath(folder) + os.sep, self.cache)
+        #: What ``verify`` writes and runs: an exported package, in a folder for temporary files.
+        self.exported = re.compile(re.escape(os.path.realpath(folder)) + r"/(?:\w+/)*tmp\w{8}/made/[\w/]+\.py$")
         self.programs: frozenset[str] = frozenset()
         self.armed = False
         self.escapes: list[str] = []
@@ -189,4 +192,5 @@ class Guard:
         if name.startswith("<"):
             return None if sys._getframe(3).f_code.co_filename in MAKERS else f"exec of {name!r}"
         real = self._real(name)
-        return None if real.startswith((*ROOTS, self.cache)) else f"exec {name!r}"
+        own = real.startswith((*ROOTS, self.cache)) or self.exported.match(real)
+        return None if own else f"exec {name!r}"
