@@ -250,6 +250,8 @@ class Crossings:
         da, db = (self.forward * s * float(slope[i]) * h for slope in (self.slope, self.slope_new))
         if not (a * b > 0.0 and da < 0.0 < db) or max(abs(a), abs(b)) <= RESTING * TOUCHED * self.size[i]:
             return False
+        if db * s * a - da * s * b <= -da * db:  # the tangents meet below zero: also a flat touch, (t - 1)**8
+            return True
         x = da / (da - db)  # about where the cubic through both is least
         y = 1.0 - x
         least = s * a * y * y * (1 + 2 * x) + da * x * y * y + s * b * x * x * (1 + 2 * y) - db * x * x * y

@@ -36,7 +36,7 @@ NO_COMPILERS = (
 ENVIRONMENT: dict[str, tuple[str | None, ...]] = {
     "HOME": (None, "", "none", "other.txt", "sub"),
     "XDG_CACHE_HOME": (None, "", "sub", "other.txt"),
-    "EOMGEN_CACHE_DIR": ("sub", "sub/new/cache", "other.txt", "other.txt/cache", "full.csv", ".", "a" * 300, "\udc80"),
+    "EOMGEN_CACHE_DIR": ("sub", "sub/new/cache", "other.txt", "other.txt/cache", ".", "a" * 300, "\udc80"),
     "LANG": (None, "", "C", "xx_YY.nothing"),
     "LC_ALL": (None, "", "C", "POSIX", "xx_YY.nothing"),
     "COLUMNS": (None, "", "0", "1", "-1", "x", "9" * 30),
@@ -229,7 +229,8 @@ class CommandLines:
             raise Wrong(f"exit code {code} without a message")
         if TRACE.search(err.getvalue()):
             raise Wrong(f"stderr holds a traceback or a warning: {err.getvalue()[-300:]}")
-        if code == 0 and words[-1:] == ["--json"] and "--help" not in words and "-h" not in words:
+        as_value = len(words) > 1 and words[-2].startswith("-")  # of the option before it
+        if code == 0 and words[-1:] == ["--json"] and not as_value and "--help" not in words and "-h" not in words:
             try:
                 json.loads(out.getvalue())
             except ValueError as error:
