@@ -20,6 +20,7 @@ MOST_NUMBERS = 5 * 10**7  #: kept by one call: 0.4 GB, of which results are copi
 #: A run that has taken so many steps and needs so many more at their pace would not end.
 ENOUGH, ENDLESS = 3000, 10**10
 FEW, HOPELESS = 300, 10**15  #: the same, where fewer steps tell as much
+MOST_STATES = 10_000  #: random states of one verification: each takes milliseconds
 
 # -- events ----------------------------------------------------------------------------------------------------------
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time
