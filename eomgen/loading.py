@@ -42,13 +42,18 @@ def load(
     Raises
     ------
     UsageError
-        The suffix is not one that can be loaded, or an option is not one of it.
+        The suffix is not one that can be loaded, an option is not one of it, or the path is that of no plain file (a
+        folder, a pipe, a device).
     FileNotFoundError
         There is no such file.
     ModelError
         The file cannot be read as a model; what can only be judged as a whole is told by ``Model.mechanism``.
     """
-    suffix = os.path.splitext(os.fspath(path))[1].lower()
+    try:
+        path = os.fsdecode(path)
+    except TypeError:
+        raise UsageError(f"{path!r:.200} is not the path of a file: give a text or a pathlib.Path") from None
+    suffix = os.path.splitext(path)[1].lower()
     if suffix in ROBOTS:
         from .robots import describe_file  # only where it is needed: MJCF brings its own compiler
 
@@ -57,11 +62,9 @@ def load(
         return _with_notes(Model.from_description(describe_file(path, **robot)))
     if suffix not in SUFFIXES:
         known = ", ".join(f"{s} {what}" for s, what in {**SUFFIXES, **ROBOTS}.items())
-        raise UsageError(
-            f"{os.fspath(path)}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}"
-        )
+        raise UsageError(f"{path}: files ending in {suffix or 'nothing'} cannot be loaded; supported: {known}")
     if robot:
-        raise UsageError(f"{os.fspath(path)}: {', '.join(robot)}: options of robot files, not of model files")
+        raise UsageError(f"{path}: {', '.join(robot)}: options of robot files, not of model files")
     model = Model.from_description(describe_yaml_file(path, allow_native=allow_native))
     if check_inertia is not None:
         word = word_of_check(check_inertia)

@@ -22,8 +22,9 @@ from ..numeric import algebra
 from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.layout import Layout, number
-from ..runtime.room import read_numbers
+from ..runtime.layout import Layout
+from ..runtime.names import read_names
+from ..runtime.room import read_number, read_numbers, shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -77,7 +78,7 @@ def consistent(
     ``project(x)`` is the same with weights 1 to first order in the change; ``x0`` starts from named values.
     """
     module = module if p is None and u is None else module.bind(p, u)
-    layout, t = module.layout, number("t", t)
+    layout, t = module.layout, read_number("t", t)
     state = np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")
@@ -85,7 +86,11 @@ def consistent(
         raise UsageError(
             "consistent() needs q' = v; project(x) also serves models whose rates of coordinates are given"
         )
-    held = (hold,) if isinstance(hold, str) else tuple(hold)
+    held = read_names("hold", hold)
+    if isinstance(weights, Mapping):
+        weights = {name: read_number(f"weights: that of {name}", weight) for name, weight in weights.items()}
+    elif weights is not None and not (isinstance(weights, str) and weights == "mass"):
+        raise UsageError(f"weights must be a mapping of names to weights, or 'mass', not {shown(weights)}")
     _check_names(layout, weights, held)
     if not layout.n_c:
         return np.asarray(module.project(state, t=t))
@@ -94,9 +99,7 @@ def consistent(
 
 
 def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
-    if isinstance(weights, str) and weights != "mass":
-        raise UsageError(f"weights must be a mapping of names to weights, or 'mass', not {weights!r}")
-    given = () if weights is None or isinstance(weights, str) else tuple(weights)
+    given = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
     allowed = tuple(dict.fromkeys((*layout.freedoms, *layout.v)))
     for what, names in (("weights", given), ("hold", held)):
         for name in names:
@@ -106,7 +109,7 @@ def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held
                 raise UsageError(f"{what}: no coordinate or velocity {name!r}{hint}; there are {', '.join(allowed)}")
     if isinstance(weights, Mapping):
         for name, weight in weights.items():
-            if not (np.isfinite(weight) and weight > 0.0):
+            if not weight > 0.0:
                 raise UsageError(f"weights: that of {name} must be positive, not {weight}; hold= keeps a value exactly")
 
 

@@ -61,6 +61,8 @@ class States(NamedTuple):
             return np.ascontiguousarray(result)
         if not isinstance(out, np.ndarray) or out.shape != result.shape or out.dtype != result.dtype:
             raise UsageError(f"out must be an array of shape {result.shape} and type {result.dtype}")
+        if not out.flags.writeable:
+            raise UsageError("out is read-only")
         out[...] = result
         return out
 
@@ -89,12 +91,11 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
         raise UsageError(
             f"x must have shape ({layout.n_x},) or ({layout.n_x}, k) [{', '.join(layout.x)}], not {state.shape}"
         )
+    if not state.size and layout.n_x:
+        raise UsageError(f"x of shape {state.shape} holds no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
-    try:
-        time = read_numbers("t", t)
-    except (TypeError, ValueError):
-        raise UsageError(f"t must be a number or an array of them, not {t!r}") from None
+    time = read_numbers("t", t)
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
@@ -166,10 +167,11 @@ def evaluate(
     out: Array | None = None,
 ) -> Array:
     """``find`` of all states; where inputs are given state by state, (n_u, k), of each state with its own."""
-    states = prepare(module, t, x, p, None if np.ndim(u) == 2 else u)
-    if np.ndim(u) != 2:
+    inputs = None if u is None or isinstance(u, Mapping) else read_numbers("u", u)
+    if inputs is None or inputs.ndim != 2:
+        states = prepare(module, t, x, p, u)
         return states.shaped(find(states), out)
-    inputs = read_numbers("u", u)
+    states = prepare(module, t, x, p)
     if states.single or inputs.shape != (module.n_u, len(states.t)):
         raise UsageError(f"u must have shape ({module.n_u},), or ({module.n_u}, k) for k states, not {inputs.shape}")
     parts = [

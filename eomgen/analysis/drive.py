@@ -24,6 +24,7 @@ from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
+from ..runtime.names import read_names
 from ..runtime.room import read_numbers
 from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
@@ -210,7 +211,7 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     """
     if actuated is None:
         return tuple(layout.freedoms[i] for i in layout.independent)
-    names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+    names = read_names("actuated", actuated)
     allowed = [*layout.freedoms, *layout.loops, *layout.u]
     for name in names:
         if name not in allowed:
@@ -255,7 +256,10 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
                 )
         values = np.zeros((layout.n_v, count))
         for name, value in given.items():
-            values[keys[name]] = np.broadcast_to(read_numbers(name, value), (count,))
+            row = read_numbers(f"a: {name}", value)
+            if row.shape not in ((), (count,)):
+                raise UsageError(f"a: {name} must be a number or have shape ({count},), one a state, not {row.shape}")
+            values[keys[name]] = row
         chosen = list(layout.independent)
         result = np.array(free)
         for k, B in enumerate(bases):

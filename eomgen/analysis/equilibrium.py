@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike
 from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from ..runtime.layout import number
-from ..runtime.names import unknown
+from ..runtime.names import read_names, unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_numbers
+from ..runtime.room import read_number, read_numbers
 from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
@@ -69,11 +68,11 @@ def equilibrium(
     """
     require_velocities(module.layout)
     module = module if p is None and u is None else module.bind(p, u)
-    time = number("t", t)
-    unknowns = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns)
-    names = (hold,) if isinstance(hold, str) else hold
-    wanted: dict[str, float | None] = dict(names) if isinstance(names, Mapping) else dict.fromkeys(names)
-    given = {name: float(value) for name, value in wanted.items() if value is not None}
+    time = read_number("t", t)
+    unknowns = read_names("unknowns", unknowns)
+    by_name = isinstance(hold, Mapping)
+    wanted: dict[str, float | None] = dict(hold) if by_name else dict.fromkeys(read_names("hold", hold))  # type: ignore[arg-type]
+    given = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
         raise UsageError(f"hold takes coordinates, not rates: {', '.join(initial.sort(given).rates)}")
@@ -99,7 +98,7 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
     """A closed position near the guess that has the held values."""
     initial = Initial(module.kernels, t)
     if guess is None or isinstance(guess, Mapping):
-        values = {name: number(name, value) for name, value in (guess or {}).items()}
+        values = {name: read_number(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:
             raise UsageError("a guess is a position: name coordinates, not rates")
         loose = {name: value for name, value in values.items() if name not in held}

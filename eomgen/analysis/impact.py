@@ -19,8 +19,8 @@ from ..limits.impacts import HELD, ROUNDED, TOUCHING
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
-from ..runtime.layout import Layout, number
-from ..runtime.room import read_numbers
+from ..runtime.layout import Layout
+from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
 from .constrained import States, conditioned_motions, prepare, solve_multipliers
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
@@ -130,10 +130,10 @@ def impact(
     """
     module = module if p is None and u is None else module.bind(p, u)
     found, locked = check_gaps(module.layout, gaps, lock)
-    states = _one_state(module, number("t", t), x)
+    states = _one_state(module, read_number("t", t), x)
     watched = Gaps(module, tuple(found))
     rows = watched.normals(float(states.t[0]), states.x[:, 0])
-    if not closed:
+    if not read_flag("closed", closed):
         _require_closed(watched, states)
     return _strike_gaps(states, watched, rows, found, locked)
 

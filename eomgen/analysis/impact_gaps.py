@@ -10,7 +10,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.layout import Layout, number
+from ..runtime.layout import Layout
+from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import Formula
 
@@ -197,9 +198,7 @@ def check_gaps(
                 raise UsageError(f"{what}: no coordinate or output {name!r}{hint}; there are {', '.join(allowed)}")
     found: dict[str, float] = {}
     for name, e in (gaps or {}).items():
-        if np.ndim(e):
-            raise UsageError(f"{word}: the restitution of {name} must be one number, not {e!r}")
-        found[name] = number(f"{word}: the restitution of {name}", e)
+        found[name] = read_number(f"{word}: the restitution of {name}", e)
         if not 0.0 <= found[name] <= 1.0:
             raise UsageError(f"{word}: the restitution of {name} is between 0 and 1, not {e}")
     return found, tuple(locked)

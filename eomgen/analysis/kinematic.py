@@ -19,7 +19,7 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_numbers, require_room
+from ..runtime.room import read_flag, read_number, read_numbers, require_room, shown
 from .following import Follower
 from .gaps import describe_gap
 from .motions import KinematicAnalysis, keep
@@ -86,15 +86,10 @@ def read_range(module: BoundModel, t: ArrayLike | None, named: Mapping[str, Any]
 
 
 def _column(name: str, value: Any) -> Array:
-    try:
-        if np.iscomplexobj(value):
-            raise TypeError
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}") from None
+    array = read_numbers(name, value)
     require_room(f"a range of {array.size} points", 3.0 * array.size, "give fewer points")
     if array.ndim > 1 or not array.size or not np.isfinite(array).all():
-        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {value!r}")
+        raise UsageError(f"{name} must be a finite number, or an array (n,) of them, not {shown(value)}")
     return array
 
 
@@ -155,6 +150,7 @@ def analyse(
     """Walk the range from the initial position."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
+    partial = read_flag("partial", partial)
     t0, y0 = float(asked.t[0]), asked.y[:, 0]
     start_t, q = start_from(module, initial, t0)
     try:
@@ -200,7 +196,7 @@ def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | No
             return t0, Initial(module.kernels, t0).assembled({})
     here = Initial(module.kernels, t0)
     if isinstance(initial, Mapping):
-        given = here.sort({name: float(value) for name, value in initial.items()})
+        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
         if given.rates:
             raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.layout import number
-from ..runtime.room import read_numbers
+from ..runtime.room import read_number, read_numbers
 from .linear_given import find_given_tangent, refuse_inputs
 from .linearisation import Linearisation
 from .rounding import own_accelerations
@@ -70,10 +69,10 @@ def linearise(
     """
     if module.layout.given_rates:
         refuse_inputs(module.layout)
-    if form not in FORMS:
+    if not isinstance(form, str) or form not in FORMS:
         raise UsageError(f"form must be one of {', '.join(FORMS)}, not {form!r}")
     module = module if p is None and u is None else module.bind(p, u)
-    layout, time = module.layout, number("t", t)
+    layout, time = module.layout, read_number("t", t)
     state = module.x0(x, t=time) if x is None or isinstance(x, Mapping) else np.array(read_numbers("x", x))
     if state.shape != (layout.n_x,):
         raise UsageError(f"x must have shape ({layout.n_x},) [{', '.join(layout.x)}], not {state.shape}")

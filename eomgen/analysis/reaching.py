@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
+from ..runtime.room import read_number, read_numbers, shown
 from .following import Follower
 from .gaps import describe_gap
 from .kinematic import complete, start_from
@@ -102,11 +103,11 @@ def _walk_both_ways(
     t: float,
     within: tuple[float, float] | None,
 ) -> MotionRange:
-    layout = module.layout
+    layout, t = module.layout, read_number("t", t)
     if layout.n_h < layout.n_c:
         layout.require_minimal_form()
     known = (*layout.q, *layout.loops, "t")
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise unknown("coordinate", name, known)
     start_t, q = start_from(module, initial, t)
     if start_t != t:
@@ -118,7 +119,12 @@ def _walk_both_ways(
     here = t if name == "t" else float(y[k])
     turns = name != "t" and follower.led_scales[k] == 1.0 and not _is_length(module, name)
     reach = 2 * np.pi if turns else FAR * (1.0 if name == "t" else layout.length)
-    low, high = (here - reach, here + reach) if within is None else within
+    low, high = here - reach, here + reach
+    if within is not None:
+        bounds = read_numbers("within", within)
+        if bounds.shape != (2,):
+            raise UsageError(f"within must be (lowest, highest), not {shown(within)}")
+        low, high = bounds.tolist()
     if not low <= here <= high:
         raise UsageError(f"{name} is {here:.6g} at the start, which is not within {low:.6g} .. {high:.6g}")
     found: list[tuple[float, Singular | None, str]] = []

@@ -6,13 +6,13 @@ Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import NoDerivativeError, SimulationError, UsageError
+from ..errors import NoDerivativeError, SimulationError
 from ..limits.motions import SINGULAR
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
@@ -20,7 +20,7 @@ from ..runtime.events import Events, warn_of_unknown
 from ..runtime.failure import place
 from ..runtime.input_slopes import Slopes
 from ..runtime.integrate import Solution, choose_solver, integrate, require_end
-from ..runtime.names import unknown
+from ..runtime.names import check_names, read_names, unknown
 from ..runtime.pace import Crawling, Pace, describe_crawl
 from ..runtime.recording import record
 from ..runtime.refusals import require_projection, require_velocities
@@ -38,6 +38,8 @@ from .variations import Variational
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.trajectory import Trajectory
+
+OPTIONS = ("max_step", "first_step", "min_step")  #: of solvers, besides tolerances
 
 
 def sensitivities(
@@ -85,6 +87,7 @@ def sensitivities(
     """
     require_velocities(module.layout)
     require_projection(module.layout)
+    check_names("option of sensitivities", options, OPTIONS, ("method", "rtol", "atol", "t_eval", "events"))
     forcing = Forcing(module.layout, inputs)
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
@@ -97,10 +100,8 @@ def sensitivities(
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
     given = initial if isinstance(initial, Mapping) else None
-    if not isinstance(names, Iterable):
-        raise UsageError(f"names must be one name or several of what to differentiate by, not {names!r}")
     held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
-    columns = split_columns(layout, (names,) if isinstance(names, str) else tuple(names), held)
+    columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)
     watched = Events(layout, events)
     options = check_tolerances(layout.n_x, abs(stop - start), {"rtol": rtol, "atol": atol, **options})
@@ -213,7 +214,8 @@ def _distinct(solution: Solution) -> Indices:
 def _checked(module: BoundModel, hold: Sequence[str]) -> list[str]:
     layout = module.layout
     allowed = (*layout.q, *layout.v, *layout.loops, *layout.loop_rates)
-    for name in hold:
+    names = read_names("hold", hold)
+    for name in names:
         if name not in allowed:
             raise unknown("coordinate or rate", name, allowed)
-    return list(hold)
+    return list(names)

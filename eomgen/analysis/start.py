@@ -51,8 +51,9 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     UsageError
         A name is none of them.
     """
-    from ..runtime.names import unknown
+    from ..runtime.names import read_names, unknown
 
+    names = read_names("names", names)
     parameters, inputs, initial = [], [], []
     for column, name in enumerate(names):
         if name in layout.p:

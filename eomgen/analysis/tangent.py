@@ -17,7 +17,7 @@ from ..numeric.partitions import partition
 from ..numeric.projection import tangent_projector
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices, Scales
-from ..runtime.names import unknown
+from ..runtime.names import read_names, unknown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -83,7 +83,7 @@ def find_tangent(
 def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     """Indices of n_dof velocities from their names or those of their coordinates."""
     allowed = dict.fromkeys((*layout.freedoms, *layout.v))
-    chosen = []
+    chosen, names = [], read_names("independent", names)
     for name in names:
         if name not in allowed:
             raise unknown("coordinate of the tree", name, allowed)

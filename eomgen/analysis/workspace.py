@@ -15,6 +15,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.refusals import require_velocities
+from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
@@ -295,7 +296,7 @@ def workspace(
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):
         grid = read_grid(module, over, of, limits, points)
-        stage = Stage(module, grid, initial, t)
+        stage = Stage(module, grid, initial, read_number("t", t))
         reader = Reader(stage)
         reader.require_positions(stage.q, stage.t)
         filled = flood(stage)

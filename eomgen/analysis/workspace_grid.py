@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.names import unknown
+from ..runtime.names import read_names, unknown
+from ..runtime.room import as_real, read_count, read_number, read_numbers, shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -63,9 +64,11 @@ def read_grid(
     ------
     UsageError
     """
-    layout = module.layout
+    layout, points = module.layout, read_count("points must be a whole number", points)
     if not isinstance(over, Mapping) or not over:
-        raise UsageError(f"over names coordinates and their values, such as {{'theta': (0, 6.28, 73)}}, not {over!r}")
+        raise UsageError(
+            f"over names coordinates and their values, such as {{'theta': (0, 6.28, 73)}}, not {shown(over)}"
+        )
     coordinates = (*layout.q, *layout.loops)
     for name in over:
         if name not in (*coordinates, "t"):
@@ -83,13 +86,13 @@ def read_grid(
     if size > points:
         shape = " x ".join(str(len(axis)) for axis in axes)
         raise UsageError(f"{shape} = {size} grid points, more than points={points}; take fewer values or raise points")
-    wanted = (of,) if isinstance(of, str) else tuple(of)
+    wanted = read_names("of", of)
     known = dict.fromkeys((*layout.y, *coordinates))
     for name in wanted:
         if name not in known:
             raise unknown("output or coordinate", name, known)
     if not wanted or len(set(wanted)) < len(wanted):
-        raise UsageError(f"of names outputs or coordinates, each once, not {of!r}")
+        raise UsageError(f"of names outputs or coordinates, each once, not {shown(of)}")
     return Grid(tuple(over), axes, wanted, _limits(module, limits))
 
 
@@ -107,21 +110,30 @@ def _axis(name: str, given: Any) -> Array:
             raise UsageError(f"{what}; a count is at least 2, not {count!r}")
         if count > 10_000_000:
             raise UsageError(f"over {name}: {count} values are too many")
-        given = np.linspace(given[0], given[1], int(count))
-    try:
-        values = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{what}, not {given!r}") from None
+        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), int(count))
+    values = as_real(given)
+    if values is None:
+        raise UsageError(f"{what}, not {shown(given)}")
     steps = np.diff(values) if values.ndim == 1 else np.empty(0)
     if not steps.size or not np.isfinite(values).all() or not ((steps > 0.0).all() or (steps < 0.0).all()):
-        raise UsageError(f"{what}, not {given!r}")
+        raise UsageError(f"{what}, not {shown(given)}")
     return values
+
+
+def _bound(name: str, given: Any) -> float:
+    """One limit, which may be infinite."""
+    found = read_numbers(f"limits {name}", given)
+    if found.ndim:
+        raise UsageError(f"limits {name}: give (lower, upper), not {shown(given)} for one of them")
+    return float(found)
 
 
 def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit, ...]:
     """Declared limits, or those given."""
     coordinates = (*module.layout.q, *module.layout.loops)
     if not isinstance(given, Mapping):
+        if not isinstance(given, (bool, np.bool_)):
+            raise UsageError(f"limits must be True, False or a mapping {{name: (lower, upper)}}, not {shown(given)}")
         declared = module.layout.limits if given else {}
         pairs = {name: (kept.get("lower"), kept.get("upper")) for name, kept in declared.items()}
         if given and not any(x is not None for pair in pairs.values() for x in pair):
@@ -137,7 +149,8 @@ def _limits(module: BoundModel, given: bool | Mapping[str, Any]) -> tuple[Limit,
             pairs[name] = (pair[0], pair[1])
     found = []
     for name, (low, high) in pairs.items():
-        lower, upper = -np.inf if low is None else float(low), np.inf if high is None else float(high)
+        lower = -np.inf if low is None else _bound(name, low)
+        upper = np.inf if high is None else _bound(name, high)
         if not lower <= upper:
             raise UsageError(f"limits {name}: lower {lower:g} is above upper {upper:g}")
         if lower > -np.inf or upper < np.inf:

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import metadata
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import NamedTuple
 
 import click
@@ -150,4 +150,9 @@ def _cache() -> Finding:
     entries = cache.entries()
     detail = f"{cache.root}: {len(entries)} entries, {readable_size(sum(e.size for e in entries))}"
     folder = next(p for p in (cache.root, *cache.root.parents) if p.exists())
-    return Finding("cache", os.access(folder, os.W_OK), detail, f"make {folder} writable, or set EOMGEN_CACHE_DIR")
+    try:
+        with TemporaryFile(dir=folder):  # rights alone do not tell: /proc grants them to root, and takes no file
+            writable = folder.is_dir()
+    except OSError:
+        writable = False
+    return Finding("cache", writable, detail, f"make {folder} writable, or set EOMGEN_CACHE_DIR")

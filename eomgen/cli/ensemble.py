@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import UsageError
+from ..files.reading import open_plain
 from ..files.writing import save_figure, write_whole
 from ..runtime.names import require
 from ..runtime.room import require_room
@@ -127,8 +129,11 @@ def _cluster(given: str | None) -> int | str | None:
 
 def _read(path: Path) -> dict[str, list[float]]:
     """The columns of a table of cases."""
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = [row for row in csv.reader(file) if row]
+    with TextIOWrapper(open_plain(path), newline="", encoding="utf-8-sig") as file:
+        try:
+            rows = [row for row in csv.reader(file) if row]
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise UsageError(f"--cases {path}: is no table of text (CSV, UTF-8): {error}") from None
     if len(rows) < 2:
         raise UsageError(f"--cases {path}: a line of names and a line for each run are needed")
     names = [name.strip() for name in rows[0]]

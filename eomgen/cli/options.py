@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import ModelError, UsageError
+from ..files.reading import kind_of
 from ..files.writing import refuse_link
 
 if TYPE_CHECKING:
@@ -237,8 +238,10 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
 
 
 def _missing(path: Path) -> str:
-    if path.is_dir():
-        return f"{path} is a folder; name a model file in it"
+    if what := kind_of(path):
+        return f"{path} is {what}, no plain file; " + (
+            "name a model file in it" if path.is_dir() else "copy what it gives into a file"
+        )
     from .shipped import example_names
 
     if path.stem in example_names():

@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..errors import UsageError
+from ..files.reading import open_plain
 from ..graph.functions import Function, NativeCode
 from ..numeric.functions import Orders, Twin, up_to
 from ..records import dataclass
@@ -126,7 +128,7 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
         return None
     file = Path(folder) / name
     try:
-        with open(file, "rb") as stream:
+        with open_plain(file) as stream:
             data = stream.read(SIZE + 1)
         if len(data) > SIZE:
             reader.faults.add(path, f"{file} is too large", f"at most {SIZE} bytes")
@@ -136,6 +138,8 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
         reader.faults.add(path, f"{file} cannot be read ({error.strerror})", "paths are relative to the model file")
     except UnicodeDecodeError:
         reader.faults.add(path, f"{file} is not UTF-8 text", "save it as UTF-8")
+    except UsageError as error:
+        reader.faults.add(path, str(error))
     return None
 
 

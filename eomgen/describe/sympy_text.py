@@ -104,7 +104,10 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
             return f"diff({', '.join([call, *map(str, orders)])})"
 
-    text = str(Printer().doprint(expression))
+    try:
+        text = str(Printer().doprint(expression))
+    except RecursionError:
+        raise UsageError(f"{shortened(expression)} is nested too deeply to be written as a text") from None
     graph = Graph()
     for call in expression.atoms(AppliedUndef) if isinstance(expression, sympy.Basic) else ():
         if call.func.__name__ in functions:

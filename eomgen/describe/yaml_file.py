@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ModelError, Problem
+from ..files.reading import open_plain
 from .description import SECTIONS, Description, Faults
 from .fields import KINDS, MODEL, SHORT
 from .names import nearest
@@ -33,11 +34,13 @@ def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = Fal
     ------
     FileNotFoundError
         There is no such file.
+    UsageError
+        It is no plain file.
     ModelError
         The file is not YAML or not a mapping.
     """
-    name = os.fspath(path)
-    with open(name, "rb") as file:
+    name = os.fsdecode(path)
+    with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:
         raise ModelError([Problem("file", "is too large", f"at most {SIZE} bytes", name, 1)])

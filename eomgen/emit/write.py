@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
+from ..files.reading import open_plain
 from ..files.writing import refuse_link
 
 MANIFEST = "model.json"  #: lists the files of the package under "files"
@@ -81,10 +82,11 @@ def _earlier_files(folder: Path) -> set[str] | None:
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return set()
     try:
-        listed: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        with open_plain(folder / MANIFEST) as file:
+            listed: Any = json.load(file)
         if "abi" not in listed:
             raise ValueError
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError, UsageError):
         message = f"{folder} exists and is not a generated package; choose another --out or remove it"
         raise UsageError(message) from None
     files = listed.get("files")

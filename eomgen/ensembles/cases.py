@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
-from ..runtime.room import require_room
+from ..runtime.room import read_count, read_numbers, require_room
 from ..runtime.run_arguments import find_state
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ class Cases:
 
     def column(self, k: int) -> dict[str, Any]:
         """Parameters and inputs of one run, as ``Module.bind`` takes them."""
-        return {name: a if a.ndim == 1 else a[:, k] for name, a in (("p", self.p), ("u", self.u))}
+        given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
+        return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
 
     def digest(self) -> str:
         """SHA-256 of all of it."""
@@ -97,7 +98,9 @@ def collect_cases(
     UsageError
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
-    lengths: dict[str, int] = {} if count is None else {"count": _count(count)}
+    lengths: dict[str, int] = (
+        {} if count is None else {"count": read_count("count must be a whole number of runs", count)}
+    )
     p = _bound("parameter", module.p_names, module.p, parameters, lengths)
     u = _bound("input", module.u_names, module.u, inputs, lengths)
     states, values = None, {}
@@ -209,12 +212,6 @@ def _bound(what: str, names: tuple[str, ...], base: Array, given: Any, lengths: 
     return result
 
 
-def _count(given: Any) -> int:
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
-        raise UsageError(f"count must be a whole number of runs, not {given!r}")
-    return int(given)
-
-
 def _require_one_length(lengths: Mapping[str, int]) -> None:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
@@ -241,10 +238,7 @@ def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
 
 
 def _floats(what: str, given: Any) -> Array:
-    try:
-        array = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{what} must be numbers, not {given!r}") from None
+    array = np.array(read_numbers(what, given))
     if not np.isfinite(array).all():
         first = np.argwhere(~np.isfinite(array))[0].tolist()
         raise UsageError(f"{what} must be finite; entry {first} is {array[tuple(first)]}")

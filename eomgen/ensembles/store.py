@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.reading import open_plain
 from ..files.writing import remove_parts, write_whole
 from ..runtime.arrays import BROKEN, read_arrays
 from .blocks import LARGEST, RUNS
@@ -48,7 +49,8 @@ class Store:
 
     def _compare(self, manifest: Path, wanted: dict[str, Any]) -> None:
         try:
-            found = json.loads(manifest.read_text(encoding="utf-8"))
+            with open_plain(manifest) as file:
+                found = json.load(file)
         except (ValueError, RecursionError):
             found = {}
         found = found if isinstance(found, dict) else {}
@@ -92,7 +94,8 @@ class Store:
 def stored_length(folder: str | Path) -> int | None:
     """Runs of a block of the ensemble that a folder holds; None if it holds none."""
     try:
-        found = json.loads((Path(folder) / "manifest.json").read_text(encoding="utf-8"))["block"]
+        with open_plain(Path(folder) / "manifest.json") as file:
+            found = json.load(file)["block"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
     return found if type(found) is int and 0 < found <= LARGEST else None

@@ -17,7 +17,10 @@ STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrat
 # -- size of a run ---------------------------------------------------------------------------------------------------
 MOST_STEPS = 10**8  #: steps of limited size
 MOST_NUMBERS = 5 * 10**7  #: kept by one call: 0.4 GB, of which results are copied two or three times
-ENOUGH, ENDLESS = 3000, 10**10  #: a run that has taken so many steps and needs so many more at their pace would not end
+#: A run that has taken so many steps and needs so many more at their pace would not end.
+ENOUGH, ENDLESS = 3000, 10**10
+FEW, HOPELESS = 300, 10**15  #: the same, where fewer steps tell as much
+MOST_STATES = 10_000  #: random states of one verification: each takes milliseconds
 
 # -- events ----------------------------------------------------------------------------------------------------------
 CROWDED, CROWD = 1e-9, 12  #: resets closer than this part of the run, so many in a row, accumulate at one time

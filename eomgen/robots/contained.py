@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 from collections.abc import Iterable, Sequence
 
-from ..errors import ModelError, Problem
+from ..errors import ModelError, Problem, UsageError
+from ..files.reading import open_plain
 from ..limits.files import NAME
 from .xml_text import Element
 
@@ -80,13 +80,10 @@ class Folder:
             It is no plain file (a pipe, a device), has more than ``most`` bytes, or cannot be read.
         """
         try:
-            descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0))
-            with open(descriptor, "rb") as file:
-                data = file.read(most + 1) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
-        except (OSError, MemoryError) as error:
+            with open_plain(path, follow=False) as file:
+                data = file.read(most + 1)
+        except (OSError, MemoryError, UsageError) as error:
             raise self._refusal(element, path, f"cannot be read: {getattr(error, 'strerror', error)}") from None
-        if data is None:
-            raise self._refusal(element, path, "is no plain file")
         if len(data) > most:
             raise self._refusal(element, path, "is too large", f"at most {most:,} bytes are left for it")
         return data

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import io
 import os
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import MissingDependencyError, ModelError, Problem, UsageError
+from ..errors import MissingDependencyError, ModelError, Problem
+from ..files.reading import open_plain
 from ..limits.files import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 
 
@@ -56,20 +56,14 @@ def read_xml(path: str | os.PathLike[str]) -> Element:
     FileNotFoundError
         There is no such file.
     UsageError
-        The path is none, such as one with NUL.
+        It is no plain file, or the path is none, such as one with NUL.
     ModelError
-        Not a plain file, not XML, a document type or an entity, or too large; with the line.
+        Not XML, a document type or an entity, or too large; with the line.
     MissingDependencyError
         defusedxml is not installed.
     """
     name = os.fsdecode(path)
-    try:
-        mode = os.stat(name).st_mode
-    except ValueError as error:  # NUL, or half a surrogate pair
-        raise UsageError(f"{name!r} is not the name of a file: {error}") from None
-    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # a pipe would be waited for, a device may have no end
-        raise ModelError([Problem("file", "is no plain file", "copy it into one", name, 1)])
-    with open(name, "rb") as file:
+    with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:
         raise ModelError([Problem("file", "is too large", f"at most {SIZE:,} bytes", name, 1)])

@@ -15,6 +15,8 @@ from zipfile import ZIP_STORED, BadZipFile, ZipFile, ZipInfo
 import numpy as np
 from numpy.lib import format as npy
 
+from ..files.reading import open_plain
+
 #: Bytes that any file may unfold to, and how many for each of its own: columns of zeros shrink a lot, these do not.
 SMALL, UNFOLDED = 2**28, 100
 #: What reading a file that is none of ours may raise.
@@ -36,10 +38,12 @@ def read_arrays(path: Path, compressed: bool = True) -> dict[str, Any]:
     Raises
     ------
     FileNotFoundError
+    UsageError
+        It is no plain file.
     ValueError and others of :data:`BROKEN`
         It is damaged, or holds what is no array of numbers or of text.
     """
-    with path.open("rb") as file, ZipFile(file) as archive:
+    with open_plain(path) as file, ZipFile(file) as archive:
         members = archive.infolist()
         own = path.stat().st_size
         allowed = max(SMALL, UNFOLDED * own) if compressed else own

@@ -13,8 +13,9 @@ from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
 from .initial import Initial
 from .kernels import Kernels
-from .layout import Layout, number
-from .room import read_numbers
+from .layout import Layout
+from .names import require_mapping
+from .room import read_number, read_numbers
 
 
 class Assembled:
@@ -65,8 +66,6 @@ class Assembled:
         UsageError
             An unknown name.
         """
-        if values is not None and not isinstance(values, Mapping):
-            raise UsageError(f"x0 takes values by name, as in x0({self.x_names[0]}=0.3), not {values!r}")
         initial = self._initial(t, p, u)
         given = initial.sort(_numbers(values, named))
         q = initial.assembled(given.positions)
@@ -164,13 +163,15 @@ class Assembled:
         """
         layout = self.layout
         for name, given, what in (("p", p, "parameters"), ("u", u, "inputs")):
-            scalar = given is not None and not isinstance(given, Mapping) and np.ndim(given) == 0
+            scalar = isinstance(given, (float, int, np.number)) or (isinstance(given, np.ndarray) and not given.ndim)
             if scalar and name in layout.q + layout.loops + layout.v:
                 kind = "velocity" if name in layout.v else "coordinate"
                 raise UsageError(f"{name}= gives the {what}; the {kind} {name!r} goes in a dict: {{{name!r}: ...}}")
-        return Initial((self if p is None and u is None else self.bind(p, u)).kernels, t)
+        return Initial((self if p is None and u is None else self.bind(p, u)).kernels, read_number("t", t))
 
 
 def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:
+    if values is not None:
+        require_mapping("initial values", values)
     merged = {**(values or {}), **named}
-    return {name: number(name, value) for name, value in merged.items()}
+    return {name: read_number(name, value) for name, value in merged.items()}

@@ -10,6 +10,7 @@ import json
 import warnings
 from collections.abc import Sequence
 from math import isfinite
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .identity import code_digest, differences, digest
+from .room import shown
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
@@ -59,6 +61,8 @@ class Checkpoint:
             raise UsageError(f"checkpoint_every must be a number of seconds, not {every!r}")
         if not isinstance(resume, bool | None):
             raise UsageError(f"resume must be True, False or None, not {resume!r}")
+        if not isinstance(file, (str, PathLike)):
+            raise UsageError(f"checkpoint must be a file's name or path, not {shown(file)}")
         self.file, self.every, self.resume = Path(file), float(every), resume
         self.identity: dict[str, Any] = {}
         self.kept: dict[str, Any] | None = None

@@ -7,8 +7,8 @@ and leave again within it, and zeros after a reset, once the value has been seen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Generator, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -28,9 +28,14 @@ from ..limits.runs import (
     TURNING,
 )
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, crowd_of
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, Together, crowd_of
 
 GOLDEN = 0.3819660112501051
+AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call
+
+Found = TypeVar("Found")
+#: Yields times within a step, is sent the value of one event there, and returns what it looked for.
+Search = Generator[float, float, Found]
 
 
 class Step(NamedTuple):
@@ -39,7 +44,7 @@ class Step(NamedTuple):
     t_old: float
     t: float
     x: Array  #: at t
-    between: Callable[[float], Array]  #: the state at times between
+    between: Callable[[float | Array], Array]  #: the state (n_x,) at a time between, or (n_x, k) at k of them
     length: float  #: of the step to try next, or of this one
 
 
@@ -81,10 +86,25 @@ class Crossings:
         self.size, self.leaving, self.touch = np.empty(n), [0] * n, [0] * n
         self.resets, self.crowded, self.last = 0, 0, np.inf
         self.crowd = crowd_of([event.action for event in events])
+        self.together: dict[int, tuple[Together, list[int]]] = {}  #: what gives several values, and of which events
+        self.alone: list[int] = []
+        for i, event in enumerate(events):
+            if event.source is None:
+                self.alone.append(i)
+            else:
+                self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
 
     # -- values ---------------------------------------------------------------------------------------------------
     def _values(self, t: float, x: Array) -> Array:
-        return np.array([event(t, x) for event in self.events])
+        g = np.empty(len(self.events))
+        for i in self.alone:
+            g[i] = self.events[i](t, x)
+        for together, places in self.together.values():
+            values = together.values(t, x)
+            for i in places:
+                event = self.events[i]
+                g[i] = event.judge(t, float(values[event.source[1]]))  # type: ignore[index]
+        return g
 
     def _slopes(self, t: float, x: Array, f: Array, g: Array, length: float, way: float = 1.0) -> Array:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
@@ -102,7 +122,9 @@ class Crossings:
         """Note the zeros of a step, up to one at which the run stops: its time, and whether the run ends there."""
         new, f = self._values(step.t, step.x), np.asarray(self.rhs(step.t, step.x))
         self.slope_new = self._slopes(step.t, step.x, f, new, step.length)
-        found = [(self._zero(step, z), z.event, z.fb - z.fa) for z in self._brackets(step, new)]
+        brackets = self._brackets(step, new)
+        zeros = self._searched(step, [(z.event, self._zero(z)) for z in brackets])
+        found = [(zero, z.event, z.fb - z.fa) for zero, z in zip(zeros, brackets, strict=True)]
         found.sort(key=lambda triple: self.forward * triple[0])
         self.fired, self.ways = [], []
         stop: tuple[float, bool] | None = None
@@ -132,23 +154,64 @@ class Crossings:
     def _value(self, step: Step, i: int, t: float) -> float:
         return self.events[i](t, self._state(step, t))
 
+    def _searched(self, step: Step, searches: Sequence[tuple[int, Search[Found]]]) -> list[Found]:
+        """Results of searches in the values of events, all of which go on side by side."""
+        results: dict[int, Found] = {}
+        sent: dict[int, float | None] = dict.fromkeys(range(len(searches)))
+        while sent:
+            asked: dict[int, float] = {}
+            for k, value in sent.items():
+                try:
+                    asked[k] = searches[k][1].send(value)  # type: ignore[arg-type]  # None begins
+                except StopIteration as end:
+                    results[k] = end.value
+            values = self._scattered(step, [(searches[k][0], t) for k, t in asked.items()])
+            sent = dict(zip(asked, values, strict=True))
+        return [results[k] for k in range(len(searches))]
+
+    def _scattered(self, step: Step, asked: Sequence[tuple[int, float]]) -> list[float]:
+        """Values of events, each at its time."""
+        if len(asked) < 2:
+            return [self._value(step, i, t) for i, t in asked]
+        times = np.array([t for _, t in asked])
+        states = np.ascontiguousarray(np.asarray(step.between(times)).T)
+        values: dict[int, float] = {}
+        for together, places in self.together.values():
+            if together.columns is None:
+                continue
+            watched = set(places)
+            mine = [k for k, (i, _) in enumerate(asked) if i in watched]
+            size = max(AT_ONCE // len(places), 1)
+            for part in (mine[n : n + size] for n in range(0, len(mine), size)):
+                table = together.columns(times[part], np.ascontiguousarray(states[part].T))
+                for column, k in enumerate(part):
+                    event = self.events[asked[k][0]]
+                    values[k] = event.judge(asked[k][1], float(table[event.source[1], column]))  # type: ignore[index]
+        for k, (i, t) in enumerate(asked):
+            if k not in values:
+                values[k] = self.events[i](t, states[k])
+        return [values[k] for k in range(len(asked))]
+
     def _brackets(self, step: Step, new: Array) -> list[Bracket]:
-        found: list[Bracket] = []
+        found: list[list[Bracket]] = []
+        touching: list[tuple[int, Search[list[Bracket]]]] = []
         for i, event in enumerate(self.events):
             a, b = float(self.g[i]), float(new[i])
             self.touch[i] = 0
             noted = a == 0.0 and bool(self.t[i]) and self.t[i][-1] == step.t_old
             if event.direction != UNWATCHED and not (noted and not self.leaving[i]):
                 if self.leaving[i]:
-                    found += self._after_reset(step, i, b)
+                    found.append(self._after_reset(step, i, b))
                 elif a == 0.0 and self.forward * float(self.slope[i]) * b < 0.0:
-                    found += self._from_zero(step, i, b)
+                    found.append(self._from_zero(step, i, b))
                 elif (a <= 0.0 <= b) or (a >= 0.0 >= b):
-                    found.append(Bracket(i, step.t_old, step.t, a, b))
+                    found.append([Bracket(i, step.t_old, step.t, a, b)])
                 elif self._may_touch(step, i, a, b):
-                    found += self._touching(step, i, a, b)
+                    touching.append((i, self._touching(step, i, a, b)))
                 self.size[i] = np.fmax(self.size[i], abs(b))
-        return [z for z in found if not self.events[z.event].direction * (z.fb - z.fa) < 0.0]
+        found += self._searched(step, touching)
+        every = sorted((z for few in found for z in few), key=lambda z: z.event)
+        return [z for z in every if not self.events[z.event].direction * (z.fb - z.fa) < 0.0]
 
     def _after_reset(self, step: Step, i: int, last: float) -> list[Bracket]:
         """A reset left the value at zero: it has to be seen on its side before it can come back."""
@@ -187,17 +250,19 @@ class Crossings:
         da, db = (self.forward * s * float(slope[i]) * h for slope in (self.slope, self.slope_new))
         if not (a * b > 0.0 and da < 0.0 < db) or max(abs(a), abs(b)) <= RESTING * TOUCHED * self.size[i]:
             return False
+        if db * s * a - da * s * b <= -da * db:  # the tangents meet below zero: also a flat touch, (t - 1)**8
+            return True
         x = da / (da - db)  # about where the cubic through both is least
         y = 1.0 - x
         least = s * a * y * y * (1 + 2 * x) + da * x * y * y + s * b * x * x * (1 + 2 * y) - db * x * x * y
         return least < 0.5 * min(abs(a), abs(b))
 
-    def _touching(self, step: Step, i: int, a: float, b: float) -> list[Bracket]:
+    def _touching(self, step: Step, i: int, a: float, b: float) -> Search[list[Bracket]]:
         s, h = 1.0 if a > 0.0 else -1.0, (step.t - step.t_old) / SAMPLED
         best, at = np.inf, step.t_old
         for k in range(1, SAMPLED):
             t = step.t_old + k * (step.t - step.t_old) / SAMPLED
-            if (value := s * self._value(step, i, t)) < best:
+            if (value := s * (yield t)) < best:
                 best, at = value, t
         left, right = at - h, at + h
         for _ in range(60):  # golden section
@@ -205,7 +270,7 @@ class Crossings:
                 break
             low = abs(at - left) > abs(right - at)
             t = at + GOLDEN * ((left if low else right) - at)
-            value = s * self._value(step, i, t)
+            value = s * (yield t)
             if value < best:
                 left, right = (left, at) if low else (at, right)
                 best, at = value, t
@@ -219,7 +284,7 @@ class Crossings:
             return [Bracket(i, at, at, a, 0.0)]
         return []
 
-    def _zero(self, step: Step, bracket: Bracket) -> float:
+    def _zero(self, bracket: Bracket) -> Search[float]:
         """The zero in a bracket: R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4.
 
         Where the value jumps, the far side of the jump: a run that goes on from the near one would meet it again.
@@ -250,7 +315,7 @@ class Crossings:
                     d = e = m
             a, fa = b, fb
             b += d if abs(d) > tolerance else tolerance if m > 0.0 else -tolerance
-            fb = self._value(step, i, b)
+            fb = yield b
         jumps = fb * bracket.fa > 0.0 > fb * fc and abs(fb) > TOUCHING * float(self.size[i])
         return float(c if jumps else b)
 

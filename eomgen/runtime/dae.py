@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric import algebra
 from ..numeric.scales import Array
+from .kernels import fitting
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class DaeForm:
         result = self._residual(t, self._full(y, yp), u=u)[self._equations]
         if res is None:
             return np.asarray(result)
-        res[:] = result
+        fitting(res, result.shape)[...] = result
         return res
 
     def jacobian(
@@ -94,7 +95,7 @@ class DaeForm:
         result = every[np.ix_(self._equations, self._unknowns)]
         if out is None:
             return np.asarray(result)
-        out[...] = result
+        fitting(out, result.shape)[...] = result
         return out
 
     def initial(self, x: ArrayLike | None = None, t: float = 0.0, u: ArrayLike | None = None) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..limits.runs import CROWD, INSTANT
 from ..numeric.scales import Array
 from .layout import Layout
 from .names import check_names, require_time_and_state, unknown
-from .tapes import Formula, is_formula, record_tape
+from .tapes import Formula, is_formula, record_tape, values_together
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -85,14 +85,25 @@ class Event:
         self.direction = int(np.sign(given)) if given != UNWATCHED or direction is None else UNWATCHED
         self.left: tuple[float, float] | None = None  #: time of the last reset, and the side of zero it led to
         self.known = False  #: whether it has had a value other than NaN
+        self.source: tuple[Together, int] | None = None  #: what gives the values of several events, and its place there
 
     def __call__(self, t: float, x: Array) -> float:
         """The value at time t and state x; right after a reset, one on the side to which it led."""
-        value = float(self.function(t, x))
+        return self.judge(t, float(self.function(t, x)))
+
+    def judge(self, t: float, value: float) -> float:
+        """The same where the function's value is known."""
         self.known = self.known or value == value
         if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
             return self.left[1] * max(abs(value), TINY)
         return value
+
+
+class Together(NamedTuple):
+    """Values of several events, which cost little more than that of one."""
+
+    values: Callable[[float, Array], Sequence[float] | Array]  #: (t, x) -> all of them
+    columns: Callable[[Array, Array], Array] | None = None  #: k times and states (n_x, k) -> (n, k), if that is cheaper
 
 
 class Events:
@@ -120,7 +131,7 @@ class Events:
             if isinstance(one, str) and one in known and name is None:
                 chosen.add(one)
             elif is_formula(one) or isinstance(one, Mapping):
-                self.formulas.append(_of_text(layout, one, name))
+                self.formulas.append(_of_text(layout, one, name, self.formulas[0][1] if self.formulas else None))
             else:
                 self.functions.append(Event(one, name or ""))
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
@@ -159,12 +170,16 @@ class Events:
         """The same as functions f(t, x), for SciPy's methods."""
         kernel = module.kernels.timed("events", nan=True) if self.model else None
         found: list[Event] = []
+        every = _of_kernel(kernel, forcing)
         for i, event in enumerate(self.model):
             function = _unwatched if event.direction == UNWATCHED else _value_of(kernel, forcing, i)
             found.append(Event(function, self.names[i], event.terminal, event.direction, event.action))
+            found[-1].source = None if event.direction == UNWATCHED else (every, i)
         p = module.p
-        for event, formula in self.formulas:
+        texts = Together(values_together([f for _, f in self.formulas], p)) if len(self.formulas) > 1 else None
+        for i, (event, formula) in enumerate(self.formulas):
             found.append(Event(formula.function(p), event.name, event.terminal, event.direction))
+            found[-1].source = None if texts is None else (texts, i)
         return [*found, *self.functions]
 
     def reset(self, module: BoundModel, forcing: Forcing, t: float, x: Array, fired: Sequence[int]) -> Array:
@@ -213,7 +228,7 @@ def _listed(given: Any) -> list[tuple[str | None, Any]]:
     return [(None, given)]
 
 
-def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formula]:
+def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | None) -> tuple[Event, Formula]:
     """An event by its text, or by a mapping with the keys of a model file."""
     options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
@@ -224,7 +239,7 @@ def _of_text(layout: Layout, given: Any, name: str | None) -> tuple[Event, Formu
     if direction not in (-1, 0, 1):
         raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = Event(_only_in_c, name or text, options.get("terminal"), direction)
-    return event, Formula(layout, text, f"event {name or text!r}")
+    return event, Formula(layout, text, f"event {name or text!r}", beside)
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
@@ -261,6 +276,18 @@ def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
             "found; look for a logarithm, root or quotient outside its domain",
             stacklevel=depth + 2,
         )
+
+
+def _of_kernel(kernel: Any, forcing: Forcing) -> Together:
+    """The kernel of the model's events, which gives all of them, at one time or at several."""
+    if not forcing:
+        return Together(kernel, kernel)
+
+    def columns(t: Array, x: Array) -> Array:
+        u = np.stack([forcing(at, state) for at, state in zip(t.tolist(), x.T, strict=True)], axis=1)
+        return np.asarray(kernel(t, x, u=u))
+
+    return Together(lambda t, x: kernel(t, x, u=forcing(t, x)), columns)
 
 
 def _value_of(kernel: Any, forcing: Forcing, i: int) -> Callable[[float, Array], float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
 from .names import UnknownNameError, unknown
-
-if TYPE_CHECKING:
-    pass
 
 
 class Given(NamedTuple):

@@ -17,7 +17,7 @@ from .integrate import choose_solver
 from .late import eager
 from .names import check_names
 from .pace import Crawling, Pace
-from .room import require_steps
+from .room import read_vector, require_steps
 from .run import Run
 from .run_arguments import check_method, declare, own_step
 from .signals import Forcing
@@ -131,7 +131,7 @@ class Integrator:
                 require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
             advance = self._plainly if self._compiled is None else self._compiled.advance
             result, trouble = advance(t, x, h, p, u, out)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise UsageError(f"integrator of {self.module.name}: {error}") from None
         if trouble is not None:
             self._explain(trouble, result, end, p, u)
@@ -225,9 +225,4 @@ def _vector(label: str, given: Any, n: int) -> Any:
     """A new array (n,) of what is given, or None."""
     if given is None and label != "x":
         return None
-    if np.iscomplexobj(given):
-        raise ValueError(f"{label} must hold real numbers, not complex ones")
-    values = np.array(given, dtype=float)
-    if values.shape != (n,):
-        raise ValueError(f"{label} must have shape ({n},), not {values.shape}")
-    return values
+    return np.array(read_vector(label, given, n))

@@ -19,6 +19,7 @@ from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
+from .room import read_numbers
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
@@ -49,12 +50,18 @@ class Kernels:
         except UsageError as error:
             raise UsageError(layout.explain_constants(str(error), p)) from None
         if p is not None and "scales" in core.names:
-            scales = core.state("scales", self.context, layout.shape("scales"), None, False, UsageError)
+            scales = core.state("scales", self.context, layout.shape("scales"), self._unscaled, False, UsageError)
             self.layout = layout = layout.sized(scales(np.empty(0)))
         self.fail = Fail(layout, self._culprit, self._poses if "poses" in core.names else None)
         self.constraints = Rows(self.state("constraints"), layout.rows[layout.rows < layout.n_h])
         self.constraint_jacobian = Rows(self.state("constraint_jacobian"), layout.rows)
         self.velocity_constraints = Rows(self.state("velocity_constraints"), layout.rows)
+
+    def _unscaled(self, *_: Any) -> None:
+        """Refuse parameters whose lengths and masses scale nothing."""
+        given = zip(self.layout.p, self.context.p, strict=True)
+        bad = [f"{name} = {value:.6g}" for name, value in given if not np.isfinite(value)]
+        raise UsageError(f"the sizes that follow from the parameters are not finite{': ' * bool(bad)}{', '.join(bad)}")
 
     def timed(self, name: str, nan: bool = False) -> Timed:
         """A kernel called as ``f(t, x, p=None, u=None, out=None)``; NaN for recoverable failures if `nan`."""
@@ -254,11 +261,11 @@ class Constant:
         t: ArrayLike = 0.0,
     ) -> Array:
         """An empty array, with a last axis for a batch."""
-        shape = np.shape(x)
+        shape = read_numbers("x", x).shape
         if shape[:1] != (self.n_in,) or len(shape) > 2:
             raise UsageError(f"x must have shape ({self.n_in},) or ({self.n_in}, k), not {shape}")
         expected = self.value.shape + shape[1:]
-        return np.zeros(expected) if out is None else _fitting(out, expected)
+        return np.zeros(expected) if out is None else fitting(out, expected)
 
 
 class Nothing:
@@ -297,7 +304,7 @@ class Identity(Constant):
         t: ArrayLike = 0.0,
     ) -> Array:
         """A copy of x."""
-        result = _write(super().__call__(x, out=out), np.asarray(x, dtype=float))
+        result = _write(super().__call__(x, out=out), read_numbers("x", x))
         for i in self.balls:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
@@ -326,14 +333,17 @@ class Selected:
 
 
 def _write(out: Array, result: Array) -> Array:
-    _fitting(out, result.shape)[...] = result
+    fitting(out, result.shape)[...] = result
     return out
 
 
-def _fitting(out: Array, shape: tuple[int, ...]) -> Array:
+def fitting(out: Array, shape: tuple[int, ...]) -> Array:
+    """The array that takes a result, if it can."""
     if not isinstance(out, np.ndarray) or out.dtype != np.float64:
         kind = getattr(out, "dtype", type(out).__name__)
         raise UsageError(f"out must be a float64 array of shape {shape}, not {kind}")
     if out.shape != shape:
         raise UsageError(f"out must have shape {shape}, not {out.shape}")
+    if not out.flags.writeable:
+        raise UsageError("out is read-only")
     return out

@@ -53,7 +53,7 @@ class LateCore:
     def _make(self, maker: str, name: str, options: tuple[Any, ...]) -> Any:
         if name in self.core.names:
             return getattr(self.core, maker)(name, *options)
-        return LateKernel(self, maker, name, options)
+        return LATE[maker](self, maker, name, options)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.core, name)
@@ -85,9 +85,32 @@ class LateKernel:
         """The last failure, as other kernels have it; None before the first call."""
         return self.__dict__["kernel"].failure if "kernel" in self.__dict__ else None
 
-    def __call__(self, *args: Any, **options: Any) -> Any:
+
+class LateTimed(LateKernel):
+    """A kernel of time and state."""
+
+    def __call__(self, t: Any, x: Any, p: Any = None, u: Any = None, out: Any = None) -> Any:
         """Evaluate."""
-        return self.kernel(*args, **options)
+        return self.kernel(t, x, p, u, out)
+
+
+class LateState(LateKernel):
+    """A kernel of the state alone."""
+
+    def __call__(self, x: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
+        """Evaluate."""
+        return self.kernel(x, p, u, out, t)
+
+
+class LateMotion(LateKernel):
+    """A kernel of coordinates, velocities and accelerations."""
+
+    def __call__(self, q: Any, v: Any, a: Any, p: Any = None, u: Any = None, out: Any = None, t: Any = 0.0) -> Any:
+        """Evaluate."""
+        return self.kernel(q, v, a, p, u, out, t)
+
+
+LATE = {"timed": LateTimed, "state": LateState, "motion": LateMotion}
 
 
 def eager(core: Any) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array, Scales, Space
 from .names import check_names
-from .room import read_numbers
+from .room import read_number, read_numbers
 
 ABI = 1  #: layout of the metadata this file reads
 
@@ -200,7 +200,7 @@ class Layout:
             check_names(what, given, names)
             result = np.array(current, dtype=float)
             for name, value in given.items():
-                result[names.index(name)] = number(f"{what} {name}", value)
+                result[names.index(name)] = read_number(f"{what} {name}", value)
             self._check_masses(what, names, result)
             return result
         result = read_numbers(f"the {what}s", given)
@@ -235,17 +235,6 @@ class Layout:
                     f"parameter {name} is the mass of body {body!r}, which is 0 or positive, not {value:g}; "
                     "check_inertia: false in the model lets it be negative"
                 )
-
-
-def number(label: str, value: object) -> float:
-    """One finite number, or a UsageError that names it."""
-    try:
-        result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"{label} must be a number, not {value!r}") from None
-    if not np.isfinite(result):
-        raise UsageError(f"{label} must be finite, not {result}")
-    return result
 
 
 def acceleration_name(velocity: str) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
 from .paths import STEP, Path
-from .room import read_numbers
+from .room import read_number, read_numbers
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -120,8 +120,11 @@ class Minimal:
         if x.shape[:1] != (self.n_x,) or x.ndim > 2:
             raise UsageError(f"x must have shape ({self.n_x},) or ({self.n_x}, k), not {x.shape}")
         if x.ndim == 1:
-            return self._solve(float(read_numbers("t", t)), x)
-        times = np.broadcast_to(read_numbers("t", t), x.shape[1:])
+            return self._solve(read_number("t", t), x)
+        times = read_numbers("t", t)
+        if times.shape not in ((), x.shape[1:]):
+            raise UsageError(f"t must be a number or have shape {x.shape[1:]}, one a state, not {times.shape}")
+        times = np.broadcast_to(times, x.shape[1:])
         result = np.empty((self._layout.n_x, x.shape[1]))
         for j in range(x.shape[1]):
             result[:, j] = self._solve(float(times[j]), x[:, j])
@@ -152,6 +155,7 @@ class Minimal:
         state = read_numbers("x", x)
         if state.shape != (self.n_x,):
             raise UsageError(f"x must have shape ({self.n_x},) [{', '.join(self.x_names)}], not {state.shape}")
+        t = read_number("t", t)
         memory = self._memory
         before = memory.q
         full = self._solve(t, state)

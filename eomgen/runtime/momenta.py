@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from .kernels import fitting
 from .room import read_numbers
 
 if TYPE_CHECKING:
@@ -68,9 +69,7 @@ class Part:
         result = every[self.start : self.start + prod(self.shape)].reshape(self.shape + state.shape[1:])
         if out is None:
             return result
-        if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != result.shape:
-            raise UsageError(f"out must be a float64 array of shape {result.shape}")
-        out[...] = result
+        fitting(out, result.shape)[...] = result
         return out
 
 

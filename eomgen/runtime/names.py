@@ -7,6 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
+from .room import shown
 
 
 class UnknownNameError(UsageError, KeyError):
@@ -39,6 +40,35 @@ def check_names(
     for name in given:
         if name not in allowed:
             raise unknown(what, name, [*allowed, *further])
+
+
+def read_names(what: str, given: Any) -> tuple[str, ...]:
+    """One name or several as a tuple of texts.
+
+    Raises
+    ------
+    UsageError
+    """
+    if isinstance(given, str):
+        return (given,)
+    try:
+        names = tuple(given)
+    except TypeError:
+        names = (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise UsageError(f"{what} must be a name or a list of names, not {shown(given)}")
+    return names
+
+
+def require_mapping(what: str, given: Any) -> None:
+    """Refuse what does not give values by name.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(given, Mapping):
+        raise UsageError(f"{what} must give values by name, as a mapping does, not {shown(given)}")
 
 
 def require(module: str, extra: str, purpose: str) -> ModuleType:

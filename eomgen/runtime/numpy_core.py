@@ -18,10 +18,13 @@ from ..errors import STATUS, EvaluationError
 from ..numeric.scales import Array
 from .layout import KERNELS, Layout
 from .numpy_drivers import Drivers
+from .room import as_real, read_vector, shown
 
 #: f(t, x, u, c) -> out
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
 
+#: For values by name where a call takes an array.
+BY_NAME = "{0} of a call is an array in the order of {0}_names; by name: bind({0}={{...}})"
 CODES = {error: status for status, error in STATUS.items()}
 
 
@@ -74,8 +77,9 @@ class NumpyCore:
             For a wrong shape, or constants that are not finite.
         """
         data = self.layout.metadata
-        p = _vector(data["p_values"] if p is None else p, self.layout.n_p, "p", error)
-        u = _vector(data["u_values"] if u is None else u, self.layout.n_u, "u", error)
+        p = _declared(data["p_values"]) if p is None else p
+        p = _vector(p, self.layout.n_p, "p", error)
+        u = _vector(_declared(data["u_values"]) if u is None else u, self.layout.n_u, "u", error)
         return Context(p, u, self.constants(p, error))
 
     def constants(self, p: Array, error: type[Exception]) -> Array:
@@ -148,24 +152,40 @@ class NumpyKernel:
         self.vectorised = block is not None
         self.call: Block = block if block is not None else core.drivers.make(name)
 
+    def read(self, value: object, label: str, n: int) -> Array:
+        """An argument with n rows, or the time, as an array of floats."""
+        found = as_real(value)
+        if found is not None:
+            return found
+        if label in ("p", "u") and isinstance(value, Mapping):
+            raise self.error(BY_NAME.format(label))
+        wanted = "be a real number, or (k,)" if label == "t" else f"hold real numbers, ({n},) or ({n}, k)"
+        raise self.error(f"{self.label(label)} of {self.name} must {wanted}, not {shown(value)}")
+
+    def misfit(self, label: str, n: int, given: Array) -> Exception:
+        """The error for a wrong shape."""
+        error: Exception = self.error(
+            f"{self.label(label)} of {self.name} must have shape ({n},) or ({n}, k), not {given.shape}"
+        )
+        return error
+
+    def label(self, label: str) -> str:
+        """What users call an argument: the x of some kernels is q."""
+        return "q" if label == "x" and KERNELS.get(self.name, ("x",))[0] == "q" else label
+
     def evaluate(self, t: Any, x: Array, p: Any, u: Any, out: Array | None) -> Array:
         """One state or a batch."""
         layout = self.core.layout
         if x.shape[:1] != (self.n_in,) or x.ndim > 2:
-            label = "q" if KERNELS.get(self.name, ("x",))[0] == "q" else "x"
-            raise self.error(
-                f"{label} of {self.name} must have shape ({self.n_in},) or ({self.n_in}, k), not {x.shape}"
-            )
+            raise self.misfit("x", self.n_in, x)
         c = self.context.c
         if p is not None:
             c = self.core.constants(_vector(p, layout.n_p, "p", self.error), self.error)
         given = () if p is None and u is None else (p,)
-        force = self.context.u if u is None else _real(u, "u", self.error)
+        force = self.context.u if u is None else self.read(u, "u", layout.n_u)
         if force.shape not in ((layout.n_u,), (layout.n_u, *x.shape[1:])):
-            raise self.error(
-                f"u of {self.name} must have shape ({layout.n_u},) or ({layout.n_u}, k), not {force.shape}"
-            )
-        t = _real(t, "t", self.error)
+            raise self.misfit("u", layout.n_u, force)
+        t = self.read(t, "t", 0)
         if t.shape not in ((), x.shape[1:]):
             raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
         expected = (*self.shape, *x.shape[1:])
@@ -220,7 +240,7 @@ class NumpyTimed(NumpyKernel):
 
     def __call__(self, t: Any, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None) -> Array:
         """Evaluate at time t, or one time for each state (k,), and state x (n,) or k states as columns (n, k)."""
-        return self.evaluate(t, _real(x, "x", self.error), p, u, out)
+        return self.evaluate(t, self.read(x, "x", self.n_in), p, u, out)
 
 
 class NumpyState(NumpyKernel):
@@ -228,7 +248,7 @@ class NumpyState(NumpyKernel):
 
     def __call__(self, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None, t: Any = 0.0) -> Array:
         """Evaluate at state x; arguments as for :class:`NumpyTimed`."""
-        return self.evaluate(t, _real(x, "x", self.error), p, u, out)
+        return self.evaluate(t, self.read(x, "x", self.n_in), p, u, out)
 
 
 class NumpyMotion(NumpyKernel):
@@ -246,25 +266,14 @@ class NumpyMotion(NumpyKernel):
     ) -> Array:
         """Evaluate at q, v, a of shapes (n_q,), (n_v,), (n_v,) or with a last axis k."""
         layout = self.core.layout
-        parts = [_real(part, label, self.error) for part, label in ((q, "q"), (v, "v"), (a, "a"))]
+        sizes = (layout.n_q, layout.n_v, layout.n_v)
+        parts = [self.read(part, label, n) for part, label, n in zip((q, v, a), "qva", sizes, strict=True)]
         columns = max((part.shape[1:] for part in parts), key=len)
-        for part, label, size in zip(parts, "qva", (layout.n_q, layout.n_v, layout.n_v), strict=True):
-            if part.shape not in ((size,), (size, *columns)):
-                raise self.error(f"{label} of {self.name} must have shape ({size},) or ({size}, k), not {part.shape}")
+        for part, label, n in zip(parts, "qva", sizes, strict=True):
+            if part.shape not in ((n,), (n, *columns)) or part.ndim > 2:
+                raise self.misfit(label, n, part)
         x = [part if part.shape[1:] == columns else np.repeat(part[:, None], columns[0], axis=1) for part in parts]
         return self.evaluate(t, np.concatenate(x), p, u, out)
-
-
-def _real(value: object, label: str, error: Any) -> Array:
-    if isinstance(value, Mapping):
-        raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
-    array = np.asarray(value)
-    if array.dtype.kind not in "biufO" or value is None:
-        raise error(f"{label} must hold real numbers, not {array.dtype if value is not None else None}")
-    try:
-        return array.astype(float, copy=False)
-    except (TypeError, ValueError):
-        raise error(f"{label} must hold real numbers, not {value!r}") from None
 
 
 def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) -> None:
@@ -277,10 +286,12 @@ def _check_out(out: object, expected: tuple[int, ...], name: str, error: Any) ->
         raise error(f"out of {name} is read-only")
 
 
+def _declared(values: Any) -> list[float]:
+    """Values as the metadata hold them, where what is not given is null."""
+    return [np.nan if value is None else value for value in values]
+
+
 def _vector(value: object, n: int, label: str, error: Any) -> Array:
-    if isinstance(value, list):
-        value = [np.nan if item is None else item for item in value]
-    array = np.array(_real(value, label, error))
-    if array.shape != (n,):
-        raise error(f"{label} must have shape ({n},), not {array.shape}")
-    return array
+    if isinstance(value, Mapping):
+        raise error(BY_NAME.format(label))
+    return np.array(read_vector(label, value, n, error))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import SimulationError
 from ..limits.rounding import TINY
-from ..limits.runs import ENDLESS, ENOUGH, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
+from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from .failure import place
 
@@ -97,7 +97,8 @@ class Pace:
                 f"the run has taken {self.taken} steps to t = {t:.6g} s of {self.end:.6g} s, and no more are kept; "
                 "take a shorter span, or in Python give the times to store, t_eval"
             )
-        if self.taken > ENOUGH and abs(self.end - t) * self.taken > ENDLESS * abs(t - self.start):
+        wanted, gone = abs(self.end - t) * self.taken, abs(t - self.start)
+        if (self.taken > ENOUGH and wanted > ENDLESS * gone) or (self.taken > FEW and wanted > HOPELESS * gone):
             more = abs(self.end - t) / max(abs(t - self.start), TINY) * self.taken
             raise SimulationError(
                 f"the run has taken {self.taken} steps to t = {t:.6g} s and needs {more:.1e} more to "

@@ -169,6 +169,8 @@ def motions(
             raise UsageError(f"{name} must be finite")
         parts.append(np.broadcast_to(full if full.shape[1:] == columns else full[:, None], (size, *columns)))
     q, v, a = (part if columns else part[:, None] for part in parts)
+    if t.shape not in ((), q.shape[1:]):
+        raise UsageError(f"t must be a number or have shape {q.shape[1:]}, one a position, not {t.shape}")
     times = np.broadcast_to(t, q.shape[1:])
     if guess is not None:
         if guess.shape != (layout.n_q,):

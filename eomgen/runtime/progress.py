@@ -6,6 +6,8 @@ import sys
 from time import perf_counter
 from typing import Any
 
+from .room import read_flag
+
 PATIENCE = 2.0  #: seconds before anything is shown
 EVERY = 0.2  #: seconds between updates
 STRIDE = 64  #: calls between looks at the clock
@@ -76,4 +78,4 @@ class Progress:
 
 def wanted(progress: bool | None) -> bool:
     """Whether to watch a run: as asked, or when stderr is a terminal."""
-    return sys.stderr.isatty() if progress is None else progress
+    return sys.stderr.isatty() if progress is None else read_flag("progress", progress)

@@ -14,8 +14,7 @@ from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .layout import number
-from .room import read_numbers, read_times
+from .room import as_real, read_number, read_numbers, read_times, shown
 from .signals import Forcing
 from .tolerances import check_step
 
@@ -34,14 +33,11 @@ def find_span(span: float | tuple[float, float] | None, declared: float) -> tupl
     plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
     if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
         return float(span[0]), float(span[1])  # type: ignore[index]
-    try:
-        if np.ndim(span) == 0:
-            return 0.0, number("the end of the span", span)
-        pair = np.asarray(span, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}") from None
-    if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise UsageError(f"span must be (start, end) in seconds, not {span!r}")
+    pair = as_real(span)
+    if pair is not None and not pair.ndim:
+        return 0.0, read_number("the end of the span", span)
+    if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
+        raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}")
     return float(pair[0]), float(pair[1])
 
 
@@ -60,6 +56,8 @@ def own_step(module: BoundModel, method: Any, step: Any) -> tuple[Any, Any]:
 
 def check_method(method: Any, step: Any) -> float | None:
     """The size of the steps of RK4 (s), or None for another method; a UsageError if they do not go together."""
+    if method is not None and not isinstance(method, (str, type)):
+        raise UsageError(f"method must be a name or a subclass of OdeSolver, not {shown(method)}")
     if (isinstance(method, str) and method == "RK4") != (step is not None):
         raise UsageError("method RK4 needs step=, the size of its steps (s), and no other method takes it")
     return None if step is None else check_step("step", step)

@@ -16,7 +16,8 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
-from .layout import Layout, number
+from .layout import Layout
+from .room import read_number
 from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
@@ -313,7 +314,7 @@ def derive(name: str, rate: str, value: Any) -> Any:
     derivative = getattr(value, "derivative", None)
     found = derivative() if callable(derivative) else None
     if found is not None:
-        return of_time(found) if callable(found) else number(f"derivative of input {name}", found)
+        return of_time(found) if callable(found) else read_number(f"derivative of input {name}", found)
     raise UsageError(
         f"input {name}: the equations need its rate {rate}, which is not known of a function; give {rate} beside it, "
         f"or {name} as text, table or Signal, or as an object with a method derivative()"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from math import isfinite
 from typing import Any, NamedTuple
@@ -13,9 +13,10 @@ from ..errors import UsageError
 from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..numeric.splines import slopes
-from .layout import Layout, number
-from .names import check_names, require_time_and_state, unknown
+from .layout import Layout
+from .names import check_names, require_mapping, require_time_and_state, unknown
 from .rate_checks import require_agreement
+from .room import as_real, read_number, read_numbers, shown
 from .signal_rates import TableRate, derive, fill_rates, jumps, of_time, pieces_of, require_smooth
 from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
@@ -44,8 +45,8 @@ class Signal:
     """
 
     def __init__(self, times: Any, values: Any, interpolation: str = "linear", *, corners: bool = True) -> None:
-        self.times, self.values = np.array(times, dtype=float), np.array(values, dtype=float)
-        if interpolation not in ORDERS:
+        self.times, self.values = (np.array(read_numbers("a table", part)) for part in (times, values))
+        if not isinstance(interpolation, str) or interpolation not in ORDERS:
             raise unknown("interpolation", interpolation, ORDERS)
         self.interpolation, self.order, self.corners = interpolation, ORDERS[interpolation], corners
         if self.times.ndim != 1 or self.times.shape != self.values.shape or not self.times.size:
@@ -158,9 +159,8 @@ class Forcing:
     """
 
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
-        given = inputs or {}
-        if not isinstance(given, Mapping):
-            raise UsageError(f"inputs must be a mapping of names, not {type(given).__name__}")
+        given = {} if inputs is None else inputs
+        require_mapping("inputs", given)
         check_names("input", given, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
         self.layout = layout
         self.constants: dict[str, float] = {}
@@ -206,17 +206,18 @@ class Forcing:
             return value
         if is_formula(value):
             return Formula(self.layout, value, f"input {name}")
-        if isinstance(value, (tuple, list)) and len(value) == 2 and np.ndim(value[0]) > 0:
+        if isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], (Sequence, np.ndarray)):
             try:
                 return Signal(*value)
             except UsageError as error:
                 raise UsageError(f"input {name}: {error}") from None
-        if np.ndim(value) == 0:
-            return number(f"input {name}", value)
-        raise UsageError(
-            f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
-            f"f(t, x), not {value!r}"
-        )
+        found = as_real(value)
+        if found is None or found.ndim:
+            raise UsageError(
+                f"input {name} must be a number, (times, values), a Signal, an expression as text or a function "
+                f"f(t, x), not {shown(value)}"
+            )
+        return read_number(f"input {name}", value)
 
     def begin(self, start: float, end: float) -> None:
         """Take the times of a run, over which tables must be as smooth as the equations need them.
@@ -292,14 +293,13 @@ class Forcing:
 
     def _one_number(self, index: int, t: float, value: Any) -> float:
         """What is no float as one, if it is a number: an integer, a NumPy scalar, an array of shape ()."""
-        if value is not None and not isinstance(value, str) and np.shape(value) == ():
-            try:
-                return float(value)
-            except (TypeError, ValueError):
-                pass
-        shown = f"an array of shape {np.shape(value)}" if isinstance(value, np.ndarray) and value.ndim else repr(value)
+        found = as_real(value)
+        if found is not None and not found.ndim:
+            return float(found)
+        many = isinstance(value, np.ndarray) and value.ndim
+        returned = f"an array of shape {value.shape}" if many else shown(value)
         raise UsageError(
-            f"input {self.names[index]} must be one number at each time, but its function returned {shown} "
+            f"input {self.names[index]} must be one number at each time, but its function returned {returned} "
             f"at t = {t:.6g} s"
         )
 

@@ -18,7 +18,7 @@ from .names import check_names
 from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import require_room, require_steps
+from .room import read_flag, require_room, require_steps
 from .run import Run
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
 from .signals import Forcing
@@ -133,7 +133,7 @@ def simulate(
         kept = Checkpoint(checkpoint, checkpoint_every, resume)
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to go on from")
-    if method == "kinematic" or (method is None and not module.n_dof):
+    if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
         from ..analysis.driven import is_driven
 
         if is_driven(module) and not _led_by_inputs(module, inputs, method):
@@ -144,7 +144,7 @@ def simulate(
         if method is not None:
             raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
     method, step = own_step(module, method, step)
-    step = check_method(method, step)
+    step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
     method = declared["method"] if method is None else method
     watched = Events(module.layout, events)

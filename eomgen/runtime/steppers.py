@@ -11,8 +11,10 @@ from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
 from .compiled import no_series, stepper_options
 from .events import Events
+from .kernels import fitting
 from .late import eager
 from .names import require
+from .room import read_number, read_vector
 from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
@@ -162,17 +164,20 @@ def step(module: BoundModel, t: float, x: Any, h: float, u: Any = None, out: Arr
     core = eager(module.core)
     if hasattr(core, "march"):
         context = module.kernels.context
-        status, result = core.march(context, t, h, x, u, out)
+        status, result = core.march(context, t, h, x, u, out, UsageError)
         if status != 0:
             module.kernels.fail(
                 "rhs", status, t, np.array(x, dtype=float), None, None if u is None else np.array(u, dtype=float)
             )
         return np.asarray(result)
-    start = np.array(x, dtype=float)
+    t, h, start = read_number("t", t), read_number("h", h), read_vector("x", x, module.n_x)
+    if out is not None:
+        fitting(out, start.shape)
     k = [module.rhs(t, start, u=u)]
-    for part in (0.5, 0.5, 1.0):
-        k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
-    after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
+    with np.errstate(all="ignore"):  # what overflows is told by the next evaluation
+        for part in (0.5, 0.5, 1.0):
+            k.append(module.rhs(t + part * h, start + part * h * k[-1], u=u))
+        after = start + h / 6.0 * (k[0] + 2.0 * (k[1] + k[2]) + k[3])
     if out is None:
         return np.asarray(after)
     out[...] = after

@@ -35,9 +35,11 @@ class Formula:
         As in a model file, e.g. ``"theta - pi/2"``.
     what : str
         Whose it is, for messages.
+    beside : Formula, optional
+        One whose graph it shares, so that both can be evaluated at once.
     """
 
-    def __init__(self, layout: Layout, text: str, what: str) -> None:
+    def __init__(self, layout: Layout, text: str, what: str, beside: Formula | None = None) -> None:
         try:
             from ..describe.expressions import parse
             from ..graph.core import Graph
@@ -48,7 +50,7 @@ class Formula:
                 f"{what}: an expression as text needs eomgen to be read: pip install eomgen, or give a function f(t, x)"
             ) from None
         self.text, self.layout = text, layout
-        graph = Graph()
+        graph: Graph = Graph() if beside is None else beside.expression.graph
         known = ("t", *layout.x, *layout.p)
 
         def resolve(name: str) -> Expr:
@@ -57,7 +59,7 @@ class Formula:
             return graph.symbol(name)
 
         try:
-            self.expression = parse(text, graph, resolve)
+            self.expression: Expr = parse(text, graph, resolve)
         except ExpressionError as error:
             raise UsageError(f"{what}: {error}") from None
         self.depends_on_state = not symbols_of([self.expression]).isdisjoint(layout.x)
@@ -128,6 +130,15 @@ class Formula:
         evaluate = compile_evaluator(gradient(self.expression, [graph.symbol(name) for name in known]), known)
         values = p.tolist()
         return lambda t, x: np.array(evaluate([t, *np.asarray(x).tolist(), *values]), dtype=float)
+
+
+def values_together(formulas: Sequence[Formula], p: Array) -> Callable[[float, Array], list[float]]:
+    """f(t, x) -> the values of formulas of one graph at given parameters (n_p,), in one pass."""
+    from ..graph.evaluate import compile_evaluator
+
+    layout, values = formulas[0].layout, p.tolist()
+    evaluate = compile_evaluator([formula.expression for formula in formulas], ("t", *layout.x, *layout.p))
+    return lambda t, x: evaluate([t, *np.asarray(x).tolist(), *values])
 
 
 def record_tape(formulas: Sequence[Formula]) -> Tape:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import LEAST_RTOL
-from .layout import number
+from .room import as_real, read_number, shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 
@@ -48,7 +48,7 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
         if name in checked:
             checked[name] = check_step(name, checked[name])
     if "min_step" in checked:
-        checked["min_step"] = number("min_step", checked["min_step"])
+        checked["min_step"] = read_number("min_step", checked["min_step"])
         if checked["min_step"] < 0.0:
             raise UsageError(f"min_step must not be negative, not {checked['min_step']:.6g}")
     if checked.get("first_step", 0.0) > span:
@@ -59,14 +59,13 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
 def _tolerance(name: str, given: Any, n: int) -> Any:
     if type(given) is float and 0.0 <= given < np.inf:
         return given
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise UsageError(f"{name} must be a number, or one for each of the {n} states, not {given!r}") from None
+    values = as_real(given)
+    if values is None:
+        raise UsageError(f"{name} must be a number, or one for each of the {n} states, not {shown(given)}")
     if values.shape not in ((), (n,)):
         raise UsageError(f"{name} must be a number or have shape ({n},), one for each state, not {values.shape}")
     if not (np.isfinite(values).all() and (values >= 0.0).all()):
-        raise UsageError(f"{name} must not be negative and must be finite, not {given}")
+        raise UsageError(f"{name} must not be negative and must be finite, not {shown(given)}")
     return values if values.ndim else float(values)
 
 
@@ -74,10 +73,10 @@ def check_step(name: str, given: Any) -> float:
     """A length of steps (s), or a UsageError that names it."""
     if type(given) is float and 0.0 < given < np.inf:
         return given
-    try:
-        value = float(given)
-    except (TypeError, ValueError):
-        raise UsageError(f"{name} must be a number of seconds, not {given!r}") from None
+    found = as_real(given)
+    if found is None or found.ndim:
+        raise UsageError(f"{name} must be a number of seconds, not {shown(given)}")
+    value = float(found)
     if not value > 0.0 or (name == "first_step" and not np.isfinite(value)):
         raise UsageError(f"{name} must be greater than 0 s{' and finite' * (name == 'first_step')}, not {given}")
     return value

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import EomgenError, UsageError
 from ..limits.rounding import EPS
+from ..limits.runs import MOST_STATES
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
@@ -57,8 +58,9 @@ def verify(module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: 
     MissingDependencyError
         mpmath or SciPy is missing where the equations are there.
     UsageError
-        ``states`` is no whole number from 1.
+        ``states`` is no whole number from 1 to :data:`MOST_STATES`, ``seed`` none from 0, ``seconds`` no number from 0.
     """
+    _require(states, seed, seconds)
     start = perf_counter()
     found = _of_module(module, states, seed)
     left = max(LEAST, seconds - (perf_counter() - start))
@@ -66,10 +68,23 @@ def verify(module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: 
     return Verification(module.name, tuple(found), perf_counter() - start)
 
 
+def _require(states: object, seed: object, seconds: object) -> None:
+    """Refuse what is no number of states, no seed, no time."""
+    if isinstance(states, bool) or not isinstance(states, int | np.integer) or not 1 <= states <= MOST_STATES:
+        what = f"the number of random states, a whole number from 1 to {MOST_STATES}"
+        raise UsageError(f"verify: states is {states!r:.80}; it is {what}")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise UsageError(f"verify: seed is {seed!r:.80}; it is a whole number from 0, of the random states")
+    if (
+        isinstance(seconds, bool)
+        or not isinstance(seconds, int | float | np.integer | np.floating)
+        or not seconds >= 0.0
+    ):
+        raise UsageError(f"verify: seconds is {seconds!r:.80}; it is the time for all of it, a number from 0")
+
+
 def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
     """What the module says of itself, and what follows from its equations."""
-    if isinstance(states, bool) or not isinstance(states, int) or states < 1:
-        raise UsageError(f"verify: states is {states!r}; it is the number of random states, a whole number from 1")
     if not module.n_x:
         return _of_fixed_bodies(module)
     cases = random_cases(module, states, seed)
@@ -108,6 +123,7 @@ def verify_model(
     seconds : float
         Time for all of it; variants have what is left, and at least :data:`LEAST`.
     """
+    _require(states, seed, seconds)
     start = perf_counter()
     found = _of_module(module, states, seed)
     found += _variants(module, model, seed, max(LEAST, seconds - (perf_counter() - start)))

@@ -75,6 +75,7 @@ cdef enum:
     STACK = 1024  # doubles of work kept on the stack: 8 KiB, as a thread may have no more than 512
     MAX_DIMENSIONS = 8
     WIDEST = 8  # lanes; 8 doubles are also the largest alignment they need
+    SCALAR = -2  # in place of a number of rows
     MANY = 4096  # columns after which lanes that must be compiled first are worth it
 
 cdef const eomgen_model *MODEL = eomgen_model_table()
@@ -95,34 +96,80 @@ cdef int find(str name, object error) except -1:
     return names.index(name)
 
 
-cdef cnp.ndarray doubles(object value, str label, object error):
-    """The value as an aligned float64 array: itself if it is one, whatever its strides; else a converted copy."""
-    cdef cnp.ndarray array = cnp.PyArray_FROM_O(value)
-    if cnp.PyArray_TYPE(array) == cnp.NPY_DOUBLE and cnp.PyArray_ISBEHAVED_RO(array):
-        return array
-    if isinstance(value, dict):
+# What Python or NumPy would make a float of, or NaN, though it is no real number.
+cdef tuple UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))
+
+
+cdef cnp.ndarray doubles(object value, str label, object error, str name=None, int n=-1):
+    """The value as an aligned float64 array: itself if it is one, whatever its strides; else a converted copy.
+
+    What is refused is told as the argument `label` of kernel `name`, of n rows.
+    """
+    if (cnp.PyArray_CheckExact(value) and cnp.PyArray_TYPE(<cnp.ndarray>value) == cnp.NPY_DOUBLE
+            and cnp.PyArray_ISBEHAVED_RO(<cnp.ndarray>value)):
+        return value
+    return converted(value, label, error, name, n)
+
+
+cdef cnp.ndarray converted(object value, str label, object error, str name, int n):
+    """Real numbers, by the rule of as_real in eomgen's runtime/room.py."""
+    try:
+        array = np.asarray(value)
+        kind = array.dtype.kind
+        real = kind in "biuf" or kind == "O" and not any([isinstance(one, UNREAL) for one in array.flat])
+        if real and not (isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value)):
+            return np.require(array, np.float64, "A")
+    except (TypeError, ValueError, OverflowError):
+        pass
+    if label in ("p", "u") and isinstance(value, dict):
         raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
-    if array.dtype.kind not in "biufO":
-        raise error(f"{label} must hold real numbers, not {array.dtype}")
-    return cnp.PyArray_FROMANY(array, cnp.NPY_DOUBLE, 0, 0, cnp.NPY_ARRAY_BEHAVED | cnp.NPY_ARRAY_FORCECAST)
+    if n == SCALAR:
+        wanted = "be a number" if name is None else "be a real number, or (k,)"
+    else:
+        shape = "" if n < 0 else f", ({n},)" if name is None else f", ({n},) or ({n}, k)"
+        wanted = f"hold real numbers{shape}"
+    raise error(f"{called(label, name, n)} must {wanted}, not {shown(value)}")
 
 
-cdef inline double moment(object t, object error) except? -7.0:
-    """The time of a call."""
+cdef str called(str label, str name, int n):
+    """What users call an argument: the x of some kernels is q."""
+    label = "q" if label == "x" and n == len(_FACTS.get("q_names", ())) else label
+    return label if name is None else f"{label} of {name}"
+
+
+cdef str shown(object value):
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else text[:80] + "..."
+
+
+cdef inline double moment(object t, str label, object error, str name=None) except? -7.0:
+    """A time: one real number."""
     if isinstance(t, float):
         return t
-    try:
-        return t
-    except TypeError:
-        raise error(f"t must be a real number, not {t!r}") from None
+    if isinstance(t, int):
+        try:
+            return t
+        except OverflowError:
+            pass
+    array = doubles(t, label, error, name, SCALAR)
+    if cnp.PyArray_NDIM(array):
+        if name is None:
+            raise error(f"{label} must be a number, not {shown(t)}")
+        raise error(f"{label} of {name} must be a number or have shape (k,), not {(<object>array).shape}")
+    return (<double *>cnp.PyArray_DATA(array))[0]
 
 
 cdef cnp.ndarray vector(object value, int n, str label, object error):
     """The value as a contiguous float64 vector of n numbers."""
-    cdef cnp.ndarray array = cnp.PyArray_GETCONTIGUOUS(doubles(value, label, error))
+    cdef cnp.ndarray array = cnp.PyArray_GETCONTIGUOUS(doubles(value, label, error, None, n))
     if array.ndim != 1 or cnp.PyArray_DIM(array, 0) != n:
         raise error(f"{label} must have shape ({n},), not {(<object>array).shape}")
     return array
+
+
+cdef list declared(str key):
+    """Values as the metadata hold them, where what is not given is null."""
+    return [NAN if value is None else value for value in _FACTS.get(key, ())]
 
 
 cdef cnp.ndarray copy(const double *data, cnp.npy_intp n):
@@ -162,8 +209,8 @@ cdef class Context:
     cdef readonly cnp.ndarray p, u, c
 
     def __cinit__(self, p=None, u=None, error=ValueError):
-        p = _FACTS.get("p_values", ()) if p is None else p
-        u = _FACTS.get("u_values", ()) if u is None else u
+        p = declared("p_values") if p is None else p
+        u = declared("u_values") if u is None else u
         self.p = np.array(vector(p, MODEL.n_p, "p", error))
         self.u = np.array(vector(u, MODEL.n_u, "u", error))
         self.c = compute_constants(self.p, error)
@@ -261,11 +308,11 @@ cdef class Kernel:
         cdef double now
         cdef cnp.npy_intp n_work = MODEL.n_work
         cdef int status, i
-        if (p is not None or u is not None or not cnp.PyArray_Check(x)
+        if (p is not None or u is not None or not cnp.PyArray_CheckExact(x)
                 or cnp.PyArray_TYPE(<cnp.ndarray>x) != cnp.NPY_DOUBLE or cnp.PyArray_NDIM(<cnp.ndarray>x) != 1
                 or cnp.PyArray_DIM(<cnp.ndarray>x, 0) != self.n_in or not cnp.PyArray_ISCARRAY_RO(<cnp.ndarray>x)):
             return self.general(t, [("x", self.n_in, x)], p, u, out)
-        now = moment(t, self.error)
+        now = moment(t, "t", self.error, self.name)
         state = <const double *>cnp.PyArray_DATA(<cnp.ndarray>x)
         if out is None:
             out = cnp.PyArray_EMPTY(self.ndim, self.dims, cnp.NPY_DOUBLE, 0)
@@ -308,10 +355,14 @@ cdef class Kernel:
             label, length, value = values[i]
             held.append(self.read(value, length, label, &batch.pieces[i], &columns))
         batch.time = Piece(<char *>&now, 1, 0, 0)
-        if isinstance(t, (np.ndarray, list, tuple)) and np.ndim(t) > 0:
-            held.append(self.read(np.expand_dims(t, 0), 1, "t", &batch.time, &columns))
+        if isinstance(t, (np.ndarray, list, tuple)):
+            t = doubles(t, "t", self.error, self.name, SCALAR)
+        if isinstance(t, np.ndarray) and t.ndim > 0:
+            if t.ndim > 1 or len(t) != columns:
+                raise self.error(f"t of {self.name} must be a number or have shape (k,), not {t.shape}")
+            held.append(self.read(t[None], 1, "t", &batch.time, &columns))
         else:
-            now = moment(t, self.error)
+            now = moment(t, "t", self.error, self.name)
         batch.inputs = Piece(<char *>self.u, MODEL.n_u, sizeof(double), 0)
         if u is not None:
             held.append(self.read(u, MODEL.n_u, "u", &batch.inputs, &columns))
@@ -356,13 +407,13 @@ cdef class Kernel:
 
     cdef cnp.ndarray read(self, object value, cnp.npy_intp n, str label, Piece *piece, cnp.npy_intp *columns):
         """Describe an input of shape (n,) or (n, k) by a piece; columns is k, -1 for a vector, -2 while unknown."""
-        cdef cnp.ndarray array = doubles(value, label, self.error)
+        cdef cnp.ndarray array = doubles(value, label, self.error, self.name, n)
         cdef cnp.npy_intp k = cnp.PyArray_DIM(array, 1) if array.ndim == 2 else -1
         if columns[0] == -2:
             columns[0] = k
         if array.ndim not in (1, 2) or cnp.PyArray_DIM(array, 0) != n or k not in (-1, columns[0]):
             batch = "k" if columns[0] < 0 else columns[0]
-            raise self.error(f"{label} of {self.name} must have shape ({n},) or ({n}, {batch}), "
+            raise self.error(f"{called(label, self.name, n)} must have shape ({n},) or ({n}, {batch}), "
                              f"not {(<object>array).shape}")
         piece.data, piece.n, piece.row = cnp.PyArray_BYTES(array), n, cnp.PyArray_STRIDE(array, 0)
         piece.column = cnp.PyArray_STRIDE(array, 1) if k >= 0 else 0

@@ -40,7 +40,7 @@ cdef class Integrator(Journey):
         cdef cnp.ndarray result
         if p is not None:
             constants = compute_constants(vector(p, MODEL.n_p, "p", ValueError), ValueError)
-        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
+        result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, ValueError)
         if not self.turn.acquire(False):
             raise ValueError("it is at work in another thread; make one for each")
         try:

@@ -310,30 +310,31 @@ cdef class Stepper:
         return self.run.failure, self.run.failure_time, copy(self.run.failure_state, self.run.n)
 
 
-cdef cnp.ndarray target(out, cnp.npy_intp n):
+cdef cnp.ndarray target(out, cnp.npy_intp n, error):
     """The array (n,) that a state is written into."""
     if not (cnp.PyArray_Check(out) and cnp.PyArray_TYPE(<cnp.ndarray>out) == cnp.NPY_DOUBLE
             and cnp.PyArray_ISCARRAY(<cnp.ndarray>out) and cnp.PyArray_NDIM(<cnp.ndarray>out) == 1
             and cnp.PyArray_DIM(<cnp.ndarray>out, 0) == n):
-        raise ValueError(f"out must be a contiguous writeable float64 array of shape ({n},)")
+        raise error(f"out must be a contiguous writeable float64 array of shape ({n},)")
     return out
 
 
-def march(Context context not None, double t, double h, x, u=None, out=None):
+def march(Context context not None, t, h, x, u=None, out=None, error=ValueError):
     """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
     cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
-    cdef cnp.ndarray start = vector(x, n, "x", ValueError), inputs = context.u
+    cdef double begin = moment(t, "t", error), size = moment(h, "h", error)
+    cdef cnp.ndarray start = vector(x, n, "x", error), inputs = context.u
     cdef cnp.npy_intp length = n, n_work = MODEL.n_work + 5 * n
     cdef double[STACK] stack
     cdef double *w = stack
     cdef cnp.ndarray result
     if u is not None:
-        inputs = vector(u, MODEL.n_u, "u", ValueError)
-    result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n)
+        inputs = vector(u, MODEL.n_u, "u", error)
+    result = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0) if out is None else target(out, n, error)
     if n_work > STACK:
         heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
         w = <double *>cnp.PyArray_DATA(heap)
-    status = eomgen_march(MODEL.kernels[index].call, n, t, h, <double *>cnp.PyArray_DATA(start),
+    status = eomgen_march(MODEL.kernels[index].call, n, begin, size, <double *>cnp.PyArray_DATA(start),
                           <double *>cnp.PyArray_DATA(inputs), <double *>cnp.PyArray_DATA(context.c),
                           <double *>cnp.PyArray_DATA(result), w, w + MODEL.n_work)
     return status, result

@@ -39,6 +39,7 @@ RARE = {
     "branches",
     "integrator",
 }
+MOST, FEW = 100_000, 2_000  #: numbers of an array; of points at which a mechanism is closed one after the other
 LONG = {"span", "points", "most", "of", "over", "within"}  #: arguments in which a large number rightly takes long
 #: Options of runs that stand behind **options.
 OPTIONS = {
@@ -84,7 +85,6 @@ class Calls:
 
     name = "calls"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = (TypeError, ValueError)
     #: NumPy's of a complex array given for a real one, SciPy's of options that a solver does not know.
     unjudged: tuple[type[Warning], ...] = (np.exceptions.ComplexWarning, UserWarning)
 
@@ -116,6 +116,8 @@ class Calls:
         for name in names:
             if name in NEEDED or r.random() < 0.25:
                 chosen[name] = {"good": 1} if r.random() < 0.6 else odd(r, name)
+                if call == "kinematic_analysis" and chosen[name].get("array", {}).get("shape") == (MOST,):
+                    chosen[name]["array"]["shape"] = (FEW,)
         if r.random() < 0.1:
             chosen[r.choice(("x", "out", "foo", "p", "__class__", "t", "rows", "theta"))] = odd(r, "")
         return {"module": module, "on": on, "call": call, "arguments": chosen}
@@ -281,7 +283,7 @@ def odd(r: random.Random, name: str) -> dict[str, Any]:
             (4, 3),
             (1, 1, 1),
             (2, 1000),
-            (100_000,),
+            (MOST,),
             "good",
             "good",
             "good",

@@ -1,4 +1,7 @@
-"""Hostile command lines: every verb of ``eomgen`` with odd options, values and files, run in this process."""
+"""Hostile command lines: every verb of ``eomgen`` with odd options, values, files and environments, in this process.
+
+No program may start here, so that compilers, if any, are named wrongly; :mod:`hostile.fault_commands` has processes.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,28 @@ from .kind import Wrong, fewer
 from .words import NUMBERS, TEXTS
 from .yaml_files import SMALL
 
-#: Not attacked here: the doctor and verify run compilers and generated packages, a cluster starts processes.
-NO_VERBS, NO_OPTIONS = ("doctor", "verify"), ("--cluster", "--target", "--help", "-h")
+#: Not attacked here: a cluster starts processes; targets are set to the one that needs no compiler.
+NO_OPTIONS = ("--cluster", "--target", "--help", "-h")
+#: Verbs that look for a compiler whatever the target is: they are given one that does not work.
+COMPILING = ("doctor", "verify")
+NO_COMPILERS = (
+    *("/nowhere", "", " ", "'", "other.txt", "sub", ".", "-c", "\\", "$(touch CANARY)", "a b c", "é", "full.csv"),
+)
+#: Variables of the environment -> values, None where there is none.  Relative paths lie in the folder of the case.
+ENVIRONMENT: dict[str, tuple[str | None, ...]] = {
+    "HOME": (None, "", "none", "other.txt", "sub"),
+    "XDG_CACHE_HOME": (None, "", "sub", "other.txt"),
+    "EOMGEN_CACHE_DIR": ("sub", "sub/new/cache", "other.txt", "other.txt/cache", ".", "a" * 300, "\udc80"),
+    "LANG": (None, "", "C", "xx_YY.nothing"),
+    "LC_ALL": (None, "", "C", "POSIX", "xx_YY.nothing"),
+    "COLUMNS": (None, "", "0", "1", "-1", "x", "9" * 30),
+    "LINES": ("0", "1", "x"),
+    "TERM": (None, "", "dumb", "nothing"),
+    "NO_COLOR": ("", "1"),
+    "TMPDIR": ("none", "other.txt", ""),
+    "MPLBACKEND": ("nothing", ""),
+    "CC": NO_COMPILERS,
+}
 #: Files that every case finds in its folder.
 FILES = {
     "model.yaml": SMALL["pendulum"],
@@ -118,11 +141,10 @@ TRACE = re.compile(r"Traceback|(?:Runtime|Syntax|Deprecation|User|Future)Warning
 
 
 class CommandLines:
-    """A verb, a file, options."""
+    """A verb, a file, options, an environment."""
 
     name = "command_lines"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:
@@ -145,8 +167,9 @@ class CommandLines:
 
     def make(self, r: random.Random) -> dict[str, Any]:
         if r.random() < 0.03:
-            return {"words": [r.choice((*TEXTS, *VERBS, "--help", "--version", "-x")) for _ in range(r.randint(0, 4))]}
-        verb = r.choice([v for v in VERBS if v not in NO_VERBS])
+            few = [verb for verb in VERBS if verb != "doctor"]
+            return {"words": [r.choice((*TEXTS, *few, "--help", "--version", "-x")) for _ in range(r.randint(0, 4))]}
+        verb = r.choice(list(VERBS))
         words = [verb]
         if r.random() < 0.95:
             words.append(r.choice(("model.yaml", "model.yaml", "spring.yaml", "spring.yaml", r.choice(PATHS))))
@@ -162,22 +185,33 @@ class CommandLines:
             words[1:1] = ["--target", "numpy"]
         if "--seconds" in has:
             words[1:1] = ["--seconds", "0.5"]
+        if "--states" in has:
+            words[1:1] = ["--states", "1"]
         if "--end" in has and r.random() < 0.9:
             words += ["--end", "0.02"]
+        environment: dict[str, str | None] = {}
+        if r.random() < 0.25 or verb in COMPILING:
+            names = r.choices(list(ENVIRONMENT), k=r.randint(0, 3))
+            environment = {name: r.choice(ENVIRONMENT[name]) for name in names}
+        if verb in COMPILING:
+            environment["CC"] = r.choice([name for name in NO_COMPILERS if name.strip()])
         # what lies elsewhere is the user's own business
-        return {"words": [word for word in words if not word.startswith("/") and ".." not in word]}
+        words = [word for word in words if not word.startswith("/") and ".." not in word]
+        return {"words": words, "environment": environment}
 
     def build(self, case: Any) -> Any:
         files(Path.cwd())
-        return case["words"]
+        return case
 
     def run(self, given: Any, folder: Path) -> str:
-        return self.answer(given, folder)
+        with changed_environment(given.get("environment", {})):
+            return self.answer(given["words"], folder)
 
     def answer(self, words: list[str], folder: Path) -> str:
         """Run it with a cache of its own."""
         kept = os.environ["EOMGEN_CACHE_DIR"]
-        os.environ["EOMGEN_CACHE_DIR"] = str(Path(kept) / "lines")
+        if Path(kept).is_absolute():
+            os.environ["EOMGEN_CACHE_DIR"] = str(Path(kept) / "lines")
         out, err = io.StringIO(), io.StringIO()
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -188,11 +222,14 @@ class CommandLines:
             os.environ["EOMGEN_CACHE_DIR"] = kept
         if code not in (0, 1, 2, 3, 4, 5):
             raise Wrong(f"exit code {code}: {err.getvalue()[-300:]}")
-        if code and not err.getvalue().strip():
+        # what these two find is their answer, also where it is bad
+        told = err.getvalue() + (out.getvalue() if words[0] in COMPILING else "")
+        if code and not told.strip():
             raise Wrong(f"exit code {code} without a message")
         if TRACE.search(err.getvalue()):
             raise Wrong(f"stderr holds a traceback or a warning: {err.getvalue()[-300:]}")
-        if code == 0 and words[-1:] == ["--json"] and "--help" not in words and "-h" not in words:
+        as_value = len(words) > 1 and words[-2].startswith("-")  # of the option before it
+        if code == 0 and words[-1:] == ["--json"] and not as_value and "--help" not in words and "-h" not in words:
             try:
                 json.loads(out.getvalue())
             except ValueError as error:
@@ -200,7 +237,24 @@ class CommandLines:
         return f"exit {code}"
 
     def smaller(self, case: Any) -> Iterator[Any]:
-        yield from ({"words": words} for words in fewer(case["words"]))
+        yield from ({**case, "words": words} for words in fewer(case["words"]))
+        given = case.get("environment", {})
+        yield from ({**case, "environment": {name: given[name] for name in names}} for names in fewer(list(given)))
+
+
+@contextlib.contextmanager
+def changed_environment(changes: dict[str, str | None]) -> Iterator[None]:
+    """Other variables of the environment for a while."""
+    before = dict(os.environ)
+    try:
+        for name, text in changes.items():
+            os.environ.pop(name, None)
+            if text is not None:
+                os.environ[name] = text
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 def files(folder: Path) -> None:

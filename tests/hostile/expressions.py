@@ -62,7 +62,6 @@ class Expressions:
 
     name = "expressions"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:

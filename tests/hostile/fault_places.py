@@ -1,8 +1,7 @@
-"""Faults of places: foreign and open folders, full and read-only disks, odd environments, clocks, versions."""
+"""Faults of places: foreign and open folders, full and read-only disks, odd environments, clocks."""
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -13,9 +12,9 @@ from pathlib import Path
 
 import pytest
 from foreign import STRANGER
-from hostile.fault_work import BUILD, LIBRARY, WHOLE, Outcome, Result, Work, environment
+from hostile.fault_work import BUILD, WHOLE, Outcome, Result, Work
 
-from eomgen.compilation import Cache, compile_sources
+from eomgen.compilation import Cache
 
 #: Lets a process that is not root see a file as another user's.
 SEEN = """
@@ -224,37 +223,3 @@ def wrong_clocks(work: Work, fast: bool) -> Iterator[Result]:
         swept = Cache(cache).sweep()
         word = "right" if attempt.is_dir() and not swept else "a build of another process was swept away"
     yield Result("the clock jumps while another process builds", Outcome(word), work.run(cache))
-
-
-FORMAT = "from eomgen.compilation import cache as c; c.FORMAT = {value}"
-PYTHON = (
-    "from eomgen.compilation import cython_layer as y, build as b; real = y.describe_interpreter\n"
-    "y.describe_interpreter = b.describe_interpreter = lambda: {{**real(), {what!r}: {value!r}}}"
-)
-
-
-def other_versions(work: Work, fast: bool) -> Iterator[Result]:
-    """Other versions of eomgen, Python and NumPy on one cache, in turns: each has builds of its own."""
-    cache = work.cache(built=True)
-    entry = cache / "entries" / work.artifact.key
-    (entry / "manifest.json").write_text(json.dumps({"key": work.artifact.key, "files": {}}))  # before seals
-    yield work.try_fault("an entry of an earlier version under this key", cache)
-    (cache / "templates").mkdir(mode=0o700, exist_ok=True)
-    (cache / "templates" / "__jinja2_x.cache").write_bytes(b"j2 of another version")
-    yield work.try_fault("bytecode of an earlier version", cache, code=WHOLE)
-    changes = [("eomgen", LIBRARY, FORMAT.format(value=99))]
-    changes += [] if fast else [
-        ("eomgen, with its layer", BUILD, FORMAT.format(value=99)),
-        ("Python", BUILD, PYTHON.format(what="tag", value="cpython-399")),
-        ("NumPy", BUILD, PYTHON.format(what="numpy", value="9.9")),
-    ]  # fmt: skip
-    for name, code, before in changes:
-        own = work.run(cache, code)
-        count = len(Cache(cache).entries())
-        outcome = work.run(cache, code, before=before, patience=300.0)
-        more = len(Cache(cache).entries()) - count
-        with environment(EOMGEN_CACHE_DIR=str(cache)):
-            found = compile_sources(work.sources, "pendulum")
-        if own.word != "right" or more == 0 or found.key != work.artifact.key or not found.from_cache:
-            outcome = Outcome(f"{own}, {more} builds more, key {found.key}, from the cache: {found.from_cache}")
-        yield Result(f"another version of {name}", outcome, work.run(cache, code))

@@ -102,10 +102,12 @@ class Work:
         For everything that is made.
     layer : Path
         A cache that has the layer, or will have it.
+    pythons : sequence of str
+        Other interpreters that have what eomgen needs.
     """
 
-    def __init__(self, folder: Path, layer: Path) -> None:
-        self.folder, self.layer, self.count = folder, layer, 0
+    def __init__(self, folder: Path, layer: Path, pythons: Sequence[str] = ()) -> None:
+        self.folder, self.layer, self.count, self.pythons = folder, layer, 0, tuple(pythons)
         self.sources = {f.name: f.read_text() for f in sorted(MODEL.iterdir())}
         self.sources["eomgen.h"] = read_template("c/eomgen.h")
         self.texts = folder / "texts"
@@ -134,13 +136,17 @@ class Work:
 
     def run(
         self, cache: Path | str, code: str = BUILD, before: str = "", after: str = "pass", target: str = "cython",
-        changes: Mapping[str, str | None] | None = None, patience: float = PATIENCE,
+        changes: Mapping[str, str | None] | None = None, patience: float = PATIENCE, python: str = sys.executable,
+        factor: float = 1.0,
     ) -> Outcome:  # fmt: skip
-        """Build and evaluate in another process; ``changes`` are of its environment, None removes."""
+        """Build and evaluate in another process; ``changes`` are of its environment, None removes.
+
+        ``factor`` is what the value has to be multiplied with to be right, where another version of eomgen runs.
+        """
         folder = str(YAML if code is WHOLE else self.texts)
         text = code.format(before=before, after=after, folder=folder, target=target)
-        return judge([sys.executable, "-c", text], self._environment(cache, changes), patience,
-                     self.values[code])  # fmt: skip
+        return judge([python, "-c", text], self._environment(cache, changes), patience,
+                     factor * self.values[code])  # fmt: skip
 
     def try_fault(
         self, fault: str, cache: Path | str, *, code: str = BUILD, target: str = "cython", before: str = "",

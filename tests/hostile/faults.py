@@ -6,14 +6,15 @@ Prints every breach and a table; exits 1 if there was one.  ``--write`` keeps th
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 
-from hostile import fault_builds, fault_compilers, fault_places
+from hostile import fault_builds, fault_compilers, fault_places, fault_versions
 from hostile.fault_work import Result, Work
 
 #: Kind of fault -> what tries all of them (or a few, where the second argument says so).
@@ -29,7 +30,8 @@ FAULTS: dict[str, Callable[[Work, bool], Iterator[Result]]] = {
     "odd paths and locales": fault_places.odd_places,
     "odd environments": fault_places.odd_environments,
     "wrong clocks": fault_places.wrong_clocks,
-    "other versions on one cache": fault_places.other_versions,
+    "other versions on one cache": fault_versions.other_versions,
+    "versions at once on one cache": fault_versions.versions_at_once,
     "broken compilers": fault_compilers.broken_compilers,
     "compilers that lied once": fault_compilers.lied_once,
 }
@@ -61,11 +63,12 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help=f"parts of: {', '.join(FAULTS)}")
     parser.add_argument("--fast", action="store_true", help="the few that the tests try")
     parser.add_argument("--write", action="store_true", help="keep the table in FAULTS.md")
+    parser.add_argument("--python", action="append", default=[], help="another interpreter, with what eomgen needs")
     parser.add_argument("--verbose", action="store_true", help="print every fault")
     given = parser.parse_args()
     found: dict[str, tuple[list[Result], float]] = {}
     with tempfile.TemporaryDirectory(prefix="eomgen-faults-") as folder:
-        work = Work(Path(folder), Path(folder) / "layer")
+        work = Work(Path(folder), Path(folder) / "layer", given.python)
         for name, attempt in FAULTS.items():
             if given.names and not any(part in name for part in given.names):
                 continue
@@ -80,15 +83,24 @@ def main() -> int:
     print(table(found))
     if given.write:
         text = Path(__file__).with_name("FAULTS.md")
-        text.write_text(f"{HEADING}\n{table(found)}", encoding="utf-8")
+        text.write_text(f"{HEADING}\n{table(found)}\n{interpreters(given.python)}", encoding="utf-8")
     return int(any(not result.survived for results, _ in found.values() for result in results))
+
+
+def interpreters(others: Sequence[str]) -> str:
+    """Which Pythons ran: this one, and the others beside it on the caches of the versions."""
+    ask = "import platform, numpy, Cython; print(platform.python_version(), numpy.__version__, Cython.__version__)"
+    every = [subprocess.run([python, "-c", ask], capture_output=True, text=True, check=True).stdout.split()
+             for python in (sys.executable, *others)]  # fmt: skip
+    told = "".join(f"- Python {python}, NumPy {numpy}, Cython {cython}\n" for python, numpy, cython in every)
+    return f"Versions at once, 20 processes on one new cache, then each alone from its own build, ran on\n\n{told}"
 
 
 HEADING = """# Faults of machines: the last run
 
-`cd tests && python -m hostile.faults --write` repeats it.  Each fault strikes one build; it is survived if that run
-gives the right numbers, or stops with an error of eomgen's own (or was killed by the fault), and the run after it, with
-the fault gone, gives the right numbers.
+`cd tests && python -m hostile.faults --write` repeats it (`--python PATH` adds an interpreter to the versions).  Each
+fault strikes one build; it is survived if that run gives the right numbers, or stops with an error of eomgen's own (or
+was killed by the fault), and the run after it, with the fault gone, gives the right numbers.
 """
 
 if __name__ == "__main__":

@@ -32,8 +32,6 @@ class Kind(Protocol):
     name: str
     #: Programs that the package may start for such a case, by the last part of their path; none for most kinds.
     programs: frozenset[str]
-    #: Exceptions that refuse an argument by Python's own convention: TypeError, ValueError of calls; none for files.
-    refusals: tuple[type[Exception], ...]
     #: Warnings that speak of what was built, not of what the package did with it.
     unjudged: tuple[type[Warning], ...]
 

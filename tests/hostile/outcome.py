@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from eomgen.errors import EomgenError
 
-from .guard import PACKAGE, Escape, Guard
+from .guard import PACKAGE, TEMPLATES, Escape, Guard
 from .kind import Kind, Wrong
 
 SECONDS = 20.0  #: wall time of one case
@@ -27,6 +27,10 @@ BUILDING = 1.0  #: wall time for making the object that is given
 MEMORY = 2 << 30  #: bytes that a process may hold
 #: Outcomes that are findings; fine, named error and refused are not.
 FINDINGS = ("escape", "traceback", "hang", "memory", "crash", "warning", "wrong")
+#: Files of the generated modules, as tracebacks name those of machine code.
+GENERATED = frozenset(path.name for path in Path(TEMPLATES, "cython").iterdir())
+#: What Cython says of arguments that do not fit a signature.
+MISFIT = re.compile(r"takes (no|exactly|at least|at most) |unexpected keyword|multiple values|needs keyword")
 
 
 class Hang(BaseException):
@@ -92,7 +96,7 @@ class Runner:
         except EomgenError as error:
             found = Outcome("named error", type(error).__name__)
         except BaseException as error:
-            found = judge(error, kind.refusals)
+            found = judge(error)
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
         seconds = time.perf_counter() - start
@@ -131,31 +135,33 @@ def _alarm(number: int, frame: FrameType | None) -> None:
     raise Hang
 
 
-def judge(error: BaseException, refusals: tuple[type[Exception], ...] = ()) -> Outcome:
+def judge(error: BaseException) -> Outcome:
     """The outcome of an exception that is no named error."""
     if isinstance(error, KeyboardInterrupt) and not isinstance(error, EomgenError):
         raise error
     text = "".join(traceback.format_exception(error))[-4000:]
     frames = traceback.extract_tb(error.__traceback__)
-    own = [f for f in frames if f.filename.startswith(str(PACKAGE))]
+    own = [f for f in frames if f.filename.startswith(str(PACKAGE)) or f.filename in GENERATED]
     if isinstance(error, Wrong):
         return Outcome("wrong", str(error), f"wrong {_plain(str(error))}", text)
     if isinstance(error, Escape):
         return Outcome("escape", str(error), f"escape {_plain(str(error))}", text)
     name = type(error).__name__
-    place = f"{Path(own[-1].filename).relative_to(PACKAGE)}:{own[-1].name}" if own else "outside the package"
+    place = f"{own[-1].filename.removeprefix(f'{PACKAGE}/')}:{own[-1].name}" if own else "outside the package"
     if isinstance(error, Hang):
         return Outcome("hang", place, f"hang {place}", text)
     if isinstance(error, MemoryError):
         return Outcome("memory", place, f"memory {place}", text)
-    if not own:
+    if not own or (isinstance(error, TypeError) and _misfit(str(error), own)):
         return Outcome("refused", name)  # by Python, NumPy or SymPy before the package was asked
-    too_large = isinstance(error, OverflowError) and str(error) == "int too large to convert to float"
-    if isinstance(error, refusals) or (refusals and too_large):
-        return Outcome("refused", name)
     last = frames[-1] if frames else None
     inner = f" in {Path(last.filename).name}:{last.name}" if last is not None and last not in own else ""
     return Outcome("traceback", f"{name} {place}", f"{name} {place}{inner}", text)
+
+
+def _misfit(text: str, own: list[traceback.FrameSummary]) -> bool:
+    """Whether a call did not fit the signature of a compiled callable, which leaves frames where Python leaves none."""
+    return all(f.filename in GENERATED for f in own) and MISFIT.search(text) is not None
 
 
 def _plain(text: str) -> str:

@@ -32,7 +32,7 @@ def summary(campaign: Campaign) -> str:
         "# What was attacked, and what came of it",
         "",
         f"Written by `make fuzz RESULTS=1`: {campaign.cases:,} cases, seeds from {campaign.first}, {how}.",
-        "A named error is a refusal that says what is wrong; refused means by Python, NumPy or SymPy themselves.",
+        "A named error is a refusal that says what is wrong; refused: before the package was entered.",
         "",
         f"| {' | '.join(head)} |",
         f"|{'---|' * len(head)}",

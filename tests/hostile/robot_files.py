@@ -45,7 +45,6 @@ class Robots:
     A case is ``{"files": {name: text or base64 of bytes}, "main": name, "options": {...}, "stage": "load" | "check"}``.
     """
 
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def __init__(self, name: str, suffix: str, programs: frozenset[str]) -> None:

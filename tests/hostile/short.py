@@ -52,7 +52,6 @@ class Attempt:
 
     name = "attempt"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def __init__(self, code: CodeType) -> None:

@@ -308,7 +308,6 @@ class SympyObjects:
 
     name = "sympy"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = (SymPyDeprecationWarning,)
 
     def prepare(self, folder: Path) -> None:

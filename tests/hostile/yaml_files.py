@@ -77,7 +77,6 @@ class YamlFiles:
 
     name = "yaml"
     programs: frozenset[str] = frozenset()
-    refusals: tuple[type[Exception], ...] = ()
     unjudged: tuple[type[Warning], ...] = ()
 
     def prepare(self, folder: Path) -> None:

@@ -210,6 +210,29 @@ def test_a_value_that_only_touches_zero_is_found_by_every_loop(modules: dict[str
         assert [len(found.t_events[k]) for k in ("misses", "kink")] == [0, 0], name
 
 
+COARSE = {"rtol": 1e-4, "atol": 1e-4, "max_step": 0.3}
+FLAT = ("(t - {a!r})**4", "(t - {a!r})**6", "abs(t - {a!r})**3", "sin(t - {a!r})**4", "-1e3*(t - {a!r})**4")
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_flat_touches_are_found_wherever_they_are(target: str) -> None:
+    """In steps at one of whose ends the value is above 1e-10 of its size, as the docs say; corners are not found."""
+    m = eg.Model("swings")
+    m.prismatic("s", m.ground, m.body("a", mass=1.0), axis="x")
+    m.torque("f", "s", "-2*s")
+    m.initial(s=0.1)
+    module = m.compile(target=target)
+    places = np.random.default_rng(4).uniform(0.05, 1.95, 40).tolist()
+    for method in ("DOP853", "RK45"):
+        for text in FLAT:
+            run = module.simulate(2.0, events=[text.format(a=a) for a in places], method=method, **COARSE)
+            assert len(run.t) < 20  # steps of 0.1 and more: (t - a)**6 is 1e-10 of its size 0.02 from its touch
+            for a, found in zip(places, run.t_events, strict=True):
+                np.testing.assert_allclose(found, [a], atol=1e-6, err_msg=f"{text} {a} {method}")
+    corners = [text.format(a=a) for a in places for text in ("abs(t - {a!r})", "sqrt(abs(t - {a!r}))")]
+    assert [len(found) for found in module.simulate(2.0, events=corners).t_events] == [0] * len(corners)
+
+
 @pytest.mark.parametrize("offset", [0.0, 1e-12, 1e-9, -1e-9, 1e-7, -1e-7, 1e-6, -1e-6, 1e-5, -3e-5])
 def test_a_touch_beside_the_end_of_a_step_is_found_once(offset: float) -> None:
     m = eg.Model("slides")

@@ -69,6 +69,9 @@ static int may_touch(const eomgen_run *run, const eomgen_events *ev, int i)
     if (!(a * b > 0.0) || da >= 0.0 || db <= 0.0 || fmax(fabs(a), fabs(b)) <= RUNS_RESTING * RUNS_TOUCHED * ev->size[i]) {
         return 0;
     }
+    if (db * s * a - da * s * b <= -da * db) { /* the tangents meet below zero: also a flat touch, (t - 1)**8 */
+        return 1;
+    }
     const double x = da / (da - db), y = 1.0 - x; /* about where the cubic through both is least */
     const double least = s * a * y * y * (1.0 + 2.0 * x) + da * x * y * y + s * b * x * x * (1.0 + 2.0 * y) - db * x * x * y;
     return least < 0.5 * fmin(fabs(a), fabs(b));
