@@ -133,3 +133,24 @@ def test_faults_in_c_of_the_user_are_faults_of_the_model(
         PENDULUM + functions.replace("law.c", "law.c, arguments: 2").replace("law(theta)", "law(theta, 1)")
     )
     expect(call("check", file, "--allow-native"), 1, "functions.law.arguments: law in law.c:1 takes 1 arguments")
+
+
+def test_advice_on_checkpoints_names_options_of_the_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from eomgen.cli.command import run_command
+
+    (tmp_path / "p.yaml").write_text((Path(__file__).parents[2] / "examples" / "pendulum.yaml").read_text())
+    words = ["run", str(tmp_path / "p.yaml"), "--target", "numpy", "--solver", "BDF", "--end", "0.1"]
+    with pytest.raises(SystemExit, match="2"):
+        run_command([*words, "--checkpoint", str(tmp_path / "c.npz"), "--plot", str(tmp_path / "p.png")])
+    said = capsys.readouterr().err
+    assert "leave --plot out, or take --solver DOP853" in said
+    assert "dense_output" not in said
+
+
+def test_the_doctor_tries_whether_the_cache_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from eomgen.cli import doctor
+
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", "/proc/eomgen")  # which grants all rights to root, and takes no file
+    assert not doctor._cache().ok
+    monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
+    assert doctor._cache().ok
