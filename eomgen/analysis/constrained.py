@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array, Scales
-from ..runtime.room import read_numbers
+from ..runtime.room import as_real, read_numbers, shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -95,7 +95,9 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
         raise UsageError(f"x of shape {state.shape} holds no state")
     single = state.ndim == 1
     columns = state[:, None] if single else state
-    time = read_numbers("t", t)
+    time = as_real(t)
+    if time is None:
+        raise UsageError(f"t must be a number or an array of them, not {shown(t)}")
     if time.ndim > 1 or (time.ndim == 1 and len(time) != columns.shape[1]):
         raise UsageError(f"t must be a number or have shape ({columns.shape[1]},), one a state, not {time.shape}")
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))

@@ -159,7 +159,7 @@ def motions(
     n_q, n, size = layout.n_q, layout.n_v, layout.n_dof
     labels, width = ("q_i", "v_i", "a_i"), n_q + 2 * n
     arrays = [None if x is None else read_numbers(what, x, width) for what, x in zip(labels, given, strict=True)]
-    columns = max((part.shape[1:] for part in arrays if part is not None), key=len)
+    columns = max((part.shape[1:] for part in arrays if part is not None), key=len, default=())
     parts = []
     for name, part in zip(labels, arrays, strict=True):
         full = np.zeros((size, *columns)) if part is None else part

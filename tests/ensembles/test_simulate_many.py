@@ -196,7 +196,7 @@ def test_no_runs_and_one_run(pendulum: Any) -> None:
         ({"initial": {"theta1": [1, 2]}, "parameters": {"g": [1, 2, 3]}}, "initial theta1: 2"),
         ({"parameters": {"g": [1, 2], "m1": [1, 2, 3]}}, "parameter g: 2, parameter m1: 3"),
         ({"parameters": {"mass": 1.0}}, "no parameter 'mass'"),
-        ({"initial": {"theta1": "a"}}, "initial theta1 must be numbers"),
+        ({"initial": {"theta1": "a"}}, "initial theta1 must hold real numbers"),
         ({"reduce": "mean"}, "reduce must be"),
         ({"threads": 0}, "threads must be a whole number of at least 1"),
         ({"rtool": 1e-3}, "did you mean rtol"),
