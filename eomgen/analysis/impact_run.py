@@ -12,7 +12,7 @@ from ..errors import SimulationError, UsageError
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
 from ..numeric.scales import Array
-from ..runtime.recording import Columns, describe, units_of
+from ..runtime.columns import Columns, describe, units_of
 from ..runtime.run_arguments import find_span, find_state
 from ..runtime.signals import Forcing
 from ..runtime.simulate import simulate

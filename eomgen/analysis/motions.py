@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.recording import Columns, describe, units_of
+from ..runtime.columns import Columns, describe, units_of
 from ..runtime.trajectory import Residuals, Trajectory
 from .following import Follower
 from .singular import Singular

@@ -11,9 +11,9 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
-from ..runtime.events import Named
 from ..runtime.names import unknown
 from ..runtime.storage import table_path
+from ..runtime.trajectory import Named
 
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..limits.rounding import TINY
 from ..limits.runs import CROWD, INSTANT
 from ..numeric.scales import Array
 from .layout import Layout
-from .names import check_names, require_time_and_state, unknown
+from .names import check_names, require_time_and_state
 from .tapes import Formula, is_formula, record_tape, values_together
 
 if TYPE_CHECKING:
@@ -27,28 +27,6 @@ if TYPE_CHECKING:
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
 STOP = 3  #: an integrator stops there and goes on, from another state or the same
 UNWATCHED = 2  #: a direction
-
-
-class Named(list[Array]):
-    """What belongs to each event, by its place or its name."""
-
-    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
-        super().__init__(values)
-        self.names = tuple(names)
-
-    @overload
-    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
-    @overload
-    def __getitem__(self, key: slice) -> list[Array]: ...
-    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
-        if isinstance(key, str):
-            if key not in self.names:
-                raise unknown("event", key, self.names)
-            key = self.names.index(key)
-        return super().__getitem__(key)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Named, (list(self), self.names)
 
 
 class Event:

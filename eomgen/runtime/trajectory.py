@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
-from .events import Named
 from .names import require, unknown
 from .room import read_numbers
 from .storage import FORMAT, Stored, save
@@ -22,6 +21,28 @@ if TYPE_CHECKING:
     import pandas
 
     from .change_points import ChangePoint
+
+
+class Named(list[Array]):
+    """What belongs to each event, by its place or its name."""
+
+    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
+        super().__init__(values)
+        self.names = tuple(names)
+
+    @overload
+    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
+    @overload
+    def __getitem__(self, key: slice) -> list[Array]: ...
+    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
+        if isinstance(key, str):
+            if key not in self.names:
+                raise unknown("event", key, self.names)
+            key = self.names.index(key)
+        return super().__getitem__(key)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (list(self), self.names)
 
 
 class Residuals(NamedTuple):

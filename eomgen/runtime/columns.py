@@ -1,0 +1,196 @@
+"""Stage runtime: Module and an integrator's solution -> Trajectory: projected states, residuals, lazy columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.projection import largest
+from ..numeric.scales import Array
+from .layout import Layout
+from .origin import origin
+from .signals import Forcing
+from .trajectory import Residuals
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+    from .change_points import ChangePoint
+
+
+class Columns:
+    """Everything that can be read from the states of a run, evaluated when first asked for.
+
+    Parameters
+    ----------
+    module : BoundModel
+        With the parameters and constant inputs of the run bound.
+    t : (n_t,) array
+    x : (n_x, n_t) array
+        Projected.
+    u : (n_u, n_t) array
+    steps : callable, optional
+        Gives t, x and u of the integrator's steps, where other times are stored.
+    """
+
+    def __init__(
+        self,
+        module: BoundModel,
+        t: Array,
+        x: Array,
+        u: Array,
+        steps: Callable[[], tuple[Array, Array, Array]] | None = None,
+    ) -> None:
+        self.module, self.t, self.x, self.u, self._steps = module, t, x, u, steps
+        self._known: dict[str, Array] = {}
+        # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
+        self.names = _names(module.layout)
+
+    @cached_property
+    def _groups(self) -> list[tuple[tuple[str, ...], Callable[[], Array]]]:
+        layout = self.module.layout
+        loops = layout.loops + layout.loop_rates + layout.loop_accelerations
+        return [
+            (layout.x, lambda: self.x),
+            (layout.a, lambda: self.slopes[layout.n_q :]),
+            (layout.parameter_rates, self._parameter_rates),
+            (loops, self._loops),
+            (layout.y, self._outputs),
+            (layout.u, lambda: self.u),
+            (("T", "V", "energy") if layout.energy_known else (), lambda: self.energies),
+        ]
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._known:
+            names, evaluate = next(group for group in self._groups if name in group[0])
+            for key, row in zip(names, evaluate(), strict=True):
+                self._known.setdefault(key, row)
+        return self._known[name]
+
+    def _varying(self) -> Array | None:
+        return self.u if self.u.size else None
+
+    @cached_property
+    def slopes(self) -> Array:
+        """x' (n_x, n_t)."""
+        return self.module.rhs(self.t, self.x, u=self._varying())
+
+    def _parameter_rates(self) -> Array:
+        layout = self.module.layout
+        return self.slopes[[layout.q.index(name[:-4]) for name in layout.parameter_rates]]
+
+    def _outputs(self) -> Array:
+        return self.module.outputs(self.t, self.x, u=self._varying())
+
+    def _loops(self) -> Array:
+        layout = self.module.layout
+        if not layout.n_k:
+            return np.empty((0, len(self.t)))
+        a = np.array([self[name] for name in layout.a])
+        q, v = self.x[: layout.n_q], self.x[layout.n_q :]
+        y = self.module.kernels.motion("loop_coordinates")(q, v, a, u=self._varying(), t=self.t)
+        angles = layout.loop_angles
+        y[0, angles] = np.unwrap(y[0, angles], axis=-1)
+        parameters = [k for k, kind in enumerate(layout.loop_kinds) if kind == "parameter"]
+        for k in range(0, len(parameters), 4):  # e and -e are one rotation: the nearer one goes on
+            four = parameters[k : k + 4]
+            e = y[0, four]
+            turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
+            y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
+        return y.reshape(3 * layout.n_k, -1)
+
+    @property
+    def has_energies(self) -> bool:
+        """Whether the model knows its energy."""
+        return self.module.layout.energy_known
+
+    @cached_property
+    def energies(self) -> Array:
+        """Kinetic, potential and total energy (3, n_t), whatever the model calls T and V."""
+        T, V = self.module.energy(self.x, u=self._varying(), t=self.t)
+        return np.array([T, V, T + V])
+
+    @cached_property
+    def change_points(self) -> list[ChangePoint]:
+        """Where the mobility changes on the way."""
+        from .change_points import find_change_points
+
+        t, x, u = (self.t, self.x, self.u) if self._steps is None else self._steps()
+        if self._steps is not None and not len(t):
+            raise UsageError(
+                "the run took too many steps for all to be kept besides t_eval: run it without t_eval, "
+                "or in parts, for its change points"
+            )
+        return find_change_points(self.module, t, x, u)
+
+
+@lru_cache(maxsize=64)
+def _names(layout: Layout) -> tuple[str, ...]:
+    """All columns, each once."""
+    cut = layout.loops + layout.loop_rates + layout.loop_accelerations
+    energies = ("T", "V", "energy") if layout.energy_known else ()
+    return tuple(dict.fromkeys(layout.x + layout.a + layout.parameter_rates + cut + layout.y + layout.u + energies))
+
+
+@lru_cache(maxsize=64)
+def units_of_layout(layout: Layout) -> dict[str, str]:
+    """Units of all columns, by name."""
+    return {name: layout.unit(name) for name in ("t", *_names(layout)) if layout.unit(name)}
+
+
+def describe(module: BoundModel) -> dict[str, Any]:
+    """What the columns of any run of a module are called, where it comes from, and its parameters."""
+    return {**_described(module.layout), "origin": origin(module), "parameters": dict(module._parameters)}
+
+
+@lru_cache(maxsize=64)
+def _described(layout: Layout) -> dict[str, Any]:
+    return {
+        "name": layout.name,
+        "q_names": list(layout.q),
+        "v_names": list(layout.v),
+        "x_names": list(layout.x),
+        "loop_names": list(layout.loops),
+        "y_names": list(layout.y),
+        "u_names": list(layout.u),
+        "model_method": layout.metadata.get("method"),
+        "docs": layout.metadata.get("docs", {}),
+    }
+
+
+def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = None) -> tuple[Residuals, Array]:
+    """Projected states (n_x, k), and how far the raw ones were off, with the inputs of the run as they are then."""
+    n = module.n_q
+    if not t.size or not (module.n_rows or module.layout.space):
+        return Residuals(), raw
+    led = forcing is not None and forcing.constrained
+    u = forcing.sample(t, raw) if led and forcing is not None else None
+    x = module.project(raw, t=t, u=u)
+    if not module.n_rows:
+        return Residuals(), x
+    here = u
+    if led and forcing is not None and forcing.feedback:
+        here = forcing.sample(t, x)
+        x = module.project(x, t=t, u=here)
+    position = module.constraints.every
+    velocity = module.kernels.state("velocity_constraints")
+    correction = np.abs(x - raw)
+    for i, _ in module.layout.balls:  # their length means nothing
+        e = raw[i : i + 4]
+        correction[i : i + 4] = np.abs(x[i : i + 4] - e / np.sqrt((e * e).sum(axis=0)))
+    return Residuals(
+        raw_position=largest(position(raw[:n], t=t, u=u)),
+        raw_velocity=largest(velocity(raw, t=t, u=u)),
+        position=largest(position(x[:n], t=t, u=here)),
+        velocity=largest(velocity(x, t=t, u=here)),
+        correction_position=largest(correction[:n]),
+        correction_velocity=largest(correction[n:]),
+    ), x
+
+
+def units_of(module: BoundModel, names: Sequence[str]) -> dict[str, str]:
+    """Units of columns, of those that have one."""
+    return {name: module.layout.unit(name) for name in ("t", *names) if module.layout.unit(name)}
