@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from ..analysis.drive import actuator_forces as _actuator_forces
     from ..analysis.equilibrium import equilibrium as _equilibrium
     from ..analysis.impact import impact as _impact
-    from ..analysis.impact_run import simulate_impacts as _simulate_impacts
     from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
     from ..analysis.linear import linearise as _linearise
     from ..analysis.modes import modes as _modes
@@ -24,36 +23,37 @@ if TYPE_CHECKING:
     from ..analysis.reactions import driving_forces as _driving_forces
     from ..analysis.reactions import reactions as _reactions
     from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
-    from ..analysis.sensitivities import sensitivities as _sensitivities
     from ..analysis.workspace import workspace as _workspace
     from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..runtime.canonical import Canonical
-    from ..runtime.dae_solution import Dae
-    from ..runtime.integrator import integrator as _integrator
     from ..runtime.minimal import Minimal
     from ..runtime.report import report as _report
-    from ..runtime.simulate import simulate as _simulate
-    from ..runtime.steppers import step as _step
+    from ..simulation.dae_solution import Dae
+    from ..simulation.impact_run import simulate_impacts as _simulate_impacts
+    from ..simulation.integrator import integrator as _integrator
+    from ..simulation.sensitivities import sensitivities as _sensitivities
+    from ..simulation.simulate import simulate as _simulate
+    from ..simulation.steppers import step as _step
     from ..verification.verify import verify as _verify
 
 #: Method -> where the function is, whose first argument is the model; method and function are of one name.
 CALLS = {
-    "simulate": "runtime.simulate",
+    "simulate": "simulation.simulate",
     "simulate_many": "ensembles.simulate_many",
-    "integrator": "runtime.integrator",
-    "step": "runtime.steppers",
+    "integrator": "simulation.integrator",
+    "step": "simulation.steppers",
     "verify": "verification.verify",
     "linearise": "analysis.linear",
     "modes": "analysis.modes",
     "equilibrium": "analysis.equilibrium",
-    "sensitivities": "analysis.sensitivities",
+    "sensitivities": "simulation.sensitivities",
     "multipliers": "analysis.constrained",
     "reactions": "analysis.reactions",
     "undetermined_reactions": "analysis.reactions",
     "driving_forces": "analysis.reactions",
     "actuator_forces": "analysis.drive",
     "impact": "analysis.impact",
-    "simulate_impacts": "analysis.impact_run",
+    "simulate_impacts": "simulation.impact_run",
     "consistent": "analysis.consistent",
     "kinematic_analysis": "analysis.kinematic",
     "motion_range": "analysis.reaching",
@@ -118,14 +118,14 @@ class Module(BoundModel):  # noqa: D101
     @cached_property
     def dae(self) -> Dae:
         """F(t, y, y') = 0 with multipliers, for differential-algebraic solvers; see :class:`~.dae.Dae`."""
-        from ..runtime.dae_solution import Dae
+        from ..simulation.dae_solution import Dae
 
         require_velocities(self.layout)
         return Dae(self)
 
     def __getattr__(self, name: str) -> Any:
         if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
-            from ..runtime.steppers import find_solver
+            from ..simulation.steppers import find_solver
 
             return find_solver(self, name)
         if (own := getattr(type(self), name, None)) is not None:

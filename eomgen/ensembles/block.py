@@ -12,11 +12,11 @@ import numpy as np
 
 from ..errors import EomgenError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
-from ..runtime.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
-from ..runtime.events import WAIT, Events
 from ..runtime.late import eager
 from ..runtime.signals import Forcing
-from ..runtime.simulate import simulate
+from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
+from ..simulation.events import WAIT, Events
+from ..simulation.simulate import simulate
 from .cases import UNASSEMBLED, Cases, assemble_states
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from ..errors import EomgenError, UsageError
 from ..numeric.scales import Array
 from ..runtime.names import check_names
 from ..runtime.room import read_count, read_numbers, require_room
-from ..runtime.run_arguments import find_state
+from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -13,7 +13,7 @@ from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
-from ..runtime.simulate import simulate
+from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
 from .cases import Cases
 from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.room import shown
 from .block import EVENT, Block, Plan, inputs_at
 from .cases import Cases
 
@@ -109,17 +110,22 @@ class Custom:
         return {name.removeprefix("made_"): [part[name] for part in parts if name in part] for name in names}
 
 
+WANTED = "reduce must be 'states', 'statistics', 'events' or a function of a block"
+
+
 def choose_reduction(reduce: Any) -> Reduction:
     """The reduction that a user names: None or 'states', 'statistics', 'events', or a function of a block."""
     if callable(reduce):
         return Custom(reduce)
+    if reduce is not None and not isinstance(reduce, str):
+        raise UsageError(f"{WANTED}, not {shown(reduce)}")
     if reduce in (None, "states"):
         return States()
     if reduce == "events":
         return States(["notes"])
     if reduce == "statistics":
         return Statistics()
-    raise UsageError(f"reduce must be 'states', 'statistics', 'events' or a function of a block, not {reduce!r}")
+    raise UsageError(f"{WANTED}, not {reduce!r}")
 
 
 def with_outputs(module: BoundModel, cases: Cases, plan: Plan, x: Array, t: Array) -> Array:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..runtime.compiled import can_run
 from ..runtime.names import check_names
-from ..runtime.progress import Progress, wanted
 from ..runtime.room import require_room, require_steps
-from ..runtime.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
-from ..runtime.tolerances import check_tolerances
+from ..simulation.compiled import can_run
+from ..simulation.progress import Progress, wanted
+from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
+from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
 from .blocks import RUNS, Kept, choose_size, run_local, split
 from .cases import Cases, collect_cases

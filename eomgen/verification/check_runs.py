@@ -17,11 +17,11 @@ from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.events import Events
-from ..runtime.integrator import integrator
 from ..runtime.names import require
-from ..runtime.simulate import simulate
-from ..runtime.steppers import step
+from ..simulation.events import Events
+from ..simulation.integrator import integrator
+from ..simulation.simulate import simulate
+from ..simulation.steppers import step
 from .bench import Bench
 from .cases import Case
 from .comparison import Comparison, size_of

@@ -11,8 +11,8 @@ import pytest
 import sympy
 
 import eomgen as eg
-from eomgen.analysis.sensitivities import _refuse_change_point
 from eomgen.runtime.signals import Forcing
+from eomgen.simulation.sensitivities import _refuse_change_point
 
 Compiled = Callable[..., Any]
 

@@ -232,7 +232,7 @@ def test_the_command_line_on_a_full_disk(tmp_path: Path) -> None:
 def test_generate_goes_through_no_link(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     victim = tmp_path / "victim"
     (victim / "runtime").mkdir(parents=True)
-    (victim / "runtime" / "module.py").write_text("precious")
+    (victim / "runtime" / "bound_model.py").write_text("precious")
     out = tmp_path / "out"
     out.mkdir()
     (out / "pendulum").symlink_to(victim)
@@ -246,13 +246,13 @@ def test_generate_goes_through_no_link(tmp_path: Path, capsys: pytest.CaptureFix
     inner.symlink_to(victim / "runtime")
     assert _exit(words) == 2
     assert "runtime is a symbolic link to" in capsys.readouterr().err
-    assert (victim / "runtime" / "module.py").read_text() == "precious"
+    assert (victim / "runtime" / "bound_model.py").read_text() == "precious"
     assert names(victim) == ["runtime"]
     inner.unlink()
     (out / "pendulum" / "errors.py").unlink()
-    (out / "pendulum" / "errors.py").symlink_to(victim / "runtime" / "module.py")
+    (out / "pendulum" / "errors.py").symlink_to(victim / "runtime" / "bound_model.py")
     assert _exit(words) == 0  # the link itself is replaced
-    assert (victim / "runtime" / "module.py").read_text() == "precious"
+    assert (victim / "runtime" / "bound_model.py").read_text() == "precious"
     assert not (out / "pendulum" / "errors.py").is_symlink()
 
 

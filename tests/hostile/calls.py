@@ -162,7 +162,7 @@ def callables(module: Any) -> Iterator[tuple[str, str, list[str]]]:
                 continue
             if name.startswith("_") or isinstance(call, type):
                 continue
-            names = [p.name + "_" if p.kind is p.POSITIONAL_ONLY else p.name for p in parameters]
+            names = [p.name + "_" if p.kind is p.POSITIONAL_ONLY else p.name for p in parameters if p.name != "cluster"]
             if "args" in names:  # a kernel that is compiled late
                 names = ["t", "x", "p", "u", "out"]
             yield on, name, names
@@ -172,7 +172,7 @@ def good_values(module: Any) -> dict[str, Any]:
     """A value that fits for every name of an argument."""
     x = module.x0()
     first = module.q_names[0]
-    values: dict[str, Any] = {
+    values: dict[str, Any] = OPTIONS | {
         "t": 0.0,
         "x": x,
         "q": x[: module.n_q],
@@ -201,7 +201,12 @@ def good_values(module: Any) -> dict[str, Any]:
         "unknowns": list(module.p_names[:1]),
         "over": {first: (0.0, 0.5, 3)},
         "of": first,
-        "method": "RK45",
+        "method": None,
+        "step": None,
+        "checkpoint": None,
+        "store": None,
+        "resume": None,
+        "progress": False,
         "form": "minimal",
         "independent": [first],
         "weights": {first: 2.0},
@@ -213,6 +218,14 @@ def good_values(module: Any) -> dict[str, Any]:
         "within": (0.0, 1.0),
         "actuated": [first],
         "options": dict(OPTIONS),
+        "count": 2,
+        "threads": 1,
+        "block": 1,
+        "keep_events": 2,
+        "max_steps": 1000,
+        "reduce": "states",
+        "samples": 3,
+        "states": 1,
         "named": {first: float(x[0])},
         "led": {first: [float(x[0]), float(x[0]) + 0.01]},
     }

@@ -27,7 +27,7 @@ def test_names_are_unique_and_areas_are_covered() -> None:
     areas = {fault.file.split("/")[1] for fault in FAULTS if fault.file.startswith("eomgen/")}
     assert areas >= {
         "equations", "kinematics", "joints", "constraints", "forces", "graph", "rotations", "numeric", "emit",
-        "program", "runtime", "analysis", "limits",
+        "program", "runtime", "analysis", "simulation", "limits",
     }  # fmt: skip
     folders = {Path(fault.file).parent.name for fault in FAULTS if fault.file.startswith("templates/")}
     assert folders >= {"drivers", "steppers", "ensembles"}

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.runtime.checkpoint import Checkpoint
+from eomgen.simulation.checkpoint import Checkpoint
 
 EXAMPLES = files("eomgen.examples")
 

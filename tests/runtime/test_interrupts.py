@@ -70,8 +70,8 @@ def test_progress_is_told_from_the_loop(capsys: pytest.CaptureFixture[str]) -> N
         def look(self, t: float) -> None:
             told.append(t)
 
-    from eomgen.runtime.compiled import integrate_compiled
     from eomgen.runtime.signals import Forcing
+    from eomgen.simulation.compiled import integrate_compiled
 
     options = {"rtol": 1e-11, "atol": 1e-12}
     begun = time.perf_counter()

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 import eomgen as eg
-from eomgen.runtime.pace import MANY, WINDOW, Crawling, Pace
+from eomgen.simulation.stalling import MANY, WINDOW, Crawling, Pace
 
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])

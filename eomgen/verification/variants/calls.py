@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ... import pipeline
 from ...describe.builder import Builder
+from ...emit import emit_package
+from ...emit.write import write_package
 from ...equations import METHODS
 from ...errors import EomgenError, ToolchainError, UsageError
-from ...generation import generate
 from ...numeric import algebra
 from ...runtime.minimal import Minimal
 from ..finding import Finding
@@ -139,8 +141,8 @@ def _exported(check: str, model: Builder, original: Original, random: Any) -> Fi
     """A package written to a folder and imported from there."""
     made = Builder.from_description(original.description)
     with TemporaryDirectory() as folder:
-        root = generate(made, folder, target="numpy")
-        package = _imported(Path(root))
+        program = pipeline.build(pipeline.derive(made), "numpy")
+        package = _imported(write_package(dict(emit_package(program, "numpy")), Path(folder) / program.name))
         try:
             variant = Variant(original.description)
             return compare_module(check, original, variant, package)

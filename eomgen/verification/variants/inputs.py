@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...runtime.simulate import simulate
+from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
 from .states import Original, compiled

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...describe.description import Description
 from ...errors import EomgenError
-from ...runtime.simulate import simulate
+from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import FREE_CONSTANT, refused
 from .cuts import cut_another

@@ -1,4 +1,4 @@
-"""Analysis: a run -> the run and its derivatives by parameters, inputs and initial values.
+"""Simulation: a run -> the run and its derivatives by parameters, inputs and initial values.
 
 Forward sensitivities: S' = J S + df/dp beside x' = f (E. Hairer, S. Norsett, G. Wanner, Solving Ordinary Differential
 Equations I, 1993, section I.14), S(0) from the assembly of the initial state.
@@ -16,24 +16,24 @@ from ..errors import NoDerivativeError, SimulationError
 from ..limits.motions import SINGULAR
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
-from ..runtime.events import Events, warn_of_unknown
 from ..runtime.failure import place
-from ..runtime.input_slopes import Slopes
-from ..runtime.integrate import Solution, choose_solver, integrate, require_end
 from ..runtime.names import check_names, read_names, unknown
-from ..runtime.pace import Crawling, Pace, describe_crawl
-from ..runtime.recording import record
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
-from ..runtime.run_arguments import DEFAULTS, find_span, find_state, ordered_times
 from ..runtime.signals import Forcing
-from ..runtime.simulate import simulate
-from ..runtime.tolerances import check_tolerances
+from .events import Events, warn_of_unknown
+from .input_slopes import Slopes
+from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
+from .recording import record
+from .run_arguments import DEFAULTS, find_span, find_state, ordered_times
 from .saltation import Saltation
 from .sensitivity_result import Sensitivities
-from .start import held_names, keep_consistent, split_columns, start_sensitivity
-from .variations import Variational
+from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
+from .simulate import simulate
+from .stalling import Crawling, Pace, describe_crawl
+from .tolerances import check_tolerances
+from .variational import Variational
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Analysis: a run and its derivatives -> x' and S', and how inputs and laws vary with what it is differentiated by."""
+"""Simulation: a run and its derivatives -> x' and S', how inputs and laws vary with what it is differentiated by."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..analysis.linear import output_derivatives
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.input_slopes import InputSlopes
 from ..runtime.signals import Forcing
-from .linear import output_derivatives
-from .start import Columns
+from .input_slopes import InputSlopes
+from .sensitivity_start import Columns
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

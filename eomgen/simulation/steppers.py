@@ -1,4 +1,4 @@
-"""Stage runtime: Module -> its compiled steppers as SciPy's OdeSolver classes, for plain ``solve_ivp``."""
+"""Simulation: Module -> its compiled steppers as SciPy's OdeSolver classes, for plain ``solve_ivp``."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
+from ..runtime.kernels import fitting
+from ..runtime.late import eager
+from ..runtime.names import require
+from ..runtime.room import read_number, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
-from .kernels import fitting
-from .late import eager
-from .names import require
-from .room import read_number, read_vector
 from .tolerances import IMPLICIT
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
 
 
 def find_solver(module: BoundModel, name: str) -> Any:

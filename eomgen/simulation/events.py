@@ -1,4 +1,4 @@
-"""Stage runtime: events of the model and of one run -> what integrators watch for, and what happens then.
+"""Simulation: events of the model and of one run -> what integrators watch for, and what happens then.
 
 An event is a zero of an expression or function of time and state.  Those of the model are compiled with it; those given
 for a run are its names, expressions as text, or functions f(t, x) with SciPy's attributes.
@@ -16,13 +16,13 @@ from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
 from ..limits.runs import CROWD, INSTANT
 from ..numeric.scales import Array
-from .layout import Layout
-from .names import check_names, require_time_and_state
-from .tapes import Formula, is_formula, record_tape, values_together
+from ..runtime.layout import Layout
+from ..runtime.names import check_names, require_time_and_state
+from ..runtime.tapes import Formula, is_formula, record_tape, values_together
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
-    from .signals import Forcing
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
 STOP = 3  #: an integrator stops there and goes on, from another state or the same

@@ -1,4 +1,4 @@
-"""Stage runtime: what a user asks of a run -> its span, times, method, step and first state."""
+"""Simulation: what a user asks of a run -> its span, times, method, step and first state."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .room import as_real, read_number, read_numbers, read_times, shown
-from .signals import Forcing
+from ..runtime.room import as_real, read_number, read_numbers, read_times, shown
+from ..runtime.signals import Forcing
 from .tolerances import check_step
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
 
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 #: Assemblies in turn, by secant steps, with inputs that depend on the state.

@@ -1,4 +1,4 @@
-"""Analysis: gaps at the beginning of a piece of a run -> events that find where they close; a look for missed ones."""
+"""Simulation: gaps at the start of a part of a run -> events that find where they close; a look for those missed."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.impact_gaps import Gaps
+from ..analysis.roots import find_root
 from ..limits.impacts import FOUND, STARTED
 from ..limits.runs import INSTANT
 from ..numeric.scales import Array
-from .impact_gaps import Gaps
-from .roots import find_root
 
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory

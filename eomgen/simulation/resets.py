@@ -1,4 +1,4 @@
-"""Stage runtime: the resets of one run -> where events go on from, and when they follow each other without end."""
+"""Simulation: the resets of one run -> where events go on from, and when they follow each other without end."""
 
 from __future__ import annotations
 

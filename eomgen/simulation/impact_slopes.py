@@ -1,6 +1,6 @@
-"""Analysis: a state at an event and its changes -> how the state right after a reset or an impact changes.
+"""Simulation: a state at an event and its changes -> how the state right after a reset or an impact changes.
 
-An impact of one gap with normal n (see :mod:`.impact`) solves
+An impact of one gap with normal n (see :mod:`..analysis.impact`) solves
 
     M (v+ - v-) + C_q^T l = n^T g        C_q v+ + C_t = 0        r+ + e r- = 0,  r = n v + gap_t
 
@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.constrained import free_motions, solve_multipliers
 from ..errors import NoDerivativeError
 from ..limits.impacts import OFF
 from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
-from .constrained import free_motions, solve_multipliers
-from .start import assembly_rows
-from .variations import Move, Variational
+from .sensitivity_start import assembly_rows
+from .variational import Move, Variational
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Stage runtime: what an integrator found -> Trajectory."""
+"""Simulation: what an integrator found -> Trajectory."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..numeric.scales import Array
-from .columns import Columns, describe, project, units_of_layout
+from ..runtime.columns import Columns, describe, project, units_of_layout
+from ..runtime.origin import inputs_of, plain
+from ..runtime.signals import Forcing
+from ..runtime.trajectory import Trajectory
 from .integrate import Solution
-from .origin import inputs_of, plain
-from .signals import Forcing
-from .trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
 
 
 def record(

@@ -1,4 +1,4 @@
-"""Analysis, sensitivities: a run past a change point -> whether what it is differentiated by leaves the branch there.
+"""Simulation, sensitivities: a run past a change point -> whether what it is differentiated by leaves the branch there.
 
 At a change point two branches cross.  Let l be the direction in which the constraints lose rank there, l^T C_q = 0.  A
 change of p with l^T C_p not zero opens the crossing, and the mechanism turns back or changes over: the motion is no
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.balance import assembly_jacobian
 from ..errors import NoDerivativeError
 from ..limits.constraints import PASSED
 from ..limits.impacts import OPENS
 from ..numeric import algebra
 from ..runtime.change_points import scaled_jacobians
-from .balance import assembly_jacobian
-from .start import Columns
+from .sensitivity_start import Columns
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

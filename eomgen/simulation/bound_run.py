@@ -1,4 +1,4 @@
-"""Stage runtime: one integration of a module: its right-hand side for a solver, and the words when it fails."""
+"""Simulation: one integration of a module: its right-hand side for a solver, and the words when it fails."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import EvaluationError, SimulationError
 from ..numeric.scales import Array
-from .pace import Crawling, describe_crawl, steepest
+from ..runtime.signals import Forcing
 from .progress import Progress
-from .signals import Forcing
+from .stalling import Crawling, describe_crawl, steepest
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
-    from .protocols import Timed
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.protocols import Timed
 
 
 class Run:

@@ -1,4 +1,4 @@
-"""Analysis: a run that stops at every closing gap, applies the impact and goes on -> a trajectory with impacts."""
+"""Simulation: a run that stops at every closing gap, applies the impact and goes on -> a trajectory with impacts."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..analysis.impact import Impact, strike_run
+from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..errors import SimulationError, UsageError
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
-from ..runtime.run_arguments import find_span, find_state
 from ..runtime.signals import Forcing
-from ..runtime.simulate import simulate
 from ..runtime.trajectory import Residuals, Trajectory
-from .impact import Impact, strike_run
-from .impact_gaps import Gaps, allowance, check_gaps
 from .impact_trajectory import ImpactRun
 from .impact_watch import Watch, first_missed
+from .run_arguments import find_span, find_state
+from .simulate import simulate
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -1,4 +1,4 @@
-"""Analysis: a Module that drivers move entirely -> Trajectory over a span of time, without integration or forces."""
+"""Simulation: a Module that drivers move entirely -> Trajectory over a span of time, without integration or forces."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..analysis.following import Follower
+from ..analysis.gaps import describe_gap
+from ..analysis.kinematic import complete, start_from, walk_in
+from ..analysis.motions import KinematicAnalysis, keep
+from ..analysis.roots import find_root
+from ..analysis.tracks import Track
+from ..analysis.walking import Path
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.events import Event
 from ..runtime.signals import Forcing
-from .following import Follower
-from .gaps import describe_gap
-from .kinematic import complete, start_from, walk_in
-from .motions import KinematicAnalysis, keep
-from .roots import find_root
-from .tracks import Track
-from .walking import Path
+from .events import Event
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -42,7 +42,7 @@ def simulate_driven(
     events: Sequence[Event],
     given: Mapping[str, Any],
 ) -> KinematicAnalysis:
-    """The motion over a span; see :func:`~..runtime.simulate.simulate`.
+    """The motion over a span; see :func:`~.simulate.simulate`.
 
     Parameters
     ----------

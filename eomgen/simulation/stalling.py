@@ -1,4 +1,4 @@
-"""Stage runtime: times and states of an integrator's steps -> the end of a run whose steps lead nowhere.
+"""Simulation: times and states of an integrator's steps -> the end of a run whose steps lead nowhere.
 
 Next to a singular position, or where a force jumps, an integrator may go on for days in steps just above rounding.
 """
@@ -14,7 +14,7 @@ from ..errors import SimulationError
 from ..limits.rounding import TINY
 from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
-from .failure import place
+from ..runtime.failure import place
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any pace

@@ -1,4 +1,4 @@
-"""Analysis: the result of :mod:`.sensitivities`: a trajectory with its derivatives, and those of its events."""
+"""Simulation: the result of :mod:`.sensitivities`: a trajectory with its derivatives, and those of its events."""
 
 from __future__ import annotations
 

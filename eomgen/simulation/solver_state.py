@@ -1,4 +1,4 @@
-"""Stage runtime: one of SciPy's solvers between two steps <-> numbers.
+"""Simulation: one of SciPy's solvers between two steps <-> numbers.
 
 The same steps follow, to the last bit.
 """

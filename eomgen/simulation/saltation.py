@@ -1,4 +1,4 @@
-"""Analysis: derivatives of a run on one side of an event -> those on the other (saltation), and those of its time.
+"""Simulation: derivatives of a run on one side of an event -> those on the other (saltation), and those of its time.
 
 An event g(t, x, u, p) = 0 happens at a time T that moves with what a run is differentiated by:
 
@@ -20,11 +20,11 @@ import numpy as np
 from ..errors import NoDerivativeError, UsageError
 from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
-from ..runtime.events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
+from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
+from .impact_slopes import after_impact, after_reset
 from .sensitivity_result import EventSlopes
-from .start import keep_consistent
-from .strike_slopes import after_impact, after_reset
-from .variations import Move, Variational
+from .sensitivity_start import keep_consistent
+from .variational import Move, Variational
 
 GRAZING = 100.0  #: how much larger the square of an event's rate is than what the error of the state makes of it
 

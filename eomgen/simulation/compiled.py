@@ -1,4 +1,4 @@
-"""Stage runtime: right-hand side, corners of the inputs -> times and states, through the module's own steppers.
+"""Simulation: right-hand side, corners of the inputs -> times and states, through the module's own steppers.
 
 The whole loop runs in C, events and inputs included; Python looks in every few milliseconds, for the progress line and
 for an interrupt.
@@ -13,18 +13,18 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.names import check_names
+from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution
 from .integrate import MESSAGES as WORDS
-from .names import check_names
-from .signals import Forcing
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
     from .checkpoint import Checkpoint
-    from .pace import Pace
     from .progress import Progress
+    from .stalling import Pace
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
 ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h

@@ -1,4 +1,4 @@
-"""Analysis: how an assembled initial state changes with parameters and with the values it was assembled from.
+"""Simulation: how an assembled initial state changes with parameters and with the values it was assembled from.
 
 Values that are held stay (or change by one, for a sensitivity to an initial value); the constraints give the rest by
 implicit differentiation of C(q, p) = 0 and C_q v + C_t = 0.
@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..analysis.balance import assembly_jacobian
 from ..errors import UsageError
 from ..limits.constraints import CONTRADICTION, STATE
 from ..numeric import algebra
 from ..numeric.projection import minimum_norm
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from .balance import assembly_jacobian
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
-    from ..runtime.input_slopes import Slopes
     from ..runtime.layout import Layout
+    from .input_slopes import Slopes
 
 
 class Columns(NamedTuple):

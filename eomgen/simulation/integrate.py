@@ -1,4 +1,4 @@
-"""Stage runtime: right-hand side, solver, corners of the inputs -> times, states and events, through SciPy.
+"""Simulation: right-hand side, solver, corners of the inputs -> times, states and events, through SciPy.
 
 Steps one of SciPy's solvers from corner to corner of tabulated inputs, so that none is stepped over, and from reset to
 reset; what happens after a step is what the compiled loop does (steppers/loop.c).
@@ -14,10 +14,10 @@ import numpy as np
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
+from ..runtime.names import require, unknown
 from .crossings import Crossings, Step
 from .events import Event
-from .names import require, unknown
-from .pace import Pace
+from .stalling import Pace
 
 if TYPE_CHECKING:
     from .solver_state import Pause

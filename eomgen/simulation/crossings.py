@@ -1,4 +1,4 @@
-"""Stage runtime: values of events along a run -> where they come to zero, for integrators stepped in Python.
+"""Simulation: values of events along a run -> where they come to zero, for integrators stepped in Python.
 
 The same as the compiled loop does in C (steppers/crossings.c, event_values.c, event_zero.c), function by function, so
 that a run finds the same events by every method: changes of sign between the ends of a step, values that come to zero
@@ -14,19 +14,7 @@ import numpy as np
 
 from ..errors import ZenoError
 from ..limits.rounding import EPS
-from ..limits.runs import (
-    ASIDE,
-    CROWDED,
-    HALVED,
-    INSTANT,
-    LATE,
-    MOMENTARY,
-    RESTING,
-    SAMPLED,
-    TOUCHED,
-    TOUCHING,
-    TURNING,
-)
+from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
 from ..numeric.scales import Array
 from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, Together, crowd_of
 

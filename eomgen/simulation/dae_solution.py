@@ -1,4 +1,4 @@
-"""Stage runtime: the differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae).
+"""Simulation: the differential-algebraic form of a model -> a trajectory, by IDA of SUNDIALS (scikit-sundae).
 
 IDA stops at every event, which its own root finding locates, and at the corners of inputs; it starts anew from there
 with consistent values.
@@ -16,20 +16,20 @@ from numpy.typing import ArrayLike
 from ..errors import SimulationError, UsageError
 from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
-from .dae import DaeForm
+from ..runtime.dae import DaeForm
+from ..runtime.names import require
+from ..runtime.room import require_steps
+from ..runtime.signals import Forcing
 from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
 from .integrate import Solution, require_end
-from .names import require
 from .recording import record
 from .resets import Resets
-from .room import require_steps
 from .run_arguments import find_span, find_state, ordered_times
-from .signals import Forcing
 from .tolerances import check_step, check_tolerances
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
-    from .trajectory import Trajectory
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.trajectory import Trajectory
 
 UNCONTROLLED = 1e30  #: absolute tolerance of unknowns that the error test leaves out
 STEPS = 1_000_000  #: at most, between two times wanted

@@ -1,4 +1,4 @@
-"""Stage runtime: the inputs of a run -> their derivatives by time, state and parameters, exact or refused."""
+"""Simulation: the inputs of a run -> their derivatives by time, state and parameters, exact or refused."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from .layout import Layout
-from .signal_rates import TableRate, rate_places
-from .signals import Forcing, Signal
+from ..runtime.layout import Layout
+from ..runtime.signal_rates import TableRate, rate_places
+from ..runtime.signals import Forcing, Signal
 
 
 class Slopes(NamedTuple):

@@ -1,4 +1,4 @@
-"""Stage runtime: a run under way <-> a file from which the same call goes on, to the last bit.
+"""Simulation: a run under way <-> a file from which the same call goes on, to the last bit.
 
 The file is written beside and renamed, so that it is whole at any time; it says which run it belongs to, and that of
 another run is refused.
@@ -19,15 +19,15 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
-from .arrays import BROKEN, read_arrays
-from .identity import code_digest, differences, digest
-from .room import shown
-from .tapes import DeclaredSignal, Formula
+from ..runtime.arrays import BROKEN, read_arrays
+from ..runtime.identity import code_digest, differences, digest
+from ..runtime.room import shown
+from ..runtime.tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.signals import Forcing
     from .events import Events
-    from .signals import Forcing
 
 FORMAT = "eomgen checkpoint 1"
 

@@ -1,4 +1,4 @@
-"""Stage runtime: tolerances and limits of steps as a user gives them -> checked values that every solver takes."""
+"""Simulation: tolerances and limits of steps as a user gives them -> checked values that every solver takes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import LEAST_RTOL
-from .room import as_real, read_number, shown
+from ..runtime.room import as_real, read_number, shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 

@@ -1,4 +1,4 @@
-"""Analysis: a run with impacts as a trajectory that has two points at each."""
+"""Simulation: a run with impacts as a trajectory that has two points at each."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from ..analysis.impact import Impact
 from ..numeric.scales import Array
 from ..runtime.trajectory import Source, Trajectory
-from .impact import Impact
 
 
 class ImpactRun(Trajectory):

@@ -1,4 +1,4 @@
-"""Stage runtime: times an integrator visits -> a progress line on stderr."""
+"""Simulation: times an integrator visits -> a progress line on stderr."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import sys
 from time import perf_counter
 from typing import Any
 
-from .room import read_flag
+from ..runtime.room import read_flag
 
 PATIENCE = 2.0  #: seconds before anything is shown
 EVERY = 0.2  #: seconds between updates

@@ -1,4 +1,4 @@
-"""Stage runtime: Module, span, initial values, parameters, inputs -> Trajectory, through SciPy's integrators."""
+"""Simulation: Module, span, initial values, parameters, inputs -> Trajectory, through SciPy's integrators."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..runtime.names import check_names
+from ..runtime.room import read_flag, require_room, require_steps
+from ..runtime.signals import Forcing
+from .bound_run import Run
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .names import check_names
-from .pace import Crawling, Pace
 from .progress import Progress, wanted
 from .recording import record
-from .room import read_flag, require_room, require_steps
-from .run import Run
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
-from .signals import Forcing
+from .stalling import Crawling, Pace
 from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
-    from .trajectory import Trajectory
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.trajectory import Trajectory
 
 OPTIONS = (
     *("method", "rtol", "atol", "t_eval", "events", "dense_output", "max_step", "first_step", "progress", "step"),
@@ -68,9 +68,9 @@ def simulate(
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
-        Tables are linear in between (a :class:`~.signals.Signal` may hold the last value, or be a cubic spline) and
-        constant outside; their corners are stepped on exactly.  An expression is a text as in model files, of t,
-        coordinates, velocities and parameters.
+        Tables are linear in between (a :class:`~..runtime.signals.Signal` may hold the last value, or be a cubic
+        spline) and constant outside; their corners are stepped on exactly.  An expression is a text as in model
+        files, of t, coordinates, velocities and parameters.
         Rates of an input that the equations need (``u_dot``, ``u_ddot`` among ``u_names``) follow from it; a function
         of which none is known is refused unless they are given beside it.
     method : str or OdeSolver subclass, optional
@@ -134,7 +134,7 @@ def simulate(
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to go on from")
     if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
-        from ..analysis.driven import is_driven
+        from .driven import is_driven
 
         if is_driven(module) and not _led_by_inputs(module, inputs, method):
             if kept is not None:
@@ -249,7 +249,7 @@ def _follow_drivers(
     options: Mapping[str, Any],
 ) -> Trajectory:
     """The motion of a mechanism that its drivers move entirely: solved, not integrated."""
-    from ..analysis.driven import simulate_driven
+    from .driven import simulate_driven
 
     forcing = Forcing(module.layout, inputs)
     start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))

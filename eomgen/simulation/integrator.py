@@ -1,4 +1,4 @@
-"""Stage runtime: Module and tolerances -> an integrator held ready: state at one time -> state at another."""
+"""Simulation: Module and tolerances -> an integrator held ready: state at one time -> state at another."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
+from ..runtime.late import eager
+from ..runtime.names import check_names
+from ..runtime.room import read_vector, require_steps
+from ..runtime.signals import Forcing
+from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
 from .events import Events
 from .integrate import choose_solver
-from .late import eager
-from .names import check_names
-from .pace import Crawling, Pace
-from .room import read_vector, require_steps
-from .run import Run
 from .run_arguments import check_method, declare, own_step
-from .signals import Forcing
 from .simulate import simulate
+from .stalling import Crawling, Pace
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
-    from .bound_model import BoundModel
+    from ..runtime.bound_model import BoundModel
 
 OPTIONS = ("method", "rtol", "atol", "max_step", "first_step", "step")
 
