@@ -14,11 +14,11 @@ WEAVE, CAPSIZE = 4.292382536341104, 6.024262015388359  # m/s (Meijaard, Papadopo
 
 
 def main() -> None:
-    """Linearise the nonlinear model about straight rides, find where they are stable, and ride."""
+    """Linearize the nonlinear model about straight rides, find where they are stable, and ride."""
     module = eg.load(MODEL).compile(target="numpy")
 
     def matrices(v: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return module.linearise(module.x0(STRAIGHT, rear_dot=-v / RADIUS)).second_order("lean", "steer")
+        return module.linearize(module.x0(STRAIGHT, rear_dot=-v / RADIUS)).second_order("lean", "steer")
 
     def eigenvalues(v: float) -> np.ndarray:
         M, C, K = matrices(v)

@@ -13,8 +13,8 @@ from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.names import unknown
 from .balance import Balance, force_slopes, weigh
-from .linear import linearise
-from .linearisation import Linearisation
+from .linear import linearize
+from .linearization import Linearization
 from .rounding import judge
 from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
@@ -44,7 +44,7 @@ class Equilibrium:
         Of the motion near it, held coordinates held (1/s).
     stability : {'asymptotically stable', 'marginal', 'unstable', 'no freedom'}
         By their largest real part; 'marginal' where it vanishes.
-    linear : Linearisation or None
+    linear : Linearization or None
         About the equilibrium; None where supports hold it.
     module : BoundModel
         With the unknowns found bound.
@@ -58,7 +58,7 @@ class Equilibrium:
         self.unknowns: dict[str, float] = found["unknowns"]
         self.forces: dict[str, float] = found["forces"]
         self.supports: dict[str, float] = found["supports"]
-        self.linear: Linearisation | None = found["linear"]
+        self.linear: Linearization | None = found["linear"]
         self.eigenvalues: Any = found["eigenvalues"]
         self.stability: str = found["stability"]
         self.steps: int = found["steps"]
@@ -100,7 +100,7 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
         "steps": steps,
     }
     if held is None:
-        linear = linearise(module, here.x, t)
+        linear = linearize(module, here.x, t)
         found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
         free = weigh(module, t, q)

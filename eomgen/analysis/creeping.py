@@ -67,7 +67,7 @@ class _Flow(NamedTuple):
     @classmethod
     def at(cls, search: Search, point: Point) -> _Flow | None:
         """None where there is none."""
-        linear = search.linearise(point)
+        linear = search.linearize(point)
         if linear.flow is None:
             return None
         basis = linear.moved

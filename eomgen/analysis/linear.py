@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.room import read_number, read_numbers
 from .linear_given import find_given_tangent, refuse_inputs
-from .linearisation import Linearisation
+from .linearization import Linearization
 from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
@@ -23,7 +23,7 @@ FORMS = ("minimal", "full")
 
 
 @np.errstate(all="ignore")
-def linearise(
+def linearize(
     module: BoundModel,
     x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
@@ -32,8 +32,8 @@ def linearise(
     u: Any = None,
     form: str = "minimal",
     independent: Sequence[str] | None = None,
-) -> Linearisation:
-    """Linearise the equations of motion about any state.
+) -> Linearization:
+    """Linearize the equations of motion about any state.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def linearise(
 
     Returns
     -------
-    Linearisation
+    Linearization
         A, B, C, D, names, eigenvalues, ``mass``, ``damping``, ``stiffness``, ``drift``, ``state_space()``.
 
     Raises
@@ -89,14 +89,14 @@ def linearise(
         P = projected_directions(module, time, state, J)
         A, B, drift, states = J, U, rates, layout.x
         C, D = _outputs(module, time, state, rates, P, J, U)
-        return Linearisation(layout, time, state, module.u, (A, B, C, D), states, drift)
+        return Linearization(layout, time, state, module.u, (A, B, C, D), states, drift)
     if layout.given_rates:
         tangent = find_given_tangent(module, time, state, independent)
         moved = J @ tangent.T
         chosen = np.concatenate([tangent.positions, layout.n_q + tangent.velocities])
         C, D = _outputs(module, time, state, rates, tangent.T, moved, U)
         names = tuple(layout.x[k] for k in chosen)
-        return Linearisation(
+        return Linearization(
             layout, time, state, module.u, (moved[chosen], U[chosen], C, D), names, rates[chosen], None, tangent
         )
     tangent = find_tangent(module, time, state, J, independent)
@@ -115,7 +115,7 @@ def linearise(
     mass = tangent.B.T @ module.mass_matrix(state[:n_q], t=time) @ tangent.B
     damping, stiffness = -mass @ A[n_z:, n_z:], -mass @ A[n_z:, :n_z]
     own = own_accelerations(module, time, state, tangent.B, tangent.velocities, mass)
-    return Linearisation(
+    return Linearization(
         layout, time, state, module.u, (A, B, C, D), states, drift, (mass, damping, stiffness), tangent, own
     )
 

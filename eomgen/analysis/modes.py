@@ -1,4 +1,4 @@
-"""Analysis: a linearisation at rest -> natural frequencies, mode shapes, damping ratios.
+"""Analysis: a linearization at rest -> natural frequencies, mode shapes, damping ratios.
 
 Undamped modes solve ``K s = omega^2 M s`` (L. Meirovitch, Fundamentals of Vibrations, 2001, sections 4.6 and 7.5),
 damped ones are the eigenvalues of A.
@@ -21,8 +21,8 @@ from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.room import read_numbers
 from .equilibrium import equilibrium
-from .linear import linearise
-from .linearisation import Linearisation
+from .linear import linearize
+from .linearization import Linearization
 from .stability import symmetric_modes, uncertainty
 from .tables import as_html, as_text, number
 
@@ -59,10 +59,10 @@ class Modes:
         Numbers of rigid-body modes and of modes with negative squares.
     damped : list of Damped
         The modes with damping and gyroscopic terms, slow ones first.
-    linear : Linearisation
+    linear : Linearization
     """
 
-    def __init__(self, linear: Linearisation) -> None:
+    def __init__(self, linear: Linearization) -> None:
         assert linear.mass is not None
         assert linear.tangent is not None
         self.linear, self.name = linear, linear.name
@@ -113,7 +113,7 @@ class Modes:
         return as_html(f"Modes of {self.name}", self.facts)
 
 
-def stiffness(linear: Linearisation) -> Array:
+def stiffness(linear: Linearization) -> Array:
     """K (n_dof, n_dof) by the displacements that the independent velocities make."""
     assert linear.stiffness is not None
     n_z = len(linear.position_names)
@@ -135,7 +135,7 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
         if np.abs(values.imag).max() > SYMMETRIC * max(1.0, np.abs(values).max()):
             raise UsageError(
                 "the undamped modes are not real, because the stiffness is not symmetric (forces that follow the "
-                "motion); see the eigenvalues of linearise"
+                "motion); see the eigenvalues of linearize"
             )
         order = np.argsort(values.real)
         squares, vectors = values.real[order], complexes.real[:, order]
@@ -190,11 +190,11 @@ def modes(
     state = np.array(read_numbers("x", x))
     if state.shape == (module.n_q,):
         state = np.concatenate([state, np.zeros(module.n_v)])
-    linear = linearise(module, state, t, independent=independent)
+    linear = linearize(module, state, t, independent=independent)
     if not linear.is_equilibrium:
         k = int(np.abs(linear.drift).argmax())
         raise UsageError(
             f"modes are those about an equilibrium, and here {linear.states[k]} changes at a rate of "
-            f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearise()"
+            f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearize()"
         )
     return Modes(linear)

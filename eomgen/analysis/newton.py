@@ -35,7 +35,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
     """
     part, before, start, last = 1.0, None, point.q, np.inf
     for step in range(STEPS):
-        solver = Solver(search.linearise(point))
+        solver = Solver(search.linearize(point))
         residual = search.residual(point.here, point.here)
         change = solver.solve(residual)
         shown = solver.shown(change)
@@ -97,7 +97,7 @@ def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Po
         point, left, enough = there, after, after > 0.5 * left or largest(solver.shown(change)) <= ARRIVED
         if enough:
             break
-        solver = Solver(search.linearise(point))
+        solver = Solver(search.linearize(point))
         if len(solver.sizes) != len(sizes):
             break
         change = solver.solve(search.residual(point.here, point.here))
@@ -111,9 +111,9 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
     the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
     """
     damping, growth, columns = 1e-3, 2.0, np.zeros(0)
-    start = Solver(search.linearise(point)).sizes
+    start = Solver(search.linearize(point)).sizes
     for step in range(STEPS):
-        solver, here = Solver(search.linearise(point)), point.here
+        solver, here = Solver(search.linearize(point)), point.here
         residual = search.residual(here, here)
         change = solver.solve(residual)
         if not residual.any() or solver.arrived(residual, change, search.rounded(point)):

@@ -102,7 +102,7 @@ class Search:
         forces = s[here.velocities] * here.forces if self.supported else (here.a / s)[like.velocities]
         return np.concatenate([forces, (here.v / s)[like.surplus]])
 
-    def linearise(self, point: Point) -> Linear:
+    def linearize(self, point: Point) -> Linear:
         """The equations near an iterate, by displacements of length 1 that are at right angles (scaled)."""
         here, s = point.here, self.layout.scales.q
         if self.supported:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..analysis.equilibrium import equilibrium as _equilibrium
     from ..analysis.impact import impact as _impact
     from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
-    from ..analysis.linear import linearise as _linearise
+    from ..analysis.linear import linearize as _linearize
     from ..analysis.modes import modes as _modes
     from ..analysis.reaching import motion_range as _motion_range
     from ..analysis.reactions import driving_forces as _driving_forces
@@ -43,7 +43,7 @@ CALLS = {
     "integrator": "simulation.integrator",
     "step": "simulation.steppers",
     "verify": "verification.verify",
-    "linearise": "analysis.linear",
+    "linearize": "analysis.linear",
     "modes": "analysis.modes",
     "equilibrium": "analysis.equilibrium",
     "sensitivities": "simulation.sensitivities",
@@ -83,7 +83,7 @@ class Module(BoundModel):  # noqa: D101
         integrator = _integrator
         step = _step
         verify = _verify
-        linearise = _linearise
+        linearize = _linearize
         modes = _modes
         equilibrium = _equilibrium
         sensitivities = _sensitivities

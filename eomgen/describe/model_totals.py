@@ -24,7 +24,7 @@ class TotalMethods(Described):
         return symbol("total_mass")
 
     @property
-    def centre_of_mass(self) -> MarkerHandle:
+    def center_of_mass(self) -> MarkerHandle:
         """The centre of mass of all bodies: its ``.position``, ``.velocity`` and ``.acceleration`` in ground axes."""
         return MarkerHandle(self, COM)
 

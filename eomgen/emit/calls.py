@@ -32,7 +32,7 @@ def describe_calls(program: Program) -> list[Call]:
         Call("bias(t, x)", _shape(s.n_v), "h in M v' + h = generalized forces not in the model"),
         Call("inverse_dynamics(q, v, a)", _shape(s.n_v), "M a + h, the generalized forces to add"),
         Call("energy(x)", _shape(2), "kinetic and potential energy T, V (J)"),
-        Call("centre_of_mass(q)", _shape(3), "of all bodies, ground axes (m)"),
+        Call("center_of_mass(q)", _shape(3), "of all bodies, ground axes (m)"),
         Call("com_jacobian(q)", _shape(3, s.n_v), "its velocity for each generalized velocity"),
         Call("momentum(x)", _shape(6), "linear, then angular about the centre of mass, ground axes (kg m/s, kg m^2/s)"),
         Call("centroidal_inertia(q)", _shape(3, 3), "of all bodies about their centre of mass, ground axes (kg m^2)"),
@@ -66,7 +66,7 @@ def describe_calls(program: Program) -> list[Call]:
         Call("canonical.hamiltonian(z)", "number", "H = p v - T + V (J)"),
         Call("bind(p=None, u=None)", "Module", "the same calls with other parameters and inputs"),
         Call("simulate(span, initial=None)", "Trajectory", "an integration; needs SciPy"),
-        Call("linearise(x=None, t=0.0)", "Linearisation", "A, B, C, D along the constraints, eigenvalues"),
+        Call("linearize(x=None, t=0.0)", "Linearization", "A, B, C, D along the constraints, eigenvalues"),
         Call("modes(x=None, t=0.0)", "Modes", "frequencies, shapes and damping ratios about an equilibrium"),
         Call("equilibrium(guess=None, hold=(), unknowns=())", "Equilibrium", "a position where all forces balance"),
         Call("multipliers(t, x)", _shape(s.n_c), "l of all constraint rows in M v' + h + C_q^T l = 0"),
@@ -79,7 +79,7 @@ def describe_calls(program: Program) -> list[Call]:
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
     calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]
     calls = [call for call in calls if s.n_m or not call.text.startswith("canonical")]
-    sums = ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
+    sums = ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
     kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
     kept = [call for call in kept if s.n_s or not call.text.startswith("reactions")]
     return [call for call in kept if s.n_c or not ("constraint" in call.text or call.text.startswith("multipliers"))]

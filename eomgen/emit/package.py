@@ -22,7 +22,7 @@ from .sources import SourceSet, render
 ANNOTATED: tuple[tuple[str, str], ...] = (
     *((name, "Timed") for name in ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")),
     *((name, "State") for name in ("mass_matrix", "embedded_mass_matrix", "energy", "project", "poses")),
-    *((name, "State") for name in ("centre_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
+    *((name, "State") for name in ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")),
     ("inverse_dynamics", "Motion"),
     *((name, "Rows") for name in ("constraints", "constraint_jacobian", "velocity_constraints")),
     *((name, "tuple[str, ...]") for name in
@@ -34,7 +34,7 @@ ANNOTATED: tuple[tuple[str, str], ...] = (
 FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces", "actuator_forces", "impact",
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
-ANALYSES = (*MOTIONS, "linearise", "modes", "equilibrium", "sensitivities", *FORCES)
+ANALYSES = (*MOTIONS, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
 #: Files of verification/ that need no equations.
 VERIFICATION = (
     *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),

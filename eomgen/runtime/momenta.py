@@ -86,9 +86,9 @@ class Momenta:
         return Part(self.kernels, name, start, shape, layout.n_x if rates else layout.n_q)
 
     @cached_property
-    def centre_of_mass(self) -> State:
-        """``centre_of_mass(q)`` -> (3,) of all bodies (m)."""
-        return self._part("centre_of_mass", 0, 3)
+    def center_of_mass(self) -> State:
+        """``center_of_mass(q)`` -> (3,) of all bodies (m)."""
+        return self._part("center_of_mass", 0, 3)
 
     @cached_property
     def com_jacobian(self) -> State:

@@ -21,7 +21,7 @@ def require_velocities(layout: Layout) -> None:
     if getattr(layout, "given_rates", False):
         raise UnavailableError(
             f"the rates of the coordinates of model {layout.name!r} are given as functions of its velocities, and its "
-            "other analyses are not derived; rhs, jacobian, simulate and linearise are there"
+            "other analyses are not derived; rhs, jacobian, simulate and linearize are there"
         )
 
 

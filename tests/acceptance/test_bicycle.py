@@ -72,7 +72,7 @@ def upright(mod: Any, v: float) -> np.ndarray:
 
 
 def linear(mod: Any, v: float) -> Any:
-    return mod.linearise(upright(mod, v))
+    return mod.linearize(upright(mod, v))
 
 
 def close(found: np.ndarray, expected: np.ndarray, digits: float = 1e-11) -> None:

@@ -227,7 +227,7 @@ def test_outputs_of_every_body_at_a_given_crank_acceleration(
 ) -> None:
     model = models.build(name)
     for body, x in at.items():
-        marker = model.bodies[body].marker("centre_of_mass", at=(x, 0, 0))
+        marker = model.bodies[body].marker("center_of_mass", at=(x, 0, 0))
         for word, vector in (("p", marker.position), ("v", marker.velocity), ("a", marker.acceleration)):
             model.output(f"{body}_{word}x", vector[0])
             model.output(f"{body}_{word}y", vector[1])

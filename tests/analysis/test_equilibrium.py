@@ -46,7 +46,7 @@ def test_a_spring_preload(compiled: Compiled) -> None:
 
         assert found["L0"] == pytest.approx(scipy.optimize.brentq(slope, 0.1, 3.0), rel=1e-8)
         assert found.module.p[mod.p_names.index("L0")] == found["L0"]
-        assert found.module.linearise(found.x).is_equilibrium
+        assert found.module.linearize(found.x).is_equilibrium
         assert found.supports == {}
 
 

@@ -75,7 +75,7 @@ def test_a_hanging_body_with_a_free_rotor_is_never_called_unstable() -> None:
         seen[bool(mod.poses(found.q)[0, 1, 0] > 0.0), found.stability] += 1  # its x axis, with the masses, upwards
         spun = np.array(found.x)
         spun[mod.x_names.index("R_dot")] = 1e-3  # slowly, so that it decides nothing
-        assert mod.linearise(spun).stability == found.stability
+        assert mod.linearize(spun).stability == found.stability
     assert set(seen) == {(False, "marginal"), (True, "unstable")}
     assert min(seen.values()) > 10
 
@@ -91,7 +91,7 @@ def test_damping_makes_a_rest_asymptotically_stable_unless_something_is_free(fre
         m.actuator("hold", "B", "-2*b - 0.1*b_dot")
     mod = m.compile(target="numpy")
     assert mod.equilibrium({"a": 0.4}).stability == ("marginal" if free else "asymptotically stable")
-    assert mod.linearise(mod.x0(a=np.pi)).stability == "unstable"
+    assert mod.linearize(mod.x0(a=np.pi)).stability == "unstable"
 
 
 def test_follower_forces_are_judged_by_eigenvalues() -> None:

@@ -82,7 +82,7 @@ def test_a_loop_with_soft_and_stiff_springs(described: str, plain: Any) -> None:
     np.testing.assert_allclose(angles(other), angles(first), atol=1e-10)
     assert other.stability == first.stability == "marginal"
     np.testing.assert_allclose(np.abs(other.eigenvalues), np.abs(first.eigenvalues), rtol=1e-7)
-    assert mod.linearise(other.x).is_equilibrium
+    assert mod.linearize(other.x).is_equilibrium
 
 
 def hanging(turn: Rotation, rotation: str = "euler_parameters", unit: float = 1.0) -> Any:

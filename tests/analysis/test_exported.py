@@ -27,7 +27,7 @@ sys.meta_path.insert(0, Refuse())
 import spring_four_bar as package
 
 rest = package.equilibrium({"phi": 2.0})
-found = package.linearise(rest.x)
+found = package.linearize(rest.x)
 modes = package.modes(rest.x)
 preload = package.equilibrium(hold={"phi": 2.4}, unknowns=["L0"])
 result = {
@@ -53,7 +53,7 @@ def test_a_numpy_package(compiled: Callable[..., Any], without: list[str], tmp_p
     expected = float(models.reference("iftomm_fourbar_diagonal_spring")["reference"]["phi_eq"])
     assert result["phi"] == pytest.approx(expected, abs=1e-10)
     x = mod.x0(phi=expected)
-    np.testing.assert_allclose(result["A"], mod.linearise(x).A, atol=1e-9)
+    np.testing.assert_allclose(result["A"], mod.linearize(x).A, atol=1e-9)
     np.testing.assert_allclose(result["omega"], mod.modes(x).frequencies, rtol=1e-9)
     np.testing.assert_allclose(result["by_p"], mod.parameter_jacobian(0.0, x), atol=1e-8)
     if not without:

@@ -103,7 +103,7 @@ def test_times_and_rates_that_are_no_numbers_are_named() -> None:
     x = mod.x0(th=0.3)
     calls = [
         lambda: mod.reactions("a", x),
-        lambda: mod.linearise(x, "a"),
+        lambda: mod.linearize(x, "a"),
         lambda: mod.modes(x, "a"),
         lambda: mod.equilibrium(t="a"),
         lambda: mod.consistent(x, "a"),

@@ -113,7 +113,7 @@ def test_a_position_by_names() -> None:
     m.initial(A=0.3, A_dot=1.0)
     mod = m.compile(target="numpy")
     np.testing.assert_allclose(mod.modes({"A": 0.0}).frequencies, np.sqrt(9.81 / 0.5), rtol=1e-12)
-    turned = mod.linearise({"A": 0.1, "A_dot": 0.0})
+    turned = mod.linearize({"A": 0.1, "A_dot": 0.0})
     np.testing.assert_allclose(turned.A, [[0.0, 1.0], [-9.81 / 0.5 * np.cos(0.1), 0.0]], rtol=1e-12)
     with pytest.raises(eg.UsageError, match="B"):
         mod.modes({"B": 0.1})

@@ -12,7 +12,7 @@ from .conftest import EXAMPLES, Call
 CRANK = EXAMPLES / "slider_crank.yaml"
 PENDULUM = EXAMPLES / "double_pendulum.yaml"
 KEYS = {
-    "linearise": {
+    "linearize": {
         "name", "method", "t", "x", "states", "inputs", "outputs", "A", "B", "C", "D", "mass", "damping", "stiffness",
         "drift", "velocities", "positions", "equilibrium", "steady", "eigenvalues", "stability",
     },
@@ -48,17 +48,17 @@ def test_keys_of_json(call: Call, verb: str) -> None:
     assert result.json["name"] == "slider_crank"
 
 
-def test_linearise(call: Call) -> None:
+def test_linearize(call: Call) -> None:
     rest = ["--set", "theta1=0.2", "--set", "bend=-0.1"]
-    found = call("linearise", PENDULUM, "--equilibrium", *rest, "--target", "numpy", "--json").json
+    found = call("linearize", PENDULUM, "--equilibrium", *rest, "--target", "numpy", "--json").json
     assert found["equilibrium"]
     assert found["states"] == ["theta1", "bend", "theta1_dot", "bend_dot"]
     values = np.array(found["eigenvalues"]) @ [1, 1j]
     np.testing.assert_allclose(np.sort(np.abs(np.linalg.eigvals(np.array(found["A"])))), np.sort(np.abs(values)), 1e-9)
-    text = call("linearise", PENDULUM, "--target", "numpy", *rest).out
+    text = call("linearize", PENDULUM, "--target", "numpy", *rest).out
     assert "no steady motion" in text
     assert "theta1_dot" in text
-    full = call("linearise", CRANK, "--full", "--target", "numpy", "--json").json
+    full = call("linearize", CRANK, "--full", "--target", "numpy", "--json").json
     assert len(full["A"]) == 6
     assert full["mass"] is None
 
@@ -141,7 +141,7 @@ def test_inverse(call: Call) -> None:
     found = call(*words).json
     other = call(*words, "--actuated", "tau").json
     assert abs(found["accelerations"]["theta_ddot"] - 3.0) < 1e-12
-    declared = call("linearise", CRANK, "--target", "numpy", "--json").json["inputs"]
+    declared = call("linearize", CRANK, "--target", "numpy", "--json").json["inputs"]
     assert declared == ["tau"]
     assert set(other["forces"]) == {"tau"}
     np.testing.assert_allclose(other["reactions"], found["reactions"], atol=1e-9)

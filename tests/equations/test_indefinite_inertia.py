@@ -89,7 +89,7 @@ def closed(I: float) -> eg.Model:
 @pytest.mark.parametrize(
     "build", [lambda: pendulum(-0.2, check_inertia="off"), lambda: closed(-2.0)], ids=["tree", "loop"]
 )
-def test_jacobian_and_linearise_are_exact(build: Any, target: str) -> None:
+def test_jacobian_and_linearize_are_exact(build: Any, target: str) -> None:
     module = build().compile(target=target, **({"optimize": 0} if target == "cython" else {}))
     x = module.project(module.x0() + np.linspace(0.1, 0.4, module.n_x) * (0.1 if module.n_c else 1.0))
     q, v = x[: module.n_q], x[module.n_q :]
@@ -109,7 +109,7 @@ def test_jacobian_and_linearise_are_exact(build: Any, target: str) -> None:
     by_input = module.input_jacobian(0.0, x)[:, 0]
     given = [module.rhs(0.0, x, u=[tau]) for tau in (1.0, -1.0)]
     np.testing.assert_allclose(by_input, (given[0] - given[1]) / 2, rtol=1e-9, atol=1e-9)
-    linear = module.linearise(x)
+    linear = module.linearize(x)
     assert np.isfinite(linear.eigenvalues).all()
     if not m:
         np.testing.assert_allclose(linear.A, J, atol=1e-12)

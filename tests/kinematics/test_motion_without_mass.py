@@ -51,7 +51,7 @@ def test_a_mechanism_without_mass_is_led(target: str) -> None:
     assert mod.assemble(theta=1.2)[0] == 1.2
     assert mod.kinematics([1.2], [1.0])[1][0] == 1.0
     x = mod.x0()
-    for call in (lambda: mod.rhs(0.0, x), lambda: mod.jacobian(0.0, x), lambda: mod.simulate(0.1), mod.linearise):
+    for call in (lambda: mod.rhs(0.0, x), lambda: mod.jacobian(0.0, x), lambda: mod.simulate(0.1), mod.linearize):
         with pytest.raises(eg.SingularMassMatrixError, match="kinematics only: .*crank, coupler, rocker; give those"):
             call()
 

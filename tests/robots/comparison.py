@@ -34,7 +34,7 @@ class Compiled:
             "inverse": m.inverse_dynamics(s.q, s.v, s.a, u=still),
             "forward": m.rhs(0.0, x, u=u)[m.n_q :],
             "poses": m.poses(s.q),
-            "com": m.centre_of_mass(s.q),
+            "com": m.center_of_mass(s.q),
         }
 
 

@@ -229,7 +229,7 @@ def test_a_robot_without_any_mass_loads_by_itself(tmp_path: Path) -> None:
     with pytest.raises(eg.SingularMassMatrixError, match="kinematics only"):
         module.simulate(0.1)
     with pytest.raises(eg.SingularMassMatrixError, match="kinematics only"):
-        module.linearise()
+        module.linearize()
 
 
 def test_options_are_checked(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def test_coupled_mimics_equal_pinocchio_without_them(case: str) -> None:
         s = judge.at(module.q_names, module.v_names, q, v, drawn.a, drawn.tau)
         assert np.abs(module.constraints(q)).max() < 1e-14
         assert difference(module.mass_matrix(q), s.mass_matrix) < LIMIT
-        assert np.abs(module.centre_of_mass(q) - s.com).max() < LIMIT
+        assert np.abs(module.center_of_mass(q) - s.com).max() < LIMIT
         reduced = G.T @ s.mass_matrix @ G
         assert difference(module.embedded_mass_matrix(q), reduced[np.ix_(order, order)]) < LIMIT
         expected = G @ np.linalg.solve(reduced, G.T @ (s.tau - s.bias))

@@ -26,17 +26,17 @@ def test_a_rare_kernel_is_made_when_first_called(target: str) -> None:
     assert "further" not in core.__dict__
     longer = module.bind({"r": 0.2})
     q = x[: module.n_q]
-    centre, other = module.centre_of_mass(q), longer.centre_of_mass(q)
+    centre, other = module.center_of_mass(q), longer.center_of_mass(q)
     assert "centroidal" in core.further.names
     assert core.further is not core.core
     assert longer.core is core
     everything = equations.compile(target=target, kernels=["centroidal", "rhs"])
     assert "centroidal" in everything.core.names
-    np.testing.assert_array_equal(centre, everything.centre_of_mass(q))
-    np.testing.assert_array_equal(other, everything.bind({"r": 0.2}).centre_of_mass(q))
+    np.testing.assert_array_equal(centre, everything.center_of_mass(q))
+    np.testing.assert_array_equal(other, everything.bind({"r": 0.2}).center_of_mass(q))
     assert np.abs(other - centre).max() > 1e-3
     with pytest.raises(UsageError, match="q must have shape"):
-        module.centre_of_mass(q[:1])
+        module.center_of_mass(q[:1])
 
 
 def test_plain_solve_ivp_takes_the_compiled_stepper() -> None:

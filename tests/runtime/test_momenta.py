@@ -35,7 +35,7 @@ def tree(target: str = "numpy"):
     m.revolute("J1", m.ground.at(0.1, 0.2, 0.3), a)
     m.prismatic("J2", a.at(0.4, 0.1, -0.2), b, axis="x")
     m.revolute("J3", a.at(-0.3, 0.2, 0.1), c, axis="y")
-    com = m.centre_of_mass
+    com = m.center_of_mass
     for name, values in {
         "r": com.position, "v": com.velocity, "a": com.acceleration, "p": m.momentum,
         "L": m.angular_momentum(), "O": m.angular_momentum(m.ground), "B": m.angular_momentum(b.at(0.1, 0, 0)),
@@ -64,7 +64,7 @@ def test_calls_and_outputs_equal_mujoco(target: str) -> None:
         mujoco.mj_subtreeVel(world, data)
         com, velocity, angular = data.subtree_com[1], data.subtree_linvel[1], data.subtree_angmom[1]
         close = {"rtol": 1e-12, "atol": 1e-13}
-        np.testing.assert_allclose(mod.centre_of_mass(q), com, **close)
+        np.testing.assert_allclose(mod.center_of_mass(q), com, **close)
         np.testing.assert_allclose(mod.com_jacobian(q) @ v, velocity, **close)
         np.testing.assert_allclose(mod.momentum(x), [*(4.2 * velocity), *angular], **close)
         y = dict(zip(mod.y_names, mod.outputs(0.0, x), strict=True))
@@ -99,7 +99,7 @@ def test_batches_parameters_and_out() -> None:
     x = states(mod)
     q = x[:3]
     for call, given, shape in (
-        (mod.centre_of_mass, q, (3,)),
+        (mod.center_of_mass, q, (3,)),
         (mod.com_jacobian, q, (3, 3)),
         (mod.momentum, x, (6,)),
         (mod.centroidal_inertia, q, (3, 3)),
@@ -133,8 +133,8 @@ def flying(gravity: tuple[float, float, float]):
         for k, value in enumerate(values):
             m.output(f"{name}{k}", value)
     for k in range(3):
-        m.output(f"c{k}", m.centre_of_mass.position[k])
-        m.output(f"ac{k}", m.centre_of_mass.acceleration[k])
+        m.output(f"c{k}", m.center_of_mass.position[k])
+        m.output(f"ac{k}", m.center_of_mass.acceleration[k])
     mod = m.compile(target="numpy")
     start = {"F_x_dot": 0.5, "F_y_dot": -0.3, "F_z_dot": 0.2, "F_1_dot": 0.6, "F_3_dot": 0.8, "A_dot": 1.0, "A": -0.4}
     return mod, mod.simulate((0, 1.5), initial=start, rtol=1e-11, atol=1e-12)

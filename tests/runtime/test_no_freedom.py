@@ -80,7 +80,7 @@ def test_every_call_of_a_locked_structure_answers(make: object, target: str) -> 
     many = mod.simulate_many((0, 1), parameters={"g": [9.0, 8.0]})
     assert many.ok.all()
     assert mod.equilibrium().stability == "no freedom"
-    assert mod.linearise().A.shape == (0, 0)
+    assert mod.linearize().A.shape == (0, 0)
     assert target == "cython" or mod.verify().ok
 
 

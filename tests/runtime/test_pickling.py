@@ -54,9 +54,9 @@ def test_rarer_kernels_go_along_once_they_are_made() -> None:
     module = eg.load(EXAMPLES / "slider_crank.yaml").compile(target="numpy")
     q = module.x0()[: module.n_q]
     with pytest.raises(eg.UsageError, match="came without centroidal.*before pickling"):
-        pickle.loads(pickle.dumps(module)).centre_of_mass(q)
-    expected = module.centre_of_mass(q)
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(module)).centre_of_mass(q), expected)
+        pickle.loads(pickle.dumps(module)).center_of_mass(q)
+    expected = module.center_of_mass(q)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(module)).center_of_mass(q), expected)
 
 
 def test_a_module_whose_code_has_gone_says_so(tmp_path: Path) -> None:

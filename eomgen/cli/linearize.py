@@ -1,4 +1,4 @@
-"""Stage cli, linearise: model file -> A, B, C, D about a state, eigenvalues."""
+"""Stage cli, linearize: model file -> A, B, C, D about a state, eigenvalues."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .screen import print_heading, print_json, print_table, say, without_noise
 @time_option
 @click.option("--equilibrium", "at_rest", is_flag=True, help="About the equilibrium found from the initial position.")
 @click.option("--full", is_flag=True, help="All of x as states, instead of the independent ones.")
-def linearise(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool) -> None:
-    """Linearise a model about its initial state, or about an equilibrium.
+def linearize(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool) -> None:
+    """Linearize a model about its initial state, or about an equilibrium.
 
     States are independent displacements and velocities along the constraints, so that these add no eigenvalues.
     """
@@ -24,7 +24,7 @@ def linearise(work: Prepared, t: float, at_rest: bool, full: bool, as_json: bool
         x = module.equilibrium(guess or None, t).x
     else:
         x = module.x0(work.initial or None, t=t)
-    found = module.linearise(x, t, form="full" if full else "minimal")
+    found = module.linearize(x, t, form="full" if full else "minimal")
     if as_json:
         matrices = {key: getattr(found, key) for key in ("A", "B", "C", "D", "mass", "damping", "stiffness", "drift")}
         print_json(

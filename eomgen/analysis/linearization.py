@@ -1,4 +1,4 @@
-"""Analysis: the result of a linearisation, its eigenvalues and its second-order form."""
+"""Analysis: the result of a linearization, its eigenvalues and its second-order form."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .tangent import Tangent
 
 
-class Linearisation:
+class Linearization:
     """The motion near a state: ``s' = drift + A s + B du``, ``dy = C s + D du``.
 
     In the minimal form s holds the n_z independent displacements, then the n_dof independent velocities; in the full
@@ -207,7 +207,7 @@ class Linearisation:
         if self.mass is None or self.damping is None or self.stiffness is None:
             if self.layout.given_rates:
                 raise UsageError("rates of coordinates that are functions of other velocities have no such form; use A")
-            raise UsageError("the full form has no second-order form; linearise with form='minimal'")
+            raise UsageError("the full form has no second-order form; linearize with form='minimal'")
         chosen = names or self.position_names
         rows = []
         positions, tangent = list(self.position_names), self.tangent
@@ -270,7 +270,7 @@ class Linearisation:
         return [*lines, ("stability", self.stability + frozen)]
 
     def __repr__(self) -> str:
-        return as_text(f"Linearisation of {self.name}", self.facts)
+        return as_text(f"Linearization of {self.name}", self.facts)
 
     def _repr_html_(self) -> str:
-        return as_html(f"Linearisation of {self.name}", self.facts)
+        return as_html(f"Linearization of {self.name}", self.facts)

@@ -28,13 +28,13 @@ def sympy_matrix(kane: object, steady: dict[str, float]) -> np.ndarray:
     return np.array(A.subs(numbers), dtype=float)
 
 
-def test_the_rolling_disc_as_sympy_linearises_it() -> None:
+def test_the_rolling_disc_as_sympy_linearizes_it() -> None:
     kane = rolling_disc("CRAMER")
     mod = eg.from_sympy(kane, "disc", parameters=NUMBERS).compile(target="numpy")
     x = mod.x0(u2=-6.0)
     state = dict(zip(mod.x_names, x.tolist(), strict=True))
     rates = dict(zip((f"{n}_dot" for n in mod.q_names), mod.rhs(0.0, x)[: mod.n_q].tolist(), strict=True))
-    near = mod.linearise(x, independent=["q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3"])
+    near = mod.linearize(x, independent=["q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3"])
     assert near.states == ("q1", "q2", "q3", "q4", "q5", "u1", "u2", "u3")
     assert near.is_steady
     assert not near.is_equilibrium
@@ -51,7 +51,7 @@ def test_the_bicycle_as_published(whipple: eg.Model) -> None:
     mod = whipple.compile(target="numpy")
     for v in (0.0, 3.0, 5.0):
         x = mod.x0(q1=0.0, q2=0.0, q5=0.0, u2=0.0, u5=0.0, u3=v / 0.3)
-        near = mod.linearise(x, independent=["q1", "q2", "q5", "u2", "u3", "u5"])
+        near = mod.linearize(x, independent=["q1", "q2", "q5", "u2", "u3", "u5"])
         chosen = [near.states.index(name) for name in ("q2", "q5", "u2", "u5")]
         np.testing.assert_allclose(near.A[np.ix_(chosen, chosen)], state_matrix(v), atol=1e-9)
 
@@ -75,7 +75,7 @@ def tied(**more: object) -> eg.Model:
 def test_directions_stay_on_moving_constraints_and_carry_the_rates() -> None:
     mod, t, h = tied().compile(target="numpy"), 0.3, 1e-5
     x = mod.project(np.array([0.4, 0.5, 0.1, 0.3, -0.2, 0.6, 0.1]), t=t)
-    near = mod.linearise(x, t)
+    near = mod.linearize(x, t)
     assert near.tangent is not None
     assert len(near.states) == 2 + mod.n_dof
     T, chosen = near.tangent.T, [mod.x_names.index(name) for name in near.states]
@@ -88,9 +88,9 @@ def test_directions_stay_on_moving_constraints_and_carry_the_rates() -> None:
         slope = (mod.rhs(t, ahead) - mod.rhs(t, behind))[chosen] / (2 * h)
         np.testing.assert_allclose(near.A[:, k], slope, atol=1e-7)
     with pytest.raises(eg.UsageError, match="jacobian"):
-        mod.linearise(x, t, form="full")
+        mod.linearize(x, t, form="full")
     with pytest.raises(eg.UsageError, match="must name 2 different ones of a, b, c"):
-        mod.linearise(x, t, independent=["a"])
+        mod.linearize(x, t, independent=["a"])
 
 
 def test_inputs_beside_given_rates_are_refused_by_name() -> None:
@@ -98,4 +98,4 @@ def test_inputs_beside_given_rates_are_refused_by_name() -> None:
     model.input("push")
     mod = model.compile(target="numpy")
     with pytest.raises(eg.UsageError, match=r"derivatives by its inputs \(push\)"):
-        mod.linearise(np.array([0.4, 0.5, 0.1, 0.3, -0.2, 0.6, 0.1]))
+        mod.linearize(np.array([0.4, 0.5, 0.1, 0.3, -0.2, 0.6, 0.1]))

@@ -1,4 +1,4 @@
-"""Linearisation about equilibria, steady motions and any other state; constraints add no eigenvalues."""
+"""Linearization about equilibria, steady motions and any other state; constraints add no eigenvalues."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_the_iftomm_four_bar(compiled: Compiled) -> None:
     """Equilibrium, M, C, K and eigenvalues of the IFToMM linearization benchmark."""
     given = models.reference("iftomm_fourbar_diagonal_spring")["reference"]
     mod = compiled("spring_four_bar")
-    found = mod.linearise(mod.x0(phi=float(given["phi_eq"])))
+    found = mod.linearize(mod.x0(phi=float(given["phi_eq"])))
     assert found.states == ("phi", "phi_dot")
     expected = np.sort_complex([complex(text.replace(" ", "")) for text in given["eig"]])
     np.testing.assert_allclose(np.sort_complex(found.eigenvalues), expected, rtol=1e-12)
@@ -40,7 +40,7 @@ def test_the_minimal_form_is_that_of_the_minimal_right_hand_side(compiled: Compi
     """At states with any velocity: A and B are the differences of ``minimal.rhs``."""
     mod = compiled(name)
     for x in judges.random_states(mod, 5, 2):
-        found = mod.linearise(x, 0.3)
+        found = mod.linearize(x, 0.3)
         layout = mod.layout
         rows = np.concatenate([layout.independent_q, mod.n_q + layout.independent])
         small = mod.minimal
@@ -60,7 +60,7 @@ def test_outputs_and_inputs(compiled: Compiled) -> None:
     """C and D are differences of ``outputs`` along the constraints, accelerations among the outputs included."""
     mod = compiled("rssr")
     x = mod.x0()
-    found = mod.linearise(x, 0.2)
+    found = mod.linearize(x, 0.2)
     assert (found.inputs, found.outputs) == (("tau",), ("height", "push"))
     h = 1e-5
     for column in range(len(found.states)):
@@ -78,7 +78,7 @@ def test_the_full_form(compiled: Compiled) -> None:
     for name in ("rssr", "slider_crank"):
         mod = compiled(name)
         x = mod.x0()
-        full = mod.linearise(x, form="full")
+        full = mod.linearize(x, form="full")
         np.testing.assert_allclose(full.A, mod.jacobian(0.0, x), rtol=0, atol=1e-12 * np.abs(full.A).max())
         np.testing.assert_array_equal(full.B, mod.input_jacobian(0.0, full.x))
         expected = np.stack([judges.first(partial(mod.outputs, 0.0), x, e, h=1e-4) for e in np.eye(mod.n_x)], 1)
@@ -98,7 +98,7 @@ def test_a_rolling_disc_is_stable_above_the_critical_spin(compiled: Compiled) ->
 
     def at(spin: float) -> Any:
         zero = dict.fromkeys(("x", "y", "yaw", "lean", "spin", "yaw_dot", "lean_dot"), 0.0)
-        return mod.linearise(mod.x0(zero, spin_dot=spin))
+        return mod.linearize(mod.x0(zero, spin_dot=spin))
 
     below, above = at(critical * (1 - 1e-6)), at(critical * (1 + 1e-6))
     assert below.is_steady
@@ -118,7 +118,7 @@ def test_a_single_track_car_driving_on(compiled: Compiled) -> None:
     """A steady motion: side-slip and yaw as published, five zeros of position, heading and speed."""
     given = models.reference("vehicle_linear_models")["single_track"]
     mod = compiled("single_track")
-    found = mod.linearise()
+    found = mod.linearize()
     assert found.is_steady
     assert not found.is_equilibrium
     values = found.eigenvalues
@@ -133,9 +133,9 @@ def test_a_sleeping_top_in_either_rotation(compiled: Compiled, factor: float) ->
     I, C, mgl = 0.02 + 0.04, 0.01, 9.81 * 0.2
     n = factor * np.sqrt(4 * mgl * I) / C
     fixed = np.roots([I, -1j * C * n, -mgl])
-    angles = compiled("top_angles").linearise(compiled("top_angles").x0(S_1=0, S_2=0, S_3=0, S_3_dot=n))
+    angles = compiled("top_angles").linearize(compiled("top_angles").x0(S_1=0, S_2=0, S_3=0, S_3_dot=n))
     mod = compiled("top_parameters")
-    turning = mod.linearise(mod.x0(S_e0=1, S_wz=n))
+    turning = mod.linearize(mod.x0(S_e0=1, S_wz=n))
     for found, expected in ((angles, fixed), (turning, fixed - 1j * n)):
         both = np.sort_complex([0, 0, *expected, *expected.conj()])
         values = np.sort_complex(found.eigenvalues)
@@ -148,7 +148,7 @@ def test_a_sleeping_top_in_either_rotation(compiled: Compiled, factor: float) ->
 def test_the_second_order_form_of_chosen_coordinates(compiled: Compiled) -> None:
     disc = compiled("rolling_disc")
     zero = dict.fromkeys(("x", "y", "yaw", "lean", "spin", "yaw_dot", "lean_dot"), 0.0)
-    found = disc.linearise(disc.x0(zero, spin_dot=3.0))
+    found = disc.linearize(disc.x0(zero, spin_dot=3.0))
     with pytest.raises(eg.UsageError, match="yaw_dot acts on lean through C"):
         found.second_order("lean")
     M, C, K = found.second_order("lean", "yaw")
@@ -161,7 +161,7 @@ def test_the_second_order_form_of_chosen_coordinates(compiled: Compiled) -> None
 
 def test_state_space_names_and_display(compiled: Compiled) -> None:
     mod = compiled("quarter_car")
-    found = mod.linearise(p={"g": 0.0})
+    found = mod.linearize(p={"g": 0.0})
     system = found.state_space()
     assert isinstance(system, scipy.signal.StateSpace)
     np.testing.assert_array_equal(system.A, found.A)
@@ -177,13 +177,13 @@ def test_state_space_names_and_display(compiled: Compiled) -> None:
     vectors = found.eigenvectors
     np.testing.assert_allclose(found.A @ vectors, vectors * found.eigenvalues, rtol=0, atol=1e-9)
     with pytest.raises(eg.UsageError, match="no inputs"):
-        compiled("spring_four_bar").linearise().state_space()
+        compiled("spring_four_bar").linearize().state_space()
 
 
 def test_choices_and_mistakes(compiled: Compiled) -> None:
     mod = compiled("slider_crank")
-    by_slider = mod.linearise(independent=["s"])
-    by_crank = mod.linearise()
+    by_slider = mod.linearize(independent=["s"])
+    by_crank = mod.linearize()
     assert by_slider.states == ("s", "s_dot")
     assert by_crank.states == ("theta", "theta_dot")
     for wrong, message in (
@@ -193,4 +193,4 @@ def test_choices_and_mistakes(compiled: Compiled) -> None:
         ({"x": [1.0]}, "must have shape"),
     ):
         with pytest.raises(eg.UsageError, match=message):
-            mod.linearise(**wrong)
+            mod.linearize(**wrong)
