@@ -105,7 +105,6 @@ class Module(BoundModel):  # noqa: D101
         """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
         from ..runtime.minimal import Minimal
 
-        self.layout.require_minimal_form()
         return Minimal(self)
 
     @cached_property

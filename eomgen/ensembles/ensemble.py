@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..files.paths import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
@@ -216,7 +217,7 @@ class Ensemble:
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays to an .npz file that NumPy alone reads; ``header`` in it is ``metadata`` as JSON."""
-        target = Path(path).with_suffix(".npz")
+        target = as_path("path", path).with_suffix(".npz")
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)
         }

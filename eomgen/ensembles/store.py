@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.paths import as_path
 from ..files.reading import open_plain
 from ..files.writing import remove_parts, write_whole
 from ..runtime.arrays import BROKEN, read_arrays
@@ -35,7 +36,7 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, identity: dict[str, Any]) -> None:
-        self.folder = Path(folder)
+        self.folder = as_path("store", folder)
         manifest = self.folder / "manifest.json"
         wanted = json.loads(json.dumps({"format": FORMAT, **identity}))
         if manifest.is_file():
@@ -94,7 +95,7 @@ class Store:
 def stored_length(folder: str | Path) -> int | None:
     """Runs of a block of the ensemble that a folder holds; None if it holds none."""
     try:
-        with open_plain(Path(folder) / "manifest.json") as file:
+        with open_plain(as_path("store", folder) / "manifest.json") as file:
             found = json.load(file)["block"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import UsageError
+from .paths import as_path
 
 TOKEN = 8  #: random digits at the end of a part's name
 TRIES = 3  #: of writing, where others clean up meanwhile
@@ -43,7 +44,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     OSError
         With the path as ``filename``: it cannot be written; the earlier file is as it was.
     """
-    target = Path(path)
+    target = as_path("path", path)
     refuse_link(target)
     part = target.with_name(f".{target.name[:PREFIX]}.{secrets.token_hex(TOKEN // 2)}")
     try:

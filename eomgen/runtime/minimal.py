@@ -57,6 +57,7 @@ class Minimal:
 
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
+        layout.require_minimal_form()
         self._module = module
         self._layout = layout
         self._path = Path(module.kernels)

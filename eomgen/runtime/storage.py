@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..files.paths import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 
@@ -52,7 +53,7 @@ def table_path(path: str | Path, what: str) -> Path:
     UsageError
         Another ending than ``.npz`` or ``.csv``.
     """
-    target = Path(path)
+    target = as_path("path", path)
     target = target if target.suffix else target.with_suffix(".npz")
     if target.suffix not in (".npz", ".csv"):
         raise UsageError(f"{target}: {what} written as .npz or .csv, not {target.suffix!r}")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..files.paths import as_path
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .names import require, unknown
@@ -298,7 +299,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
         The file holds something else.
     FileNotFoundError
     """
-    source = Path(path)
+    source = as_path("path", path)
     if not source.suffix and not source.exists():
         source = source.with_suffix(".npz")
     try:

@@ -10,18 +10,16 @@ import json
 import warnings
 from collections.abc import Sequence
 from math import isfinite
-from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import UsageError
+from ..files.paths import as_path
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays
 from ..runtime.identity import code_digest, differences, digest
-from ..runtime.room import shown
 from ..runtime.tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
@@ -55,15 +53,12 @@ class Checkpoint:
     """
 
     def __init__(self, file: Any, every: float, resume: bool | None) -> None:
-        if not isinstance(file, (str, Path)) or not str(file) or "\0" in str(file):
-            raise UsageError(f"checkpoint must be the path of a file, not {file!r}")
+        path = as_path("checkpoint", file)
         if isinstance(every, bool) or not isinstance(every, (int, float)) or not (every >= 0.0 and isfinite(every)):
             raise UsageError(f"checkpoint_every must be a number of seconds, not {every!r}")
         if not isinstance(resume, bool | None):
             raise UsageError(f"resume must be True, False or None, not {resume!r}")
-        if not isinstance(file, (str, PathLike)):
-            raise UsageError(f"checkpoint must be a file's name or path, not {shown(file)}")
-        self.file, self.every, self.resume = Path(file), float(every), resume
+        self.file, self.every, self.resume = path, float(every), resume
         self.identity: dict[str, Any] = {}
         self.kept: dict[str, Any] | None = None
         self.warned = False

@@ -14,7 +14,7 @@ import pytest
 import eomgen as eg
 from benchmarks.equilibria import PEERS, Balance, judge
 from benchmarks.rest_models import FAMILIES
-from eomgen.analysis import search
+from eomgen.analysis import balance_search
 from eomgen.cli.shipped import example_files
 
 
@@ -126,14 +126,14 @@ def test_the_contest_knows_what_is_no_equilibrium() -> None:
 @pytest.mark.parametrize("way", ["creep", "plain", "marquardt"])
 def test_each_way_finds_what_is_near_by_itself(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The other ways are blocked; the one left must lead where Newton's iteration has the last word."""
-    newton, blocked = search.newton, {"creep", "plain", "marquardt"} - {way}
+    newton, blocked = balance_search.newton, {"creep", "plain", "marquardt"} - {way}
 
     def last_word(problem: Any, point: Any, plain: bool = False, reach: float = np.inf) -> Any:
         near = np.linalg.norm(problem.residual(point.here, point.here)) < 1e-3 or (plain and way == "plain")
         return newton(problem, point, plain, reach) if near else (point, 0, False)
 
-    monkeypatch.setattr(search, "newton", last_word)
+    monkeypatch.setattr(balance_search, "newton", last_word)
     for name in blocked - {"plain"}:
-        monkeypatch.setattr(search, name, lambda problem, point: (point, 0, False))
+        monkeypatch.setattr(balance_search, name, lambda problem, point: (point, 0, False))
     found = elastic_pendulum().equilibrium({"x": np.sin(0.05), "y": -np.cos(0.05)})
     assert found["y"] == pytest.approx(-1 - 9.81e-5, abs=1e-12)

@@ -17,7 +17,7 @@ from eomgen.cli.command import run_command
 from eomgen.ensembles.store import Store, stored_length
 from eomgen.errors import UsageError
 from eomgen.files.reading import open_plain
-from eomgen.pipeline import generate
+from eomgen.generation import generate
 from eomgen.simulation.checkpoint import Checkpoint
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "pendulum.yaml"

@@ -31,7 +31,7 @@ def test_the_judge_sees_what_grows() -> None:
 def test_nothing_grows_over_some_models() -> None:
     """Of the numpy target, without verification: that and compiled models belong to ``python -m hostile.soak``."""
     told: list[str] = []
-    samples, wrong = soak(0.33, 300, told.append, every=0.6, verified=10**9, batch=10**9, most=90)
+    samples, wrong = soak(2.0, 300, told.append, every=0.5, verified=10**9, batch=10**9, most=90)
     assert wrong == []
     assert len(samples) >= LEAST, told
     late = samples[len(samples) // 2 :]

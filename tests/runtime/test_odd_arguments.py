@@ -36,6 +36,11 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "end nan": (lambda m: m.simulate(np.nan), "span must be"),
     "end inf": (lambda m: m.simulate(np.inf), "span must be"),
     "complex end": (lambda m: m.simulate(1j), "span must be"),
+    "store of bytes": (lambda m: m.simulate_many(0.1, count=2, store=b"here"), "store must be the name of a file"),
+    "store with NUL": (lambda m: m.simulate_many(0.1, count=2, store="a\0b"), "store must be the name of a file"),
+    "checkpoint of a number": (lambda m: m.simulate(0.1, checkpoint=3), "checkpoint must be the name of a file"),
+    "reduction of an array": (lambda m: m.simulate_many(0.1, count=2, reduce=np.empty((2, 0))), "reduce must be"),
+    "saved to a number": (lambda m: m.simulate(0.1).save(3), "path must be the name of a file"),
     "many times": (lambda m: m.simulate(1.0, t_eval=WIDE), "t_eval with 1000000000 times would keep"),
     "a long range": (lambda m: m.simulate(1.0, t_eval=range(10**9)), "t_eval with 1000000000 times would keep"),
     "complex times": (lambda m: m.simulate(1.0, t_eval=[1j]), "t_eval must be a list of times"),
@@ -116,7 +121,7 @@ def test_results_written_beside_and_over_the_state(swings: dict[str, Any], targe
 
 
 def test_steps_of_length_zero_are_named(swings: dict[str, Any]) -> None:
-    with pytest.raises(eg.SimulationError, match="lead nowhere|stopped"):
+    with pytest.raises(eg.SimulationError, match="lead nowhere|stopped|would not end"):
         swings["numpy"].simulate(1.0, atol=1e-300, rtol=1e-300, method="LSODA")
 
 

@@ -17,7 +17,7 @@ import eomgen.program.collect as collect
 from eomgen.api.equations import Equations
 from eomgen.api.module import Module
 from eomgen.forces.elements import Spring
-from eomgen.verification import Verification
+from eomgen.verification import Verification, check_reactions, check_runs
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MODEL = EXAMPLES / "slider_crank.yaml"
@@ -213,14 +213,14 @@ def test_a_jacobian_without_one_term(module: Module, monkeypatch: pytest.MonkeyP
 
 
 def test_a_reaction_of_the_wrong_sign(module: Module, monkeypatch: pytest.MonkeyPatch) -> None:
-    right = module.reactions
+    right = check_reactions.reactions
 
     def wrong(*given: Any, **options: Any) -> Any:
         wrench = right(*given, **options)
         wrench[0] *= -1.0
         return wrench
 
-    monkeypatch.setattr(module, "reactions", wrong)
+    monkeypatch.setattr(check_reactions, "reactions", wrong)
     assert found_by(module.verify(states=3)) == {"reactions: every body in balance"}
 
 
@@ -238,11 +238,11 @@ def test_a_step_of_lower_order(monkeypatch: pytest.MonkeyPatch) -> None:
     module = derived(EXAMPLES / "double_pendulum.yaml").compile()
     assert found_by(module.verify(states=3)) == set()
 
-    def third_order(self: Module, t: float, x: Any, h: float, u: Any = None, out: Any = None) -> Any:
-        k1 = self.rhs(t, x)
-        k2 = self.rhs(t + h / 2, x + h / 2 * k1)
-        k3 = self.rhs(t + h, x - h * k1 + 2 * h * k2)
+    def third_order(model: Module, t: float, x: Any, h: float, u: Any = None, out: Any = None) -> Any:
+        k1 = model.rhs(t, x)
+        k2 = model.rhs(t + h / 2, x + h / 2 * k1)
+        k3 = model.rhs(t + h, x - h * k1 + 2 * h * k2)
         return x + h / 6 * (k1 + 4 * k2 + k3)
 
-    monkeypatch.setattr(Module, "step", third_order)
+    monkeypatch.setattr(check_runs, "step", third_order)
     assert found_by(module.verify(states=3)) == {"steppers: order of RK4"}
