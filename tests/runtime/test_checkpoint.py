@@ -275,8 +275,8 @@ def test_what_no_checkpoint_can_be_kept_of_is_refused(pendulum: Any, plain: Any,
         ({"checkpoint_every": float("nan")}, "checkpoint_every must be a number of seconds"),
         ({"resume": "yes"}, "resume must be True, False or None"),
         ({"resume": True}, "there is no checkpoint"),
-        ({"checkpoint": 3}, "must be the path of a file"),
-        ({"checkpoint": "a\0b"}, "must be the path of a file"),
+        ({"checkpoint": 3}, "must be the name of a file"),
+        ({"checkpoint": "a\0b"}, "must be the name of a file"),
     ):
         with pytest.raises(eg.UsageError, match=words):
             plain.simulate(1, **{"checkpoint": file, **options})
