@@ -20,6 +20,7 @@ STEPPERS = (
 #: The layer's files, the first translated by Cython, and the templates each is put together from.
 LAYER = {
     "_core.pyx": ("cython/_core.pyx",),
+    "_numbers.pxi": ("cython/_numbers.pxi",),
     "_batches.pxi": ("cython/_batches.pxi",),
     "_calls.pxi": ("cython/_calls.pxi",),
     "_lanes.pxi": ("cython/_lanes.pxi",),
