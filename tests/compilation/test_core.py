@@ -172,10 +172,16 @@ def test_out_that_does_not_fit_is_refused(f: Any, out: Any, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("x", "words"),
-    [([1.0], r"x of rhs must have shape \(2,\) or \(2, k\), not \(1,\)"), (np.zeros((3, 2)), r"not \(3, 2\)"),
-     (1.0, r"not \(\)"), (np.zeros((2, 1, 1)), r"not \(2, 1, 1\)"), ([1j, 0], r"real numbers, \(2,\) or \(2, k\), not \[1j, 0\]"),
-     (["a", "b"], r"real numbers, \(2,\) or \(2, k\), not \['a'"), (np.zeros((2, 3)), r"t of rhs must be a number or have shape \(k,\), not \(2,\)")],
-)  # fmt: skip
+    [
+        ([1.0], r"x of rhs must have shape \(2,\) or \(2, k\), not \(1,\)"),
+        (np.zeros((3, 2)), r"not \(3, 2\)"),
+        (1.0, r"not \(\)"),
+        (np.zeros((2, 1, 1)), r"not \(2, 1, 1\)"),
+        ([1j, 0], r"real numbers, \(2,\) or \(2, k\), not \[1j, 0\]"),
+        (["a", "b"], r"real numbers, \(2,\) or \(2, k\), not \['a'"),
+        (np.zeros((2, 3)), r"t of rhs must be a number or have shape \(k,\), not \(2,\)"),
+    ],
+)
 def test_states_that_do_not_fit_are_refused(core: ModuleType, x: Any, words: str) -> None:
     f = core.timed("rhs", core.context(), (2,), fail, error=LookupError)
     with pytest.raises(LookupError, match=words):
