@@ -91,7 +91,8 @@ def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray)
     def take(body: int, force: list[Number], moment: list[Number], arm: list[Number]) -> None:
         whole = numbers([*force, *bodies.add(moment, bodies.cross(arm, force))])
         total[body] += whole
-        size[body] += np.abs(whole)
+        parts = np.abs(whole).reshape(2, 3)
+        size[body] += np.repeat(parts.max(axis=1), 3)  # a vector turned from other axes is rounded as a whole
 
     for k, (body, rate, w) in enumerate(zip(truth.bodies, rates, truth.twists, strict=True)):
         acceleration = bodies.add(rate.at(body.arm), bodies.cross(w.angular, bodies.cross(w.angular, body.arm)))
@@ -115,7 +116,16 @@ def _unbalanced(bench: Bench, truth: Truth, a: np.ndarray, wrenches: np.ndarray)
             if end.body != GROUND:
                 arm = bodies.sub(point, truth.here[end.body].position)
                 take(end.body, bodies.scale(sign, many[:3]), bodies.scale(sign, many[3:]), arm)
-    return total.ravel(), size.ravel()
+    return total.ravel(), _carried(truth, size).ravel()
+
+
+def _carried(truth: Truth, size: np.ndarray) -> np.ndarray:
+    """Sizes (n_bodies, 6) of the terms of all bodies about each origin: a joint carries what is beyond it."""
+    origins = np.array([numbers(pose.position) for pose in truth.here])
+    apart = np.linalg.norm(origins[:, None] - origins[None], axis=2)
+    forces, moments = size[:, :3].max(axis=1), size[:, 3:].max(axis=1)
+    whole = np.stack([np.full(len(size), forces.sum()), moments.sum() + apart @ forces], axis=1)
+    return np.repeat(whole, 3, axis=1)
 
 
 def _along(truth: Truth, a: Array) -> dict[str, Number]:
