@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -50,6 +51,21 @@ def test_no_file_imports_one_that_imports_it() -> None:
         TopologicalSorter(found).prepare()
     except CycleError as error:
         pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
+
+
+def test_packages_stand_in_the_rows_of_the_architecture() -> None:
+    text = (ROOT.parent / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    rows = {
+        name: int(number)
+        for number, names in re.findall(r"^\| (\d+) \| ([a-z, ]+) \|", text, re.M)
+        for name in names.split(", ")
+    }
+    own = {name.split(".")[1] for name in FILES if "." in name} - {"__main__"}
+    assert set(rows) == own
+    for name, others in graph().items():
+        for other in others:
+            here, there = ((f"{one}.").split(".")[1] for one in (name, other))
+            assert here == there or here in ("", "__main__") or there == "" or rows[there] < rows[here], (name, other)
 
 
 @pytest.mark.parametrize(
