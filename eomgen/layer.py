@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
-from pathlib import Path
 
 from .limits.in_c import definitions
+from .shipped import shipped
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
 STEPPERS = (
@@ -61,5 +60,4 @@ def read_header(name: str) -> str:
 
 
 def _read(part: str) -> str:
-    root = Path(import_module("eomgen.templates").__path__[0])
-    return (root / part).read_text(encoding="utf-8")
+    return (shipped("templates") / part).read_text(encoding="utf-8")

@@ -15,6 +15,7 @@ import click
 
 from ..errors import EomgenError
 from ..limits.constraints import UNMOVED
+from ..shipped import shipped
 from ..texts import visible
 from .failures import TOOLCHAIN, reports_failures
 from .options import json_option
@@ -106,7 +107,6 @@ def _compiler() -> Iterator[Finding]:
 
 def _compiles() -> Finding:
     """Compile the shipped pendulum afresh and compare one call with the closed form."""
-    from importlib.resources import as_file, files
     from math import sin
     from time import perf_counter
 
@@ -114,8 +114,8 @@ def _compiles() -> Finding:
 
     start = perf_counter()
     try:
-        with _fresh_cache(), as_file(files("eomgen.examples") / "pendulum.yaml") as path:
-            module = load(path).compile()
+        with _fresh_cache():
+            module = load(shipped("examples") / "pendulum.yaml").compile()
             acceleration = float(module.rhs(0.0, [0.5, 0.0])[1])
     except (EomgenError, OSError) as error:
         what, _, rest = str(error).partition("\n")

@@ -5,20 +5,19 @@ from __future__ import annotations
 import ast
 import difflib
 import re
-from importlib.resources.abc import Traversable
 from pathlib import Path
 
 import click
 
 from ..errors import UsageError
 from ..files.writing import write_whole
+from .example_files import example_files
 from .failures import reports_failures
 from .options import json_option
 from .screen import print_json, print_table, say
-from .shipped import example_files
 
 
-def describe_example(file: Traversable) -> str:
+def describe_example(file: Path) -> str:
     """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
     text = file.read_text(encoding="utf-8")
     if file.name.endswith(".py"):
@@ -54,7 +53,7 @@ def examples(name: str | None, force: bool, as_json: bool) -> None:
     say(f"next:  {'python' if target.suffix == '.py' else 'eomgen run'} {target}", err=True)
 
 
-def _copy(name: str, found: dict[str, Traversable], force: bool) -> Path:
+def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
     file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
     if file is None:
         near = difflib.get_close_matches(name, found, 1)

@@ -242,7 +242,7 @@ def _missing(path: Path) -> str:
         return f"{path} is {what}, no plain file; " + (
             "name a model file in it" if path.is_dir() else "copy what it gives into a file"
         )
-    from .shipped import example_names
+    from .example_files import example_names
 
     if path.stem in example_names():
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"

@@ -12,9 +12,9 @@ import os
 import time
 from dataclasses import asdict
 from functools import cache
-from importlib import import_module
 
 from .. import _STARTED
+from ..shipped import shipped
 from .build import Artifact
 from .cache import Cache, cache_directory, compute_key
 from .compiler import find_compiler
@@ -90,7 +90,7 @@ def writers() -> list[str]:
     root = os.path.dirname(os.path.dirname(__file__))
     found = [os.path.join(root, *name.split("/")) for name in WRITERS if name.endswith(".py")]
     folders = [os.path.join(root, name) for name in WRITERS if not name.endswith(".py")]
-    folders.append(import_module("eomgen.templates").__path__[0])
+    folders.append(str(shipped("templates")))
     while folders:  # os.walk, at half its time
         with os.scandir(folders.pop()) as entries:
             listed = sorted(entries, key=lambda entry: entry.name)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .. import texts
 from ..files.kept import Kept
 from ..program import Program
+from ..shipped import shipped
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -37,10 +38,10 @@ class SourceSet(Mapping[str, str]):
 @cache
 def environment() -> Environment:
     """The template environment: undefined names are errors."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(
-        loader=PackageLoader("eomgen.templates", ""),
+        loader=FileSystemLoader(shipped("templates")),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -149,7 +149,7 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
         ({"gaps": {"s": 1.5}}, "restitution of s is between 0 and 1"),
         ({"gaps": {"s": None}}, "restitution of s must be a number"),
         ({"gaps": {"s": "a"}}, "restitution of s must be a number"),
-        ({"gaps": {"s": [0.5]}}, "restitution of s must be one number"),
+        ({"gaps": {"s": [0.5]}}, "restitution of s must be a number"),
         ({"gaps": ["s"]}, "gaps must be a mapping"),
         ({"lock": None}, "lock must be a list"),
         ({"lock": [0]}, "lock must be a list"),

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from eomgen.cli.command import VERBS
+from eomgen.cli.example_files import example_files
 from eomgen.cli.examples import describe_example
-from eomgen.cli.shipped import example_files
 
 from .conftest import EXAMPLES, Call
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -80,6 +81,22 @@ def test_the_editable_install_sees_templates_and_examples() -> None:
         for name in shipped(folder):
             found = files(package).joinpath(*Path(name).parts)
             assert found.read_bytes() == (ROOT / folder / name).read_bytes()
+
+
+def test_a_clone_works_with_its_own_templates_and_examples(tmp_path: Path, warm_cache: Path) -> None:
+    """Where eomgen is installed and Python is started in a clone, the clone's package is the one that is imported."""
+    for folder in ("eomgen", "templates", "examples"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    code = "from eomgen.shipped import shipped; print(shipped('templates'), shipped('examples'))"
+    assert run("-c", code, cwd=tmp_path).split() == [str(tmp_path / "templates"), str(tmp_path / "examples")]
+    (tmp_path / "templates" / "numpy" / "_core.py.j2").write_text("THE CLONE'S OWN = ")
+    result = subprocess.run(
+        [sys.executable, "-m", "eomgen", "run", "examples/pendulum.yaml", "--target", "numpy"],
+        cwd=tmp_path, env=os.environ | {"EOMGEN_CACHE_DIR": str(warm_cache)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert "THE CLONE'S OWN" in result.stderr or "_core" in result.stderr
+    assert result.returncode != 0
 
 
 def test_every_package_is_listed() -> None:
