@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -170,13 +171,16 @@ def test_no_entity_reads_a_file(suffix: str, arm: Any, tmp_path: Path, monkeypat
     secret.write_text("hidden")
     path = arm('<robot name="arm">', OUTSIDE.format(secret=secret) + '<robot name="arm">&secret;', f"arm{suffix}")
     opened: list[str] = []
-    real = builtins.open
 
-    def noting(file: Any, *args: Any, **keys: Any) -> Any:
-        opened.append(os.fspath(file) if not isinstance(file, int) else "")
-        return real(file, *args, **keys)
+    def noting(real: Callable[..., Any]) -> Callable[..., Any]:
+        def open_noted(file: Any, *args: Any, **keys: Any) -> Any:
+            opened.append(os.fspath(file) if not isinstance(file, int) else "")
+            return real(file, *args, **keys)
 
-    monkeypatch.setattr(builtins, "open", noting)
+        return open_noted
+
+    for module in (builtins, os):
+        monkeypatch.setattr(module, "open", noting(module.open))
     with pytest.raises(eg.ModelError, match="entities are never expanded") as caught:
         eg.load(path)
     assert "hidden" not in str(caught.value)
