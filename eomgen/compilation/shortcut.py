@@ -23,7 +23,7 @@ from .options import Options
 from .processor import lane_width
 
 #: What sources, layer and flags follow from, apart from the program and the templates: of eomgen.
-WRITERS = ("graph", "program", "emit", "compilation", "limits", "numeric", "layer.py")
+WRITERS = ("graph", "program", "emit", "compilation", "limits", "numeric", "kernel_table.py", "layer.py", "texts.py")
 
 
 class Shortcut:

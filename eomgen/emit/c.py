@@ -80,7 +80,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
     n_const = len(program.parameters) + len(program.hoisted) + printed[0].work
     sizes = program.sizes
     results = {k.name: k.result for k in KERNELS}
-    numbers = {**vars(sizes), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
+    numbers = {**sizes._asdict(), "n_const": n_const, "n_work": n_work, "n_step_work": n_work + 5 * sizes.n_x}
     others = [i for i in range(sizes.n_v) if i not in program.preferred]
     drivers = [read_template(f"c/drivers/{file}.c") for file in driver_files(program)]
     roots = [y for b in program.blocks for y in (*b.outputs, *b.checks)]

@@ -110,9 +110,9 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """errors.py, texts.py, and limits/ to ensembles/ without ELSEWHERE and parts of verification/, as in eomgen."""
+    """Files of eomgen as they are: three of its own, limits/ to ensembles/ without ELSEWHERE, parts of verification/."""
     root = files("eomgen")
-    found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "texts.py")}
+    found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "kernel_table.py", "texts.py")}
     for folder in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:

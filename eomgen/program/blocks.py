@@ -10,9 +10,9 @@ from ..graph.core import Expr
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from ..kernel_table import DAE, NAMED, Sizes
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
-from .kernels import DAE, KERNELS, Sizes
 from .loops import LoopBlocks
 from .program import Block, Limits, Port
 from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
@@ -196,7 +196,7 @@ class BlockMaker:
 
     def public(self, name: str) -> Block | None:
         """The public kernel of this name if it is straight-line code for this system, else None."""
-        kernel = next(k for k in KERNELS if k.name == name)
+        kernel = NAMED[name]
         terms = self.terms
         always: dict[str, Callable[[], Sequence[Expr]]] = {
             "mass_matrix": lambda: flat(terms.mass_matrix),

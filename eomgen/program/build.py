@@ -8,15 +8,14 @@ blocks (Newton iterations, factorisations of the embedded system).  Trees that d
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from difflib import get_close_matches
 from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
+from ..kernel_table import KERNELS, Kernel, Sizes
 from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
-from .kernels import KERNELS, Kernel, Sizes
 from .program import Block, Driver, Limits, Program
 from .slopes import sparsity
 from .terms import SystemTerms
@@ -98,7 +97,7 @@ def build_program(
     complete = {
         **metadata,
         "abi": ABI,
-        **asdict(sizes),
+        **sizes._asdict(),
         "output_accelerations": maker.outputs_need_accelerations,
         "kernels": kernel_shapes,
         "sparsity": {b.name: sparsity(b.outputs) for b in blocks.values() if b.outputs and b.name in SPARSE},

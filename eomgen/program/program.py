@@ -10,8 +10,8 @@ from typing import Any
 from ..equations.equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
+from ..kernel_table import Sizes
 from ..records import dataclass
-from .kernels import Sizes
 
 #: Blocks that only trees have whose accelerations are known without their mass matrix.
 BY_COLUMNS = ("mass_times", "acceleration_tangent", "input_acceleration", "parameter_acceleration")

@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..errors import STATUS, EvaluationError
+from ..kernel_table import NAMED
 from ..limits.motions import FLAT, LOCKED
 from ..limits.rounding import LARGE_ROOT, TINY_ROOT
 from ..numeric.scales import Array
-from .layout import KERNELS, Layout
+from .layout import Layout
 
 SHOWN = 8  #: coordinates listed in a message
 
@@ -106,8 +107,9 @@ class Fail:
         return error(f"{name} at t = {t:.6g}{place(names, x)}: {what}{blame}; {remedy}", t, x)
 
     def _names(self, kernel: str) -> Sequence[str]:
-        kind = KERNELS[kernel][0] if kernel in KERNELS else ""
-        return {"x": self.layout.x, "q": self.layout.q, "motion": self.layout.x + self.layout.a}.get(kind, ())
+        takes = NAMED[kernel].inputs if kernel in NAMED else ()
+        known = {("q",): self.layout.q, ("q", "v"): self.layout.x, ("q", "v", "a"): self.layout.x + self.layout.a}
+        return known.get(takes, ())
 
 
 def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
 from .names import check_names
 from .room import read_number, read_numbers
@@ -115,6 +116,7 @@ class Layout:
         reference = data.get("q_reference")
         neutral = np.zeros(self.n_q) if self.space is None else self.space.neutral()
         self.q_reference = neutral if reference is None else np.array(reference, dtype=float)
+        self.sizes = Sizes(**{name: getattr(self, name) for name in Sizes._fields})
 
     def sized(self, sizes: Array) -> Layout:
         """The same with typical sizes of velocities and constraint rows (n_v + n_c,) at parameters of other values.
@@ -158,27 +160,11 @@ class Layout:
 
     def inputs(self, kernel: str) -> int:
         """Length of the vector x a kernel takes."""
-        motion, dae = self.n_q + 2 * self.n_v, 2 * self.n_dae
-        sizes = {"q": self.n_q, "x": self.n_x, "motion": motion, "none": 0, "dae": dae, "dae_cj": dae + 1}
-        sizes["strike"] = motion + self.n_c + self.n_events
-        return sizes.get(KERNELS[kernel][0], 3 * self.n_dof + self.n_q)
+        return NAMED[kernel].length(self.sizes)
 
     def shape(self, kernel: str) -> tuple[int, ...]:
         """Shape of a kernel's result for one state."""
-        sums = {
-            "n_q+2n_v": self.n_q + 2 * self.n_v,
-            "n_v+n_c": self.n_v + self.n_c,
-            "n_centroidal": self.n_com * (self.n_v + 6),
-            "n_assembly": self.n_h + self.n_c + 2 * self.n_k,
-            "n_events+n_resets": self.n_events + self.n_resets,
-            "n_x+1+n_u+n_p": self.n_x + 1 + self.n_u + self.n_p,
-            "n_x+n_u+n_p": self.n_x + self.n_u + self.n_p,
-            "n_motion+n_u+n_p": self.n_x + self.n_v + self.n_u + self.n_p,
-        }
-        return tuple(
-            size if isinstance(size, int) else sums[size] if size in sums else int(getattr(self, size))
-            for size in KERNELS[kernel][1]
-        )
+        return NAMED[kernel].shape(self.sizes)
 
     def unit(self, name: str) -> str:
         """Unit of a quantity, derived for rates and accelerations; empty when unknown."""
@@ -240,44 +226,3 @@ class Layout:
 def acceleration_name(velocity: str) -> str:
     """``theta_dot`` -> ``theta_ddot``; ``w`` -> ``w_dot``."""
     return velocity[:-4] + "_ddot" if velocity.endswith("_dot") else velocity + "_dot"
-
-
-#: What each kernel takes, and the shape of what it returns for one state.
-KERNELS: dict[str, tuple[str, tuple[str | int, ...]]] = {
-    "rhs": ("x", ("n_x",)),
-    "jacobian": ("x", ("n_x", "n_x")),
-    "mass_matrix": ("q", ("n_v", "n_v")),
-    "embedded_mass_matrix": ("q", ("n_dof", "n_dof")),
-    "bias": ("x", ("n_v",)),
-    "inverse_dynamics": ("motion", ("n_v",)),
-    "energy": ("x", (2,)),
-    "centroidal": ("x", ("n_centroidal",)),
-    "constraints": ("q", ("n_h",)),
-    "constraint_jacobian": ("q", ("n_c", "n_v")),
-    "coordinate_slopes": ("q", ("n_g", "n_q")),
-    "velocity_constraints": ("x", ("n_c",)),
-    "project": ("x", ("n_x",)),
-    "poses": ("q", ("n_bodies", 4, 4)),
-    "outputs": ("x", ("n_y",)),
-    "kinematics": ("independent", ("n_q+2n_v",)),
-    "loop_coordinates": ("motion", (3, "n_k")),
-    "loop_coordinate_jacobian": ("q", ("n_k", "n_v")),
-    "alignment": ("q", ("n_a",)),
-    "motion_outputs": ("motion", ("n_y",)),
-    "finite_forces": ("x", ("n_e",)),
-    "input_jacobian": ("x", ("n_x", "n_u")),
-    "parameter_jacobian": ("x", ("n_x", "n_p")),
-    "assembly_jacobian": ("x", ("n_assembly", "n_x+n_u+n_p")),
-    "output_derivatives": ("motion", ("n_y", "n_motion+n_u+n_p")),
-    "needed_wrenches": ("motion", ("n_s",)),
-    "wrench_geometry": ("q", ("n_w",)),
-    "canonical": ("x", (2, "n_m")),
-    "dae_residual": ("dae", ("n_dae",)),
-    "dae_jacobian": ("dae_cj", ("n_dae", "n_dae")),
-    "events": ("x", ("n_events",)),
-    "resets": ("x", ("n_resets",)),
-    "event_slopes": ("x", ("n_events", "n_x")),
-    "event_derivatives": ("x", ("n_events+n_resets", "n_x+1+n_u+n_p")),
-    "strike_derivatives": ("strike", ("n_strike", "n_x+1+n_u+n_p")),
-    "scales": ("none", ("n_v+n_c",)),
-}

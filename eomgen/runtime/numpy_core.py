@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import STATUS, EvaluationError
+from ..kernel_table import NAMED
 from ..numeric.scales import Array
-from .layout import KERNELS, Layout
+from .layout import Layout
 from .numpy_drivers import Drivers
 from .room import as_real, read_vector, shown
 
@@ -43,7 +44,7 @@ class NumpyCore:
     metadata : str or mapping
         The JSON text of model.json, or what it holds.
     blocks : mapping of str to callable
-        ``f(t, x, u, c) -> (n_out, ...)``: kernels of :data:`~.layout.KERNELS`, and the inner blocks ``terms``,
+        ``f(t, x, u, c) -> (n_out, ...)``: kernels of :data:`~..kernel_table.KERNELS`, and the inner blocks ``terms``,
         ``position``, ``rate``, ``residual_jacobian`` or ``residual_tangent``, ``accelerated_outputs``.
     precompute : callable, optional
         ``p -> c``, constants that follow from the parameters, c[:n_p] = p; without it c = p.
@@ -66,7 +67,7 @@ class NumpyCore:
         self.blocks = dict(blocks)
         self.precompute = precompute
         self.drivers = Drivers(self.layout, self.blocks)
-        self.names = tuple(name for name in KERNELS if name in self.blocks or name in self.drivers.names)
+        self.names = tuple(name for name in NAMED if name in self.blocks or name in self.drivers.names)
 
     def context(self, p: Any = None, u: Any = None, error: type[Exception] = ValueError) -> Context:
         """Bind parameters (n_p,) and inputs (n_u,), the declared values by default.
@@ -171,7 +172,7 @@ class NumpyKernel:
 
     def label(self, label: str) -> str:
         """What users call an argument: the x of some kernels is q."""
-        return "q" if label == "x" and KERNELS.get(self.name, ("x",))[0] == "q" else label
+        return "q" if label == "x" and self.name in NAMED and NAMED[self.name].inputs == ("q",) else label
 
     def evaluate(self, t: Any, x: Array, p: Any, u: Any, out: Array | None) -> Array:
         """One state or a batch."""

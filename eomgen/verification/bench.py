@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..graph.core import Expr
+from ..kernel_table import NAMED
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..program.collect import collect_terms
-from ..runtime.layout import KERNELS
 from .cases import Case
 from .rounding import FOLDED, UNIT, bounded
 from .truth import System, Truth
@@ -67,10 +67,10 @@ class Bench:
     def call(self, kernel: str, case: Case) -> Array:
         """A compiled kernel at a case; its result for one state."""
         kernels, given = self.module.kernels, {"p": case.p, "u": case.u}
-        takes = KERNELS[kernel][0]
-        if takes == "motion":
+        takes = NAMED[kernel].inputs
+        if takes == ("q", "v", "a"):
             return np.asarray(kernels.motion(kernel)(case.q, case.v, case.a, **given, t=case.t))
-        return np.asarray(kernels.state(kernel)(case.q if takes == "q" else case.x, **given, t=case.t))
+        return np.asarray(kernels.state(kernel)(case.q if takes == ("q",) else case.x, **given, t=case.t))
 
     def rhs(self, case: Case) -> Array:
         """x'."""

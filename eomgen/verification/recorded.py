@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EomgenError
+from ..kernel_table import NAMED
 from ..numeric.scales import Array
-from ..runtime.layout import KERNELS
 from .comparison import FAILED, Comparison, size_of
 from .finding import Finding
 
@@ -57,7 +57,7 @@ def _compare(module: BoundModel, name: str, figures: list[dict[str, Any]], state
 def _call(module: BoundModel, name: str, given: dict[str, Array]) -> Array:
     q, v, t = given["q"], given["v"], float(given["t"])
     p, u = given["p"], given["u"]
-    takes = KERNELS[name][0]
-    if takes == "motion":
+    takes = NAMED[name].inputs
+    if takes == ("q", "v", "a"):
         return np.asarray(module.kernels.motion(name)(q, v, given["a"], p=p, u=u, t=t))
-    return np.asarray(module.kernels.state(name)(q if takes == "q" else np.concatenate([q, v]), p=p, u=u, t=t))
+    return np.asarray(module.kernels.state(name)(q if takes == ("q",) else np.concatenate([q, v]), p=p, u=u, t=t))

@@ -84,7 +84,7 @@ def test_the_files_of_each_target(packages):
     }
     c_files |= {"crank_lanes.h", *(f"crank_lanes{width}.c" for width in (2, 4, 8))}
     assert files["c"] == c_files | {"model.json", "README.md", "Makefile"}
-    copied = {"errors.py", "texts.py"} | {
+    copied = {"errors.py", "kernel_table.py", "texts.py"} | {
         str(p.relative_to(ROOT))
         for d in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles")
         for p in (ROOT / d).glob("*.py")

@@ -1,14 +1,15 @@
-"""Stage program: the table of public kernels: what each takes and gives, for every model alike."""
+"""The table of kernels, the functions of a generated module: what each takes and gives, for every model alike.
+
+Code is generated from it, and read by it where it is called.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
-from ..records import dataclass
 
-
-@dataclass(frozen=True)
-class Sizes:
+class Sizes(NamedTuple):
     """The sizes that shapes are made of, by the names used in metadata and headers."""
 
     n_q: int
@@ -35,8 +36,7 @@ class Sizes:
     n_dae: int = 0  #: unknowns [q; v; multipliers; corrections] of the differential-algebraic form
 
 
-@dataclass(frozen=True)
-class Kernel:
+class Kernel(NamedTuple):
     """One public function.
 
     Attributes
@@ -57,6 +57,14 @@ class Kernel:
     shape: Callable[[Sizes], tuple[int, ...]]
     result: str
     late: bool = False
+
+    def length(self, sizes: Sizes) -> int:
+        """How many numbers ``x`` has."""
+        each = {"q": sizes.n_q, "q_guess": sizes.n_q, "q_rate": sizes.n_q, "v": sizes.n_v, "a": sizes.n_v, "cj": 1}
+        each |= dict.fromkeys(("q_i", "v_i", "a_i"), sizes.n_dof) | {"impulses": sizes.n_events}
+        each |= dict.fromkeys(("multipliers", "multiplier_rates"), sizes.n_c)
+        each |= dict.fromkeys(("corrections", "correction_rates"), sizes.n_h)
+        return sum(each[port] for port in self.inputs)
 
 
 #: One kernel for all sums over bodies, which share the poses: each alone would make models slower to compile.
@@ -148,3 +156,6 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),
 )
+
+#: The same by name.
+NAMED = {kernel.name: kernel for kernel in KERNELS}
