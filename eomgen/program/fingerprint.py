@@ -60,6 +60,8 @@ def _spell(value: Any) -> Any:
         return ("node", value.id)
     if kind in (tuple, list):
         return [kind.__name__, *map(_spell, value)]
+    if isinstance(value, tuple) and hasattr(kind, "_fields"):
+        return [kind.__qualname__, *((name, _spell(part)) for name, part in zip(kind._fields, value, strict=True))]
     if isinstance(value, Mapping):
         return ["mapping", *((_spell(k), _spell(v)) for k, v in value.items())]
     if kind in (set, frozenset):
