@@ -59,9 +59,14 @@ class Runner:
         self.guard = Guard(str(self.folder), str(cache))
         self.warned: list[str] = []
         self.prepared: set[str] = set()
-        sys.unraisablehook = lambda args: self.warned.append(f"ignored {args.exc_type.__name__}")
+        sys.unraisablehook = self.ignored
         os.chdir(self.folder)
         signal.signal(signal.SIGALRM, _alarm)
+
+    def ignored(self, args: Any) -> None:
+        """Note an error that a destructor lost; the alarm rings again."""
+        if args.exc_type is not Hang:
+            self.warned.append(f"ignored {args.exc_type.__name__}")
 
     def limit(self) -> None:
         """Memory beyond what is mapped already is limited from here on."""
