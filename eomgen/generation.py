@@ -10,6 +10,7 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
+from .files.paths import as_path
 from .pipeline import build, derive
 from .verification.record import record
 from .verification.recorded import FILE
@@ -36,9 +37,10 @@ def generate(
     EomgenError
         The folder exists and is no generated package, or holds a file in the way that eomgen did not write.
     """
+    folder = as_path("directory", directory)
     equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
     sources = dict(emit_package(program, target))
     if target != "c":
         sources[FILE] = record(program)
-    return write_package(sources, Path(directory) / equations.name)
+    return write_package(sources, folder / equations.name)

@@ -38,6 +38,7 @@ DAMPING = 0.5  #: largest scaled step
 @np.errstate(all="ignore")
 def consistent(
     module: BoundModel,
+    /,
     x: ArrayLike,
     t: float = 0.0,
     *,

@@ -78,6 +78,7 @@ class ActuatorForces:
 @np.errstate(all="ignore")
 def actuator_forces(
     module: BoundModel,
+    /,
     t: ArrayLike,
     x: ArrayLike,
     a: Mapping[str, ArrayLike] | ArrayLike | None = None,

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @np.errstate(all="ignore")
 def equilibrium(
     module: BoundModel,
+    /,
     guess: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,

@@ -80,6 +80,7 @@ class Impact:
 @np.errstate(all="ignore")
 def impact(
     module: BoundModel,
+    /,
     t: float,
     x: ArrayLike,
     gaps: Mapping[str, float] | None = None,

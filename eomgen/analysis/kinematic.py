@@ -95,6 +95,7 @@ def _column(name: str, value: Any) -> Array:
 
 def kinematic_analysis(
     module: BoundModel,
+    /,
     t: ArrayLike | None = None,
     initial: Mapping[str, float] | ArrayLike | None = None,
     parameters: Any = None,

@@ -25,6 +25,7 @@ FORMS = ("minimal", "full")
 @np.errstate(all="ignore")
 def linearize(
     module: BoundModel,
+    /,
     x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,

@@ -149,6 +149,7 @@ def _undamped(M: Array, K: Array) -> tuple[Array, Array]:
 @np.errstate(all="ignore")
 def modes(
     module: BoundModel,
+    /,
     x: Mapping[str, float] | ArrayLike | None = None,
     t: float = 0.0,
     *,

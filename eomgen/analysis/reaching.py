@@ -57,6 +57,7 @@ class MotionRange(NamedTuple):
 
 def motion_range(
     module: BoundModel,
+    /,
     name: str,
     initial: Mapping[str, float] | ArrayLike | None = None,
     parameters: Any = None,

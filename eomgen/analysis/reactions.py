@@ -78,7 +78,7 @@ def _reactions(states: States, a: Array, multipliers: Array, drives: Mapping[int
 
 @np.errstate(all="ignore")
 def reactions(
-    module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
+    module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None, out: Array | None = None
 ) -> Array:
     """Reaction forces and moments of all joints.
 
@@ -111,7 +111,7 @@ def reactions(
 
 
 @np.errstate(all="ignore")
-def undetermined_reactions(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
+def undetermined_reactions(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> Any:
     """Which components of :meth:`reactions` redundant constraints leave undetermined.
 
     Returns
@@ -123,7 +123,7 @@ def undetermined_reactions(module: BoundModel, t: ArrayLike, x: ArrayLike, p: An
 
 
 @np.errstate(all="ignore")
-def driving_forces(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:
+def driving_forces(module: BoundModel, /, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> dict[str, Array]:
     """Generalized forces that constraint elements (drivers, gears, rolling ...) exert, by name.
 
     Returns

@@ -245,6 +245,7 @@ def _measures(J: Array) -> tuple[Array, Array, Array, Array]:
 
 def workspace(
     module: BoundModel,
+    /,
     over: Mapping[str, Any],
     of: str | Sequence[str],
     initial: Mapping[str, float] | ArrayLike | None = None,

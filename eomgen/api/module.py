@@ -1,4 +1,7 @@
-"""What a user holds: a BoundModel with every run and analysis as a method; each loads when it is first called."""
+"""What a user holds: a BoundModel with every run and analysis as a method; each loads when it is first called.
+
+Analyses and runs call each other's functions: a subclass that overrides a method changes that call alone.
+"""
 
 from __future__ import annotations
 
@@ -67,11 +70,12 @@ class Call:
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.function: Any = None
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
-        part = import_module(f"..{CALLS[self.name]}", __package__)
-        function = getattr(part, self.name)
-        return function if model is None else MethodType(function, model)
+        if self.function is None:
+            self.function = getattr(import_module(f"..{CALLS[self.name]}", __package__), self.name)
+        return self.function if model is None else MethodType(self.function, model)
 
 
 class Module(BoundModel):  # noqa: D101
@@ -102,21 +106,21 @@ class Module(BoundModel):  # noqa: D101
 
     @cached_property
     def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one; see :class:`~.minimal.Minimal`."""
+        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one."""
         from ..runtime.minimal import Minimal
 
         return Minimal(self)
 
     @cached_property
     def canonical(self) -> Canonical:
-        """Hamilton's equations on [q; p], of a model derived by ``hamilton``; see :class:`~.canonical.Canonical`."""
+        """Hamilton's equations on [q; p], of a model derived by ``hamilton``."""
         from ..runtime.canonical import Canonical
 
         return Canonical(self)
 
     @cached_property
     def dae(self) -> Dae:
-        """F(t, y, y') = 0 with multipliers, for differential-algebraic solvers; see :class:`~.dae.Dae`."""
+        """F(t, y, y') = 0 with multipliers, for differential-algebraic solvers."""
         from ..simulation.dae_solution import Dae
 
         require_velocities(self.layout)

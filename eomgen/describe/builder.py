@@ -29,34 +29,7 @@ Vector = Sequence[Any]
 
 
 class Builder(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, FunctionMethods, TotalMethods):
-    """A mechanism under description.
-
-    Values are numbers, texts such as ``"m*r**2/12"`` or SymPy expressions; bodies, markers and joints are named by
-    their handles or by text.  Names are looked up when the model is checked, so order does not matter.
-
-    Parameters
-    ----------
-    name : str
-        Identifier; the generated module bears it.
-    gravity : sequence of three, optional
-        Acceleration of gravity in ground axes (m/s^2).
-    doc : str, optional
-        One sentence about the model.
-    check_inertia : {'error', 'note', 'off'} or bool, optional
-        What becomes of masses and inertias that no rigid body can have, and of motions without inertia: by default
-        (``error``, True) they are refused; ``note`` takes them and says so in :attr:`notes`, ``off`` (False) is silent.
-
-    Examples
-    --------
-    >>> import sympy
-    >>> m = Builder("pendulum", gravity=(0, -9.81, 0))
-    >>> l = m.parameter("l", 0.5, unit="m")
-    >>> bob = m.body("bob", mass=1, com=(0, -l, 0))
-    >>> theta = m.revolute("hinge", m.ground, bob, coordinate="theta").coordinate
-    >>> m.output("height", -l * sympy.cos(theta))
-    >>> m.mechanism().joints[0].coordinates
-    ('theta',)
-    """
+    """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
         self, name: str, gravity: Vector = (0, 0, 0), doc: str = "", *, check_inertia: bool | str = True

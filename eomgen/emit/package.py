@@ -110,7 +110,7 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """Files of eomgen as they are: three of its root, limits/ to ensembles/ but ELSEWHERE, and parts of verification/."""
+    """Files of eomgen as they are: of its root, of limits/ to ensembles/ but ELSEWHERE, and of verification/."""
     root = files("eomgen")
     found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "kernel_table.py", "texts.py")}
     for folder in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):

@@ -38,6 +38,7 @@ OPTIONS = ("rtol", "atol", "max_step", "first_step")
 
 def simulate_many(
     module: BoundModel,
+    /,
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, Any] | ArrayLike | None = None,
     parameters: Mapping[str, Any] | ArrayLike | None = None,
@@ -65,7 +66,6 @@ def simulate_many(
 
     Parameters
     ----------
-    module : BoundModel
     span : (float, float) or float, optional
         As for ``simulate``.
     initial : mapping of str to float or (k,) array, or (n_x,) or (n_x, k) array, optional

@@ -19,7 +19,8 @@ def as_path(what: str, given: Any) -> Path:
     """
     try:
         path = os.fspath(given)
-    except TypeError:
+        os.fsencode(path)
+    except (TypeError, UnicodeEncodeError):
         path = b""
     if not isinstance(path, str) or not path or "\0" in path:
         raise UsageError(f"{what} must be the name of a file or folder, as text or Path, not {given!r:.80}")

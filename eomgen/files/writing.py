@@ -45,6 +45,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         With the path as ``filename``: it cannot be written; the earlier file is as it was.
     """
     target = as_path("path", path)
+    if not target.name:
+        raise UsageError(f"{target} is a folder; name a file in it")
     refuse_link(target)
     part = target.with_name(f".{target.name[:PREFIX]}.{secrets.token_hex(TOKEN // 2)}")
     try:

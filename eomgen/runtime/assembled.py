@@ -19,7 +19,7 @@ from .room import read_number, read_numbers
 
 
 class Assembled:
-    """What a :class:`~.module.Module` can say about the positions that its loops allow."""
+    """What a :class:`~.bound_model.BoundModel` can say about the positions that its loops allow."""
 
     kernels: Kernels
     layout: Layout

@@ -1,4 +1,4 @@
-"""Stage runtime: Module and an integrator's solution -> Trajectory: projected states, residuals, lazy columns."""
+"""Stage runtime: states over time -> projected states, residuals, columns that are worked out when asked for."""
 
 from __future__ import annotations
 

@@ -361,6 +361,7 @@ class Initial:
         return {name: value for name, value in kept.items() if name not in torn}
 
     def _row(self, q: Array, name: str) -> list[Array]:
+        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
         layout = self.layout
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]

@@ -74,7 +74,7 @@ class Part:
 
 
 class Momenta:
-    """Part of :class:`~.module.Module`: sums over all bodies, in ground axes, each made when it is first asked for.
+    """Part of :class:`~.bound_model.BoundModel`: sums over all bodies, in ground axes, each made when first asked for.
 
     Calls raise a :class:`~..errors.UsageError` where the model has no bodies, or none with a mass.
     """

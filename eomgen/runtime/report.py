@@ -59,8 +59,8 @@ def line(module: BoundModel) -> str:
     return f"<Module {module.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{listed(module.x_names)}]>"
 
 
-def report(module: BoundModel) -> str:
-    """Several lines of plain text."""
+def report(module: BoundModel, /) -> str:
+    """What the model is made of, as text."""
     lines = facts(module)
     width = max(len(label) for label, _ in lines)
     head = module.name + (f": {visible(module.doc)}" if module.doc else "")

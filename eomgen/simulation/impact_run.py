@@ -30,6 +30,7 @@ IDLE = 50  #: closings in a row that bring neither an impact nor time
 
 def simulate_impacts(
     module: BoundModel,
+    /,
     span: float | tuple[float, float] | None,
     gaps: Mapping[str, float],
     initial: Mapping[str, float] | ArrayLike | None = None,

@@ -270,6 +270,8 @@ class _Journey:
         def between(at: Any) -> Array:
             if not cache:
                 cache.append(solver.dense_output())
+            if np.ndim(at) and not type(solver).__module__.startswith("scipy."):  # another's may take one time only
+                return np.stack([np.asarray(cache[0](one)) for one in np.asarray(at).tolist()], axis=1)
             return np.asarray(cache[0](at))
 
         stop = None if self.crossings is None else self.crossings.find(Step(t_old, t, x, between, t - t_old))

@@ -195,7 +195,7 @@ class Integrator:
 
 
 def integrator(
-    module: BoundModel, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
+    module: BoundModel, /, parameters: Any = None, inputs: Any = None, *, method: str | None = None, **options: Any
 ) -> Integrator:
     """An integrator held ready, for many short integrations: control, shooting, filters, learning.
 

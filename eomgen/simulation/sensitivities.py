@@ -44,6 +44,7 @@ OPTIONS = ("max_step", "first_step", "min_step")  #: of solvers, besides toleran
 
 def sensitivities(
     module: BoundModel,
+    /,
     names: Sequence[str],
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, float] | ArrayLike | None = None,
@@ -70,8 +71,12 @@ def sensitivities(
         Coordinates and rates that keep their initial values when something else changes; the constraints give the
         rest, by the smallest change where they leave a choice.  By default those given in ``initial``, then the
         declared ones, then the independent ones, while they leave each other room.
+    method : str or OdeSolver subclass, optional
+        Of SciPy.
+    rtol, atol, t_eval, events : optional
+        As for ``simulate``.
     **options
-        method (of SciPy, DOP853), rtol (1e-9), atol (1e-11), t_eval, max_step, first_step.
+        max_step, first_step, as for ``simulate``.
 
     Returns
     -------

@@ -36,6 +36,7 @@ OPTIONS = (
 
 def simulate(
     module: BoundModel,
+    /,
     span: float | tuple[float, float] | None = None,
     initial: Mapping[str, float] | ArrayLike | None = None,
     parameters: Any = None,
@@ -60,7 +61,6 @@ def simulate(
 
     Parameters
     ----------
-    module : BoundModel
     span : (float, float) or float, optional
         Start and end (s); the end alone for a start at 0; the model's own end by default.
     initial : mapping of str to float, or (n_x,) array, optional

@@ -134,7 +134,7 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
-def step(module: BoundModel, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
+def step(module: BoundModel, /, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
     """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
 
     Parameters

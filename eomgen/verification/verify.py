@@ -34,31 +34,40 @@ GROUPS = ("kernels", "bodies", "joints", "reactions", "constraints", "derivative
 KINEMATIC = ("kernels", "constraints")  #: of models without inertia
 
 
-def verify(module: BoundModel, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
-    """Compare a module with several independent calculations, and with variants of its model where that is known.
+def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, seconds: float = SECONDS) -> Verification:
+    """Compare this module with several independent calculations.
 
     Parameters
     ----------
-    module : BoundModel
     states : int
-        Number of random states.
+        Number of random states on the constraints, near the declared initial position.
     seed : int
+        Of the states.
     seconds : float
-        Time for all of it; variants, the same mechanism described differently, have what is left, and at least
-        :data:`LEAST`.
+        Time for all of it.  Variants of the model, the same mechanism described differently, have what is left, and
+        at least 2 s; those that are not reached are left out and counted.
 
     Returns
     -------
     Verification
+        ``ok``, ``table``, ``findings``, ``breaches``; printed, it is a table of the worst figures, their limits and
+        where they are.
 
     Raises
     ------
     AssemblyError
         The loops do not close at the declared initial values.
     MissingDependencyError
-        mpmath or SciPy is missing where the equations are there.
+        mpmath or SciPy is not installed.
     UsageError
-        ``states`` is no whole number from 1 to :data:`MOST_STATES`, ``seed`` none from 0, ``seconds`` no number from 0.
+        ``states``, ``seed`` or ``seconds`` is none.
+
+    Notes
+    -----
+    A module that was compiled here is compared with its graph, with the graph in 50 digits, with Newton's and
+    Euler's equations of every body and with SciPy.  Where ``Model.compile`` made it, variants of the model are
+    compiled and compared with it too; with ``Equations.compile`` the model is not known, and they are left out.
+    One of an exported package is compared with the figures that came with it, and with itself.
     """
     _require(states, seed, seconds)
     start = perf_counter()
@@ -118,7 +127,6 @@ def verify_model(
     Parameters
     ----------
     model : Model
-    module : BoundModel
     states, seed : int
     seconds : float
         Time for all of it; variants have what is left, and at least :data:`LEAST`.

@@ -1,6 +1,8 @@
 """The calls of a Module: shapes, batches, parameters, assembly by name, kinematics, errors."""
 
+import inspect
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eomgen.api.module import Module
+from eomgen.api.module import CALLS, Module
 from eomgen.errors import (
     AssemblyError,
     NonFiniteError,
@@ -310,3 +312,17 @@ def test_coordinates_called_like_arguments_go_in_a_dict(pendulum, models):
     with pytest.raises(UsageError, match="the coordinate 'u' goes in a dict: {'u': ...}"):
         m.x0(u=0.4)
     assert m.x0({"u": 0.4})[0] == 0.4
+
+
+def test_calls_are_methods_with_the_whole_story() -> None:
+    """Every name of the table is a function that takes the model by place alone and explains its arguments."""
+    for name in CALLS:
+        function = getattr(Module, name)
+        first, *others = inspect.signature(function).parameters.values()
+        assert (function.__name__, first.kind) == (name, first.POSITIONAL_ONLY), name
+        text = inspect.getdoc(function) or ""
+        assert "module :" not in text, name
+        for other in others:
+            if other.kind is not other.VAR_KEYWORD and name not in ("undetermined_reactions", "driving_forces"):
+                assert re.search(rf"\b{other.name}\b", text), f"{name}: {other.name}"
+    assert vars(Module)["step"].function is Module.step
