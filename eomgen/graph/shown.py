@@ -53,7 +53,22 @@ def _prints(value: Any) -> bool:
     plain: tuple[Any, ...] = (sympy.AtomicExpr, sympy.Add, sympy.Mul, sympy.Pow, sympy.Derivative, sympy.Subs)
     plain += (sympy.Function, sympy.core.relational.Relational, sympy.logic.boolalg.Boolean, sympy.Tuple)
     plain += (sympy.functions.elementary.piecewise.ExprCondPair, sympy.core.symbol.Str)
-    return all(isinstance(part, plain) and not is_tower(part) for part in parts_of(value))
+    return all(isinstance(part, plain) and not is_tower(part) and not _grows(part) for part in parts_of(value))
+
+
+def _grows(part: Any) -> bool:
+    """Whether a part of a SymPy expression is a number that takes any time to write or to work out.
+
+    Such are a Float of millions of digits, and what grows as exp does of a large number or of what grows too.
+    """
+    sympy = sys.modules["sympy"]
+    if isinstance(part, sympy.Float):
+        return abs(part._mpf_[2]) > EXPONENT
+    growing = (sympy.exp, sympy.gamma, sympy.loggamma, sympy.factorial, sympy.sinh, sympy.cosh, sympy.Pow)
+    if not isinstance(part, growing[:-1]) or not part.is_number:
+        return False
+    below = [x for argument in part.args for x in parts_of(argument)]
+    return any(isinstance(x, growing) or (x.is_Number and abs(x) > EXPONENT) for x in below)
 
 
 def parts_of(value: Any) -> Iterator[Any]:

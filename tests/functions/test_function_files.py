@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import builtins
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -140,15 +142,16 @@ def test_native_code_of_a_file_needs_permission(sources: Path, monkeypatch: pyte
     file = written(sources, NATIVE, "-swing(s)", "diff(swing(s), 1)")
     (sources / "laws.py").write_text("raise SystemExit('read before permission')\n")
     opened: list[str] = []
-    import builtins
 
-    true_open = builtins.open
+    def watched(true_open: Any) -> Any:
+        def open_noted(name: Any, *rest: Any, **keys: Any) -> Any:
+            opened.append(str(name))
+            return true_open(name, *rest, **keys)
 
-    def watched(name: Any, *rest: Any, **keys: Any) -> Any:
-        opened.append(str(name))
-        return true_open(name, *rest, **keys)
+        return open_noted
 
-    monkeypatch.setattr(builtins, "open", watched)
+    for module in (builtins, os):
+        monkeypatch.setattr(module, "open", watched(module.open))
     with pytest.raises(ModelError) as caught:
         eg.load(file).mechanism()
     (problem,) = caught.value.problems
@@ -177,7 +180,7 @@ def test_permission_runs_it(sources: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ("{type: native, source: none.c}", "none.c cannot be read (No such file or directory); paths are relative"),
         ("{type: native, source: laws.c, derivatives: swing}", "functions.swing.derivatives: 'swing' is not a list"),
         ("{type: native, source: laws.c, function: [a]}", "functions.swing.function: ['a'] is not a name"),
-        ("{type: native, source: ., function: a}", "cannot be read (Is a directory)"),
+        ("{type: native, source: ., function: a}", "is no plain file but a folder"),
         ("{type: native, source: laws.c, python: [a]}", "functions.swing.python: ['a'] is not the path of a file"),
     ],
 )
