@@ -63,7 +63,7 @@ def _grows(part: Any) -> bool:
     """
     sympy = sys.modules["sympy"]
     if isinstance(part, sympy.Float):
-        return abs(part._mpf_[2]) > EXPONENT
+        return bool(abs(part._mpf_[2]) > EXPONENT)
     growing = (sympy.exp, sympy.gamma, sympy.loggamma, sympy.factorial, sympy.sinh, sympy.cosh, sympy.Pow)
     if not isinstance(part, growing[:-1]) or not part.is_number:
         return False

@@ -118,7 +118,7 @@ def sensitivities(
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)
     width = layout.n_x * (1 + len(columns.names))
-    if np.ndim(options.get("atol")):  # of each state, and of its derivatives alike
+    if np.ndim(options["atol"]):  # of each state, and of its derivatives alike
         options["atol"] = np.concatenate([options["atol"], np.repeat(options["atol"], len(columns.names))])
     times = None if t_eval is None else ordered_times(t_eval, start, stop, width)
     z0 = run.joined(x0, S0)
