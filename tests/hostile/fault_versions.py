@@ -69,6 +69,7 @@ class Version(NamedTuple):
         """Derive, build and evaluate the pendulum; a core of another version is a breach whatever its number is."""
         after = "assert module.metadata['eomgen'] == eg.__version__, module.metadata['eomgen']"
         changes: dict[str, str | None] = {"PYTHONPATH": str(self.home), "PYTHONDONTWRITEBYTECODE": "1"}
+        changes["PYTHONSAFEPATH"] = "1"  # where tests run may lie another eomgen
         return work.run(cache, WHOLE, self.before, after, target, changes, 600.0, self.python, self.factor)
 
 
