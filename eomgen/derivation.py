@@ -27,27 +27,7 @@ READABLE = 400  #: operations up to which equations are shown written out
 
 @dataclass(frozen=True)
 class Derivation:
-    """The derived equations of motion of a model.
-
-    Attributes
-    ----------
-    method : str
-        How they were derived, one of ``eomgen.equations.METHODS``.
-    choice : Choice or None
-        What ``auto`` compared, of a tree.
-    report : MechanismReport
-        Bodies, joints, loops, rank, degrees of freedom, partition.
-    q, v, parameters : tuple of sympy.Symbol
-        Coordinates of the spanning tree, their velocities, and the parameters.
-    mass_matrix, force : sympy.Matrix
-        ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being
-        the accelerations of ``independent``.  Large ones are written with ``intermediates``.
-    operations : dict of str to Operations
-        Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree, and of the entries of
-        the linear system where the method solves one.
-    system_size : tuple of int or None
-        Unknowns and entries of that linear system.
-    """
+    """What a derivation gives; :class:`~.api.equations.Equations` says what its attributes are."""
 
     kinematics: Kinematics = field(repr=False)
     mobility: Mobility = field(repr=False)

@@ -13,8 +13,28 @@ if TYPE_CHECKING:
     from ..describe.builder import Builder
 
 
-class Equations(Derivation):  # noqa: D101
-    __doc__ = Derivation.__doc__
+class Equations(Derivation):
+    """The derived equations of motion of a model.
+
+    Attributes
+    ----------
+    method : str
+        How they were derived, one of ``eomgen.equations.METHODS``.
+    choice : Choice or None
+        What ``auto`` compared, of a tree.
+    report : MechanismReport
+        Bodies, joints, loops, rank, degrees of freedom, partition.
+    q, v, parameters : tuple of sympy.Symbol
+        Coordinates of the spanning tree, their velocities, and the parameters.
+    mass_matrix, force : sympy.Matrix
+        ``mass_matrix * v' = force``; for a mechanism with loops of the size of its degrees of freedom, v' then being
+        the accelerations of ``independent``.  Large ones are written with ``intermediates``.
+    operations : dict of str to Operations
+        Exact counts of mass matrix, bias, inverse dynamics and energies on the spanning tree, and of the entries of
+        the linear system where the method solves one.
+    system_size : tuple of int or None
+        Unknowns and entries of that linear system.
+    """
 
     def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
         """Generate code, compile it and load it.

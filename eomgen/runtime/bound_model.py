@@ -27,56 +27,9 @@ if TYPE_CHECKING:
 
 
 class BoundModel(Assembled, Momenta):
-    """A model ready to be evaluated and simulated.
+    """A model with parameters and inputs bound, and the calls that need no analysis and no run.
 
-    ``x = [q; v]`` are the coordinates and velocities of the spanning tree, in SI units and radians, in the order of
-    ``x_names``; q' = v but for Euler parameters.  Every state may be one (n,) or a batch (n, k) of k states as columns;
-    results then carry the same last axis.  Every call takes ``p=None`` (n_p,) and ``u=None`` (n_u,), the values bound
-    here by default, and ``out=None`` to write into; calls of positions alone take ``t=0.0`` too.  A call that fails
-    raises an :class:`~..errors.EvaluationError` with the time and the state.
-
-    Parameters
-    ----------
-    core : extension module or NumpyCore
-    p, u : mapping of str to float, or arrays (n_p,), (n_u,), optional
-        Parameters and inputs to bind; the declared values by default.
-
-    Attributes
-    ----------
-    name, doc : str
-    q_names, v_names, x_names, u_names, p_names, y_names, body_names : tuple of str
-        What the entries of each vector are called.
-    loop_names : tuple of str
-        Coordinates of the joints that were cut; they can be given as initial values and read from results.
-    n_q, n_v, n_x, n_u, n_p, n_y, n_c, n_dof, n_bodies : int
-        Sizes; n_c counts the independent constraint rows, n_rows all of them.
-    p, u : arrays
-        The parameters and inputs bound.
-    limits : dict
-        Coordinate -> lower, upper, velocity and effort, those that the model gives; data only.
-    rhs : callable
-        ``rhs(t, x)`` -> x' (n_x,).  A pure function: x is projected onto the constraints first.
-    jacobian : callable
-        ``jacobian(t, x)`` -> (n_x, n_x), the derivative of the complete rhs.  Exact, in all directions, at states on
-        the constraints (of ``x0``, ``project`` or a trajectory); elsewhere it is the one at the projected state, off by
-        the order of the distance, as derivatives by parameters and inputs are.
-    bias : callable
-        ``bias(t, x)`` -> h (n_v,) in ``M v' + h`` = generalized forces that are not in the model.
-    outputs : callable
-        ``outputs(t, x)`` -> (n_y,).
-    mass_matrix, embedded_mass_matrix : callable
-        ``mass_matrix(q)`` -> (n_v, n_v) of the tree; (n_dof, n_dof) of the independent coordinates.
-    inverse_dynamics : callable
-        ``inverse_dynamics(q, v, a)`` -> (n_v,) generalized forces to add to those of the model.
-    energy : callable
-        ``energy(x)`` -> (T, V) in J.
-    constraints, constraint_jacobian, velocity_constraints : callable
-        ``constraints(q)`` -> C of the holonomic rows (m, rad), C_q (n_c, n_v), ``velocity_constraints(x)`` ->
-        C_q v + C_t: independent rows, the holonomic ones first; ``rows="all"`` for redundant ones too.
-    project : callable
-        ``project(x, t=0.0)`` -> the nearest x on the constraints.
-    poses : callable
-        ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
+    What its attributes and calls are, :class:`~..api.module.Module` says, whose parameters it has too.
     """
 
     #: what it was made from; None for a module of an exported package, or from a pickle

@@ -1,5 +1,6 @@
 """The calls of a Module: shapes, batches, parameters, assembly by name, kinematics, errors."""
 
+import ast
 import inspect
 import json
 import re
@@ -326,3 +327,19 @@ def test_calls_are_methods_with_the_whole_story() -> None:
             if other.kind is not other.VAR_KEYWORD and name not in ("undetermined_reactions", "driving_forces"):
                 assert re.search(rf"\b{other.name}\b", text), f"{name}: {other.name}"
     assert vars(Module)["step"].function is Module.step
+
+
+def test_type_checkers_read_the_same_table() -> None:
+    """What stands under TYPE_CHECKING in the class and its imports are the calls, from the same files."""
+    tree = ast.parse(inspect.getsource(sys.modules[Module.__module__]))
+    homes = {
+        alias.name: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname == f"_{alias.name}"
+    }
+    (own,) = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Module"]
+    (block,) = [node for node in own.body if isinstance(node, ast.If)]
+    assert [ast.unparse(line) for line in block.body] == [f"{name} = _{name}" for name in CALLS]
+    assert homes == CALLS
