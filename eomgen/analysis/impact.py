@@ -178,7 +178,7 @@ def strike_events(
     """
     layout = module.layout
     module = module.bind(None, u)
-    kernel = module.kernels.timed("events")
+    kernel = module.kernels.timed("events", nan=True)
     values = kernel(t, x, u=u)
     near = TOUCHING * max(1.0, layout.length)
     gaps = {
@@ -194,13 +194,13 @@ def strike_events(
                     f"event {events[i]['name']}: the input {layout.u[k]} depends on the state, and so does its rate, "
                     "which an impact changes; write the gap itself in coordinates"
                 )
-    slopes = module.kernels.timed("event_slopes")(t, x, u=u)
+    slopes = dict(zip(gaps, module.kernels.rows("event_slopes", [*gaps], t, x, u), strict=True))
     states = _one_state(module, t, x)
     q, v = states.q[:, 0], states.v[:, 0]
     for i in gaps:
-        if np.abs(slopes[i, layout.n_q :]).max(initial=0.0) > 0.0:
+        if np.abs(slopes[i][layout.n_q :]).max(initial=0.0) > 0.0:
             raise UsageError(f"event {events[i]['name']}: a gap is a function of positions, not of velocities")
-    rows = np.array([by_velocity(layout, q, slopes[i, : layout.n_q]) for i in gaps])
+    rows = np.array([by_velocity(layout, q, slopes[i][: layout.n_q]) for i in gaps])
     moved = moving_inputs(layout, u)
     rates = rows @ v + drift(lambda time: kernel(time, x, u=u + (time - t) * moved), t)[[*gaps]]
     names = [str(events[i]["name"]) for i in gaps]

@@ -71,6 +71,13 @@ class Kernels:
         kernel: Timed = self._make(self.core.timed, name, nan)
         return kernel
 
+    def rows(self, name: str, chosen: Any, t: float, x: Array, u: Array | None = None) -> Array:
+        """Rows of a timed kernel at one state; the others need not be numbers there."""
+        found = np.asarray(self.timed(name, nan=True)(t, x, u=u)[chosen])
+        if not np.isfinite(found).all():
+            self.timed(name)(t, x, u=u)  # tells what is wrong
+        return found
+
     def state(self, name: str, nan: bool = False) -> State:
         """A kernel called as ``f(x, p=None, u=None, out=None, t=0.0)``."""
         layout = self.layout

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import STATUS, EvaluationError
+from ..errors import STATUS, EvaluationError, NonFiniteError
 from ..kernel_table import NAMED
 from ..numeric.scales import Array
 from .layout import Layout
@@ -27,6 +27,7 @@ Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]
 #: For values by name where a call takes an array.
 BY_NAME = "{0} of a call is an array in the order of {0}_names; by name: bind({0}={{...}})"
 CODES = {error: status for status, error in STATUS.items()}
+NON_FINITE = CODES[NonFiniteError]
 
 
 class Context:
@@ -107,7 +108,8 @@ class NumpyCore:
         fail : callable
             Called as ``fail(name, status, t, x)`` when the kernel fails, then p and u if any was given; it must raise.
         nan : bool
-            Fill the result with NaN at a recoverable failure and record it in ``failure`` instead.
+            At a recoverable failure record it in ``failure`` instead, and put NaN where an entry is no finite number,
+            or everywhere if it is another failure.
         error : type
             Exception raised for arguments that do not fit.
         """
@@ -222,17 +224,17 @@ class NumpyKernel:
         return result
 
     def _single(self, t: Any, x: Array, u: Array, c: Array, given: tuple[Any, ...]) -> Array:
-        time = float(t)
+        time, result = float(t), np.full(self.shape, np.nan)
         try:
-            result = np.asarray(self.call(time, x, u, c), dtype=float).reshape(self.shape)
+            result = np.array(self.call(time, x, u, c), dtype=float).reshape(self.shape)
             status = 0 if np.isfinite(result).all() else self.core.drivers.singular(self.name, time, x, u, c)
         except EvaluationError as error:
             status = CODES.get(type(error), 1)
         if status:
-            result = np.full(self.shape, np.nan)
             if not self.nan:
                 self.fail(self.name, status, time, np.array(x), *given, *([np.array(u)] if given else []))
             self.failure = (status, time, np.array(x))
+            result[~np.isfinite(result) | (status != NON_FINITE)] = np.nan
         return result
 
 

@@ -8,6 +8,7 @@ and leave again within it, and zeros after a reset, once the value has been seen
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
+from math import isnan
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -182,7 +183,7 @@ class Crossings:
 
     def _brackets(self, step: Step, new: Array) -> list[Bracket]:
         found: list[list[Bracket]] = []
-        touching: list[tuple[int, Search[list[Bracket]]]] = []
+        searched: list[tuple[int, Search[list[Bracket]]]] = []
         for i, event in enumerate(self.events):
             a, b = float(self.g[i]), float(new[i])
             self.touch[i] = 0
@@ -194,10 +195,12 @@ class Crossings:
                     found.append(self._from_zero(step, i, b))
                 elif (a <= 0.0 <= b) or (a >= 0.0 >= b):
                     found.append([Bracket(i, step.t_old, step.t, a, b)])
+                elif isnan(a) != isnan(b):
+                    searched.append((i, self._within_domain(step, i, a, b)))
                 elif self._may_touch(step, i, a, b):
-                    touching.append((i, self._touching(step, i, a, b)))
+                    searched.append((i, self._touching(step, i, a, b)))
                 self.size[i] = np.fmax(self.size[i], abs(b))
-        found += self._searched(step, touching)
+        found += self._searched(step, searched)
         every = sorted((z for few in found for z in few), key=lambda z: z.event)
         return [z for z in every if not self.events[z.event].direction * (z.fb - z.fa) < 0.0]
 
@@ -231,6 +234,41 @@ class Crossings:
             seen = seen or value * side > 0.0
             t, g = later, value
         return [Bracket(i, step.t_old, step.t, 0.0, last)]
+
+    def _within_domain(self, step: Step, i: int, a: float, b: float) -> Search[list[Bracket]]:
+        """A value that is no number at one end of the step: changes of sign in the part where it is one."""
+        t, g, found = step.t_old, a, list[Bracket]()
+        for k in range(1, SAMPLED + 1):
+            later = step.t_old + k * (step.t - step.t_old) / SAMPLED if k < SAMPLED else step.t
+            value = (yield later) if k < SAMPLED else b
+            last, end = later, value
+            if isnan(value) and not isnan(g):
+                last, end = yield from self._domain_edge(t, g, later)
+            elif isnan(g) and not isnan(value):
+                t, g = yield from self._domain_edge(later, value, t)
+            if g < 0.0 <= end or g > 0.0 >= end or (k == 1 and g == 0.0 and not isnan(end)):
+                found.append(Bracket(i, t, last, g, end))
+            t, g = later, value
+        way = self.events[i].direction
+        return [z for z in found if not way * (z.fb - z.fa) < 0.0][:2]
+
+    @staticmethod
+    def _domain_edge(inside: float, g: float, outside: float) -> Search[tuple[float, float]]:
+        """The edge of a value's domain, between a time where it is a number and one where it is none.
+
+        The last time found where it is one, and its value there; no further than to where its sign is another.
+        """
+        first = g
+        for _ in range(HALVED):
+            if g * first <= 0.0:
+                break
+            t = 0.5 * (inside + outside)
+            value = yield t
+            if isnan(value):
+                outside = t
+            else:
+                inside, g = t, value
+        return inside, g
 
     def _may_touch(self, step: Step, i: int, a: float, b: float) -> bool:
         """Whether a value of one sign at both ends may have been at zero between: it comes near and leaves again."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -71,7 +72,9 @@ class Event:
 
     def judge(self, t: float, value: float) -> float:
         """The same where the function's value is known."""
-        self.known = self.known or value == value
+        if not isfinite(value):
+            return nan
+        self.known = True
         if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
             return self.left[1] * max(abs(value), TINY)
         return value
@@ -165,10 +168,10 @@ class Events:
         after = np.array(x, dtype=float)
         for i in fired:
             if self.model[i].action == RESET:
-                values = module.kernels.timed("resets")(t, after, u=forcing(t, after))
-                for (event, place), value in zip(self.layout.metadata["resets"], values, strict=True):
-                    if event == i:
-                        after[place] = value
+                resets = self.layout.metadata["resets"]
+                own = [k for k, (event, _) in enumerate(resets) if event == i]
+                places = [resets[k][1] for k in own]
+                after[places] = module.kernels.rows("resets", own, t, after, forcing(t, after))
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
@@ -233,7 +236,7 @@ def _only_in_c(t: float, x: Array) -> float:
 
 def _unwatched(t: float, x: Array) -> float:
     """In place of the value of an event that is not watched: SciPy's methods find no zero in it."""
-    return float("nan")
+    return nan
 
 
 def _times(name: str, given: Any) -> int:

@@ -113,9 +113,9 @@ def after_reset(
     resets = layout.metadata["resets"]
     chosen = [k for k, (owner, _) in enumerate(resets) if owner == event]
     places = [resets[k][1] for k in chosen]
-    slopes = module.kernels.timed("event_derivatives")(t, before, u=u)[layout.n_events :][chosen]
+    slopes = module.kernels.rows("event_derivatives", [layout.n_events + k for k in chosen], t, before, u)
     star, moved = np.array(before), np.array(move.x)
-    star[places] = module.kernels.timed("resets")(t, before, u=u)[chosen]
+    star[places] = module.kernels.rows("resets", chosen, t, before, u)
     moved[places] = move.along(slopes, what, names)
     dq, dv = moved[:n_q], moved[n_q:]
     if layout.space is not None:

@@ -59,7 +59,6 @@ class Saltation:
         self.names = [events.names[i] for i, _ in self.listed]
         self.watched = [self._of_both(event, name) for (_, event), name in zip(self.listed, self.names, strict=True)]
         self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
-        self.kernel = self.module.kernels.timed("event_derivatives")
         self.found: list[EventSlopes] = []
 
     def _of_both(self, event: Event, name: str) -> Event:
@@ -117,7 +116,7 @@ class Saltation:
         if self.events.model[index].action == RESET:
             return after_reset(self.run, here, t, x, move, x_after, index, forcing(t, x))
         declared = self.events.declared
-        values = self.module.kernels.timed("events")(t, x, u=forcing(t, x))
+        values = self.module.kernels.timed("events", nan=True)(t, x, u=forcing(t, x))
         near = TOUCHING * max(1.0, self.module.layout.length)
         gaps = [j for j, other in enumerate(declared) if other.get("restitution") is not None]
         touching = [str(declared[j]["name"]) for j in gaps if j != index and abs(values[j]) <= near]
@@ -142,7 +141,7 @@ class Saltation:
         """Derivatives (1, ...) of an event's value by [x, t, u, p]."""
         first = len(self.events.model)
         if index < first:
-            return np.asarray(self.kernel(t, x, u=self.run.forcing(t, x))[index : index + 1])
+            return self.module.kernels.rows("event_derivatives", [index], t, x, self.run.forcing(t, x))
         every, n_u = self.formulas[index - first](t, x), self.module.layout.n_u
         return np.concatenate([every[1 : 1 + self.n], every[:1], np.zeros(n_u), every[1 + self.n :]])[None]
 
@@ -224,7 +223,10 @@ class Saltation:
         for other, (index, event) in enumerate(self.listed):
             if other == own or (event.action == GO_ON and not event.terminal):
                 continue
-            value, gradient = float(event.function(t, x)), self._gradient(t, x, index)
+            value = float(event.function(t, x))
+            if np.isnan(value):
+                continue
+            gradient = self._gradient(t, x, index)
             rate = self._rate(t, x, index, f, self.names[other])
             onward = rate if self.span[1] >= self.span[0] else -rate
             if (event.action == WAIT and onward > 0.0) or event.direction * onward < 0.0:

@@ -33,8 +33,8 @@ typedef struct {
 
 /* The same for several states at a time, number k of each in lane k: all arrays hold `width` doubles for every one of
    eomgen_function's, side by side, and begin at a multiple of their 8*width bytes; c too may differ from lane to lane.
-   status: the status of every lane; what a lane with another than 0 has in out means nothing, the others are not
-   affected. Returns 0 if all are 0. A lane's results have the same bits whatever the others hold. */
+   status: the status of every lane; what a lane with another than 0 has in out means nothing, but for finite entries
+   with EOMGEN_NON_FINITE; the others are not affected. Returns 0 if all are 0. A lane's results have the same bits whatever the others hold. */
 typedef int (*eomgen_lane_function)(const double *t, const double *x, const double *u, const double *c, double *out,
     double *w, int *status);
 

@@ -30,6 +30,11 @@ cdef inline void gather(const Piece *piece, cnp.npy_intp column, double *target)
         data += piece.row
 
 
+cdef inline double entry(double value, int code) noexcept nogil:
+    """An entry of a result: NaN where it could not be computed, even if others could."""
+    return value if code == 0 or (code == EOMGEN_NON_FINITE and isfinite(value)) else NAN
+
+
 cdef double load(const Batch *batch, cnp.npy_intp column) noexcept nogil:
     """Gather the state and the inputs of one column; returns its time."""
     cdef double *x = batch.x
@@ -49,9 +54,12 @@ cdef cnp.npy_intp sweep(const Batch *batch, double *result, int *status) noexcep
     cdef double t
     for j in range(batch.columns):
         t = load(batch, j)
+        if batch.nan:
+            for i in range(batch.n_out):
+                batch.y[i] = NAN
         code = batch.call(t, batch.x, batch.u, batch.c, batch.y, batch.w)
         for i in range(batch.n_out):
-            result[i * batch.columns + j] = batch.y[i] if code == 0 else NAN
+            result[i * batch.columns + j] = entry(batch.y[i], code)
         if code != 0 and (failed < 0 or code < 0):
             failed, status[0] = j, code
         if code < 0 or (code != 0 and not batch.nan):

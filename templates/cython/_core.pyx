@@ -16,7 +16,7 @@ cimport cython
 cimport numpy as cnp
 from cpython.object cimport PyObject
 from cpython.pycapsule cimport PyCapsule_New
-from libc.math cimport NAN
+from libc.math cimport NAN, isfinite
 from libc.stdint cimport int64_t, uintptr_t
 from libc.string cimport memcmp, memcpy
 
@@ -29,6 +29,7 @@ import numpy as np
 cnp.import_array()
 
 cdef extern from "eomgen.h" nogil:
+    enum: EOMGEN_NON_FINITE
     ctypedef int (*eomgen_function)(double, const double *, const double *, const double *,
                                     double *, double *) noexcept nogil
     ctypedef struct eomgen_kernel:
@@ -170,7 +171,8 @@ cdef class Kernel:
     fail : callable
         Called as ``fail(name, status, t, x)`` when the kernel fails, then p and u if any was given; it must raise.
     nan : bool
-        At a recoverable failure (status > 0) fill the result with NaN and remember instead.
+        At a recoverable failure (status > 0) remember it instead, and put NaN where an entry is no finite number, or
+        everywhere if it is another failure.
     error : type
         Exception raised for arguments that do not fit.
 
@@ -254,6 +256,9 @@ cdef class Kernel:
         if n_work > STACK:
             heap = cnp.PyArray_EMPTY(1, &n_work, cnp.NPY_DOUBLE, 0)
             w = <double *>cnp.PyArray_DATA(<cnp.ndarray>heap)
+        if self.tolerant:
+            for i in range(self.n_out):
+                data[i] = NAN
         if self.long:
             with nogil:
                 status = self.call(now, state, self.u, self.c, data, w)
@@ -261,7 +266,7 @@ cdef class Kernel:
             status = self.call(now, state, self.u, self.c, data, w)
         if status != 0:
             for i in range(self.n_out):
-                data[i] = NAN
+                data[i] = entry(data[i], status)
             self.report(status, now, copy(state, self.n_in), ())
         return out
 

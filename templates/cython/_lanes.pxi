@@ -128,13 +128,16 @@ cdef cnp.npy_intp sweep_lanes(const Batch *batch, double *result, int *status) n
         for i in range(batch.n_pieces):
             spread(&batch.pieces[i], first, last, width, x + k * width)
             k += batch.pieces[i].n
+        if batch.nan:
+            for i in range(width * batch.n_out):
+                y[i] = NAN
         if batch.lanes(t, x, u, c, y, w, codes) == 0:
             for i in range(batch.n_out):
                 memcpy(result + i * batch.columns + first, y + i * width, (last - first + 1) * sizeof(double))
         else:
             for k in range(last - first + 1):
                 for i in range(batch.n_out):
-                    result[i * batch.columns + first + k] = y[i * width + k] if codes[k] == 0 else NAN
+                    result[i * batch.columns + first + k] = entry(y[i * width + k], codes[k])
                 if codes[k] != 0 and failed < 0:
                     failed, status[0] = first + k, codes[k]
         first += width

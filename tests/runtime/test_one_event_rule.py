@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -23,8 +24,8 @@ STEPPED = ["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 ERROR = {"BDF": 2e-6, "LSODA": 1e-6, "RK23": 1e-7, "IDA": 1e-6, "sensitivities": 1e-6}
 
 
-def ball(**floor: Any) -> eg.Model:
-    m = eg.Model("ball", gravity=(0, -G, 0))
+def ball(name: str = "ball", **floor: Any) -> eg.Model:
+    m = eg.Model(name, gravity=(0, -G, 0))
     e = m.parameter("e", E)
     m.prismatic("J", m.ground, m.body("ball", mass=1.0), axis="y", coordinate="h")
     m.initial(h=1.0)
@@ -132,6 +133,38 @@ def test_any_number_of_events_in_every_loop(modules: dict[str, Any], n: int) -> 
 def last_rate() -> float:
     k, start = len(floors()), float(floors()[-1])
     return float(np.sqrt(2 * G) * E**k - G * (END - start))
+
+
+def test_an_event_that_is_no_number_leaves_the_others_alone(modules: dict[str, Any]) -> None:
+    """A logarithm or root outside its domain, or a pole, is no event there; it once switched all of the model's off."""
+    m = ball("beside")
+    m.event("never", "log(h - 5)")
+    m.event("above", "sqrt(h - 0.5) - sqrt(0.1)")  # no number below 0.5, a zero at 0.6
+    m.event("pole", "(h - 0.2)/max(h - 0.1, 0)")  # infinite or no number below 0.1, a zero at 0.2
+    m.event("other", "h - 50", reset={"h_dot": "sqrt(h - 50)"})  # its new value is one there only
+    own = modules | {target: m.compile(target=target) for target in ("cython", "numpy")}
+    x0 = own["cython"].x0()
+    for target in ("cython", "numpy"):
+        values = own[target].kernels.timed("events", nan=True)
+        for states in (x0 * 0.3, np.stack([x0 * 0.3] * 9, axis=1)):
+            found = values(0.0, states)
+            assert np.isnan(found[1:3]).all()  # the model's order: floor, never, above, pole, other
+            np.testing.assert_allclose(found[0], 0.3)
+            np.testing.assert_allclose(found[3], 0.5)
+    for name, run in loops(own).items():
+        if "exported" in name:
+            continue
+        error = ERROR.get(name.split()[1], 1e-8)
+        with pytest.warns(UserWarning, match="never"):
+            found = run(None, **({} if "IDA" in name else {"max_step": 0.1}))
+        np.testing.assert_allclose(found.t_events["floor"], floors(), atol=error, err_msg=name)
+        np.testing.assert_allclose(found.t_events["above"], passages(0.6, 0), atol=10 * error, err_msg=name)
+        np.testing.assert_allclose(found.t_events["pole"], passages(0.2, 0), atol=10 * error, err_msg=name)
+        assert len(found.t_events["never"]) == 0, name
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        many = own["cython"].simulate_many((0, END), {"h": np.ones(3)}, keep_events=200, **TIGHT)
+    np.testing.assert_allclose(many.events("floor")[0][: len(floors()), 0], floors(), atol=1e-8)
 
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])

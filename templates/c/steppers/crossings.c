@@ -1,5 +1,5 @@
 /* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again.
-   Python's loop does the same: runtime/crossings.py. */
+   Python's loop does the same: simulation/crossings.py. */
 #include <math.h>
 #include <string.h>
 
@@ -112,6 +112,47 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
     return n;
 }
 
+/* The edge of the domain of a value, between a time where it is a number and one where it is none: the last time found
+   where it is one, and its value there; no further than to where its sign is another. */
+static void domain_edge(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *in, double *g, double out)
+{
+    const double first = *g;
+    for (int k = 0; k < RUNS_HALVED && *g * first > 0.0; k++) {
+        const double t = 0.5 * (*in + out), value = value_at(method, run, ev, i, t);
+        if (isnan(value)) {
+            out = t;
+        } else {
+            *in = t, *g = value;
+        }
+    }
+}
+
+/* A value that is no number at one end of the step: changes of sign in the part where it is one. */
+static int brackets_within_domain(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
+{
+    const int most = n + 2;
+    double t = run->t_old, g = ev->g[i];
+    for (int k = 1; k <= RUNS_SAMPLED && n < most; k++) {
+        const double next = k < RUNS_SAMPLED ? run->t_old + k * (run->t - run->t_old) / (double)RUNS_SAMPLED : run->t;
+        const double value = k < RUNS_SAMPLED ? value_at(method, run, ev, i, next) : ev->g_new[i];
+        double last = next, end = value;
+        if (isnan(value) && !isnan(g)) {
+            last = t, end = g;
+            domain_edge(method, run, ev, i, &last, &end, next);
+        } else if (isnan(g) && !isnan(value)) {
+            double start = next;
+            g = value;
+            domain_edge(method, run, ev, i, &start, &g, t);
+            t = start;
+        }
+        if ((g < 0.0 && end >= 0.0) || (g > 0.0 && end <= 0.0) || (k == 1 && g == 0.0 && !isnan(end))) {
+            n = add(ev, n, i, t, last, g, end);
+        }
+        t = next, g = value;
+    }
+    return n;
+}
+
 static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_events *ev)
 {
     int n = 0;
@@ -129,6 +170,8 @@ static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_ev
             n = brackets_from_zero(method, run, ev, n, i);
         } else if ((a <= 0.0 && b >= 0.0) || (a >= 0.0 && b <= 0.0)) {
             n = add(ev, n, i, run->t_old, run->t, a, b);
+        } else if (isnan(a) != isnan(b)) {
+            n = brackets_within_domain(method, run, ev, n, i);
         } else if (may_touch(run, ev, i)) {
             n = brackets_of_touch(method, run, ev, n, i);
         }

@@ -14,9 +14,12 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     if (run->signals != NULL) {
         eomgen_force(run, t, y);
     }
-    if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) != 0) {
+    for (int i = 0; i < ev->n_model; i++) {
+        g[i] = (double)NAN; /* if nothing is written */
+    }
+    if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) > EOMGEN_NON_FINITE) {
         for (int i = 0; i < ev->n_model; i++) {
-            g[i] = (double)NAN; /* no event here */
+            g[i] = (double)NAN;
         }
     }
     if (ev->tape != NULL) {
@@ -24,6 +27,11 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     }
     if (ev->outside != NULL && ev->outside(ev->asker, t, y, g + ev->n_model + ev->n_tape) != 0) {
         run->stopped = 1;
+    }
+    for (int i = 0; i < ev->n; i++) {
+        if (!isfinite(g[i])) {
+            g[i] = (double)NAN; /* no event here, and none of the others' business */
+        }
     }
     return run->stopped;
 }

@@ -80,11 +80,17 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
         if (run->signals != NULL) {
             eomgen_force(run, run->t, run->y);
         }
-        if (ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w) != 0) {
+        for (int k = 0; k < ev->n_resets; k++) {
+            ev->values_reset[k] = (double)NAN;
+        }
+        if (ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w) > EOMGEN_NON_FINITE) {
             return EOMGEN_RESET_FAILED;
         }
         for (int k = 0; k < ev->n_resets; k++) {
             if (ev->reset_of[k] == i) {
+                if (!isfinite(ev->values_reset[k])) { /* those of other events need not be numbers here */
+                    return EOMGEN_RESET_FAILED;
+                }
                 run->y[ev->reset_x[k]] = ev->values_reset[k];
             }
         }
