@@ -65,10 +65,12 @@ def _grows(part: Any) -> bool:
     if isinstance(part, sympy.Float):
         return bool(abs(part._mpf_[2]) > EXPONENT)
     growing = (sympy.exp, sympy.gamma, sympy.loggamma, sympy.factorial, sympy.sinh, sympy.cosh, sympy.Pow)
-    if not isinstance(part, growing[:-1]) or not part.is_number:
+    if not isinstance(part, growing[:-1]):
         return False
-    below = [x for argument in part.args for x in parts_of(argument)]
-    return any(isinstance(x, growing) or (x.is_Number and abs(x) > EXPONENT) for x in below)
+    below = [x for argument in part.args for x in parts_of(argument)]  # is_number would recurse
+    if any(isinstance(x, sympy.Symbol) for x in below):
+        return False
+    return any(isinstance(x, growing) or (x.is_Number and x is not sympy.nan and abs(x) > EXPONENT) for x in below)
 
 
 def parts_of(value: Any) -> Iterator[Any]:
