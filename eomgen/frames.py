@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .graph.core import Expr
 from .graph.vectors import Mat3, Vec3
 from .records import dataclass
 
@@ -23,3 +24,15 @@ class Marker:
     body: int
     frame: Frame
     label: str
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A smooth cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
+
+    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.
+    """
+
+    marker: Marker
+    radius: Expr
+    sense: int

@@ -1,35 +1,18 @@
-"""Constraint elements: equations between coordinates or markers; :data:`CONSTRAINTS` is the literal table of them."""
+"""Constraint elements: equations between coordinates or markers; :data:`CONSTRAINTS` is the table of their types."""
 
+from ..elements.element_type import Types
+from . import cams, couplings, drivers, gears, planetary, rolling
 from .base import Condition, Constraint, View
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
 from .couplings import Equation, Linear
 from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
-from .gears import Belt, Gear, Planetary, Rack
+from .gears import Belt, Gear, Rack
+from .planetary import Planetary
 from .rolling import KnifeEdge, RollingDisc, RollingSphere
 
-CONSTRAINTS: dict[str, type[Constraint]] = {
-    constraint.type_name: constraint
-    for constraint in (
-        Linear,
-        Equation,
-        Gear,
-        Planetary,
-        Rack,
-        Belt,
-        CamLift,
-        KnifeContact,
-        RollerContact,
-        FlatContact,
-        FlatSupport,
-        RollingDisc,
-        RollingSphere,
-        KnifeEdge,
-        CoordinateDriver,
-        DistanceDriver,
-        PlaceDriver,
-        AngleDriver,
-    )
-}
+CONSTRAINTS: Types = {}
+for _home in (couplings, gears, planetary, cams, rolling, drivers):
+    CONSTRAINTS |= _home.TYPES
 
 __all__ = [
     "CONSTRAINTS",

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
+from ..elements.entry import Entry
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -72,3 +73,10 @@ class Constraint(ABC):
     def hints(self, view: View) -> list[tuple[Expr, Expr]]:
         """Where assembly may look for a coordinate of the element's own: (its symbol, a value near by)."""
         return []
+
+
+def on_two_bodies(e: Entry, key: str, a: Marker, b: Marker) -> bool:
+    """Whether two markers are on different bodies, which is noted where they are not."""
+    if a.body == b.body:
+        e.fault(key, f"{a.label} and {b.label} are on the same body", "choose another body")
+    return a.body != b.body

@@ -11,11 +11,17 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, sqrt
 from ..records import dataclass
 from .base import Condition, Constraint, View
 from .profiles import Profile
+
+#: The name that stands for the angle in profiles of cams.
+CAM_ANGLE = "theta"
 
 
 @dataclass(frozen=True)
@@ -140,3 +146,103 @@ class FlatContact(_Contact):
     def aligned(self, view: View) -> list[Expr]:
         r, slope, face = self.polar(view)
         return [r * face.rotation[0][2] - slope * face.rotation[1][2]]
+
+
+def _profile(e: Entry, key: str, turns: bool = True) -> Profile:
+    local = e.graph.symbol(f"{CAM_ANGLE} of {e.name}")
+    return Profile(e.law(key, {CAM_ANGLE: local}, exclusive=False), local, e.flag("periodic") and turns)
+
+
+def _cam(e: Entry) -> CamLift | None:
+    turning, follower = e.coordinate("cam"), e.coordinate("follower")
+    if turning is None or follower is None:
+        return None
+    if turning.name == follower.name:
+        e.fault("follower", f"{follower.name!r} is the cam's own coordinate", "name another")
+        return None
+    for key, found in (("cam", turning), ("follower", follower)):
+        if found.kind not in ("angle", "length"):
+            message = f"the coordinate {found.name!r} is neither an angle nor a length"
+            e.fault(key, message, "name one that is; rotation: euler_angles has angles")
+    if e.values.get("periodic") is True and turning.kind == "length":
+        message = f"the cam slides: {turning.name!r} is a length, and its law repeats no turn"
+        e.fault("periodic", message, "leave it out, or write the repetition into lift, as with sin(2*pi*theta/l)")
+    if e.at_fault():
+        return None
+    lift = _profile(e, "lift", turning.kind == "angle")
+    return CamLift(e.name, e.symbol(turning), e.symbol(follower), lift, e.law("phase"), follower.kind)
+
+
+def _cam_contact(e: Entry) -> Constraint | None:
+    shape, axis, follower = e.choice("shape"), e.marker("cam"), e.marker("follower")
+    if axis is not None and follower is not None and axis.body == follower.body:
+        e.fault("follower", f"{axis.label} and {follower.label} are on the same body", "name another")
+    if e.at_fault("shape"):
+        return None
+    if shape != "roller":
+        e.refuse("radius", f"a follower of shape {shape} has no radius")
+    elif "radius" not in e.values:
+        e.fault("radius", "is missing", "give the radius of the roller")
+    if "support" in e.values and shape != "flat_face":
+        e.fault("support", "a support function is the law of a flat face", "give the contour r(theta) instead")
+    if shape == "knife_edge" or "support" in e.values:
+        e.refuse("coordinate", "its contact point is known without a coordinate of its own")
+    if axis is None or follower is None or e.at_fault():
+        return None
+    profile = _profile(e, "support" if "support" in e.values else "contour")
+    if "support" in e.values:
+        return FlatSupport(e.name, axis, follower, profile)
+    if shape == "knife_edge":
+        return KnifeContact(e.name, axis, follower, profile)
+    contact = e.contact_point(axis)
+    if contact is None:
+        return None
+    if shape == "roller":
+        return RollerContact(e.name, axis, follower, profile, *contact, e.positive("radius"))
+    return FlatContact(e.name, axis, follower, profile, *contact)
+
+
+_PERIODIC = Field(
+    "flag", "whether the profile repeats every turn; then value and slope at 2 pi must be those at 0", default=True
+)
+_JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
+
+TYPES = table(
+    ElementType(
+        "cam",
+        "a follower that moves by a law: its coordinate is the lift.",
+        {
+            "cam": _JOINT._replace(doc="joint of the cam"),
+            "follower": _JOINT._replace(doc="joint of the follower"),
+            "lift": Field(
+                "expression",
+                "the follower's coordinate over theta = the cam's angle less the phase, from 0 to a full turn",
+                required=True,
+            ),
+            "phase": Field("expression", "the cam's angle where theta is 0 (rad)", default=0),
+            "periodic": _PERIODIC,
+        },
+        _cam,
+    ),
+    ElementType(
+        "cam_contact",
+        "a follower that stays in contact with the contour of a plane cam.",
+        {
+            "cam": Field("marker", "the cam's axis (z) and where polar angles start (x)", required=True),
+            "follower": Field("marker", "tip, centre of the roller, or face with z away from the cam", required=True),
+            "shape": Field(
+                "choice", "shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")
+            ),
+            "contour": Field("expression", "r(theta), radius of the contour over its polar angle (m)"),
+            "support": Field(
+                "expression",
+                "of a flat face: h(theta), distance of the tangent with its normal at theta (m)",
+            ),
+            "radius": Field("expression", "radius of the roller (m)"),
+            "coordinate": Field("name", "name of the polar angle of the contact point (<name>_contact)"),
+            "periodic": _PERIODIC,
+        },
+        _cam_contact,
+        one_of=("contour", "support"),
+    ),
+)

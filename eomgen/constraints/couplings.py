@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import OUTPUT, Field
 from ..graph.core import Expr
+from ..graph.differentiate import gradient
+from ..graph.substitute import symbols_of
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .base import POSITION, VELOCITY, Condition, Constraint, View
 
 
 @dataclass(frozen=True)
@@ -38,3 +43,56 @@ class Equation(Constraint):
 
     def conditions(self, view: View) -> list[Condition]:
         return [Condition("equation", self.expression, self.kind, self.level)]
+
+
+def _coupling(e: Entry) -> Linear | Equation | None:
+    if "equation" in e.values:
+        e.refuse("offset", "an equation has no offset")
+        return _equation(e)
+    terms = e.factors("coordinates")
+    if terms is None:
+        return None
+    kind = "length" if any(found.kind == "length" for found, _ in terms) else "angle"
+    return Linear(e.name, tuple((e.symbol(found), factor) for found, factor in terms), e.law("offset"), kind)
+
+
+def _equation(e: Entry) -> Equation | None:
+    expression = e.law("equation")
+    used = {name: e.meaning(name) for name in sorted(symbols_of([expression]))}
+    for name, meant in used.items():
+        if meant.level == 2:
+            what = "acceleration" if meant.kind == "marker" else meant.kind
+            remedy = "a constraint knows t, inputs, coordinates, velocities"
+            e.fault("equation", f"the {what} {name!r} cannot stand here", remedy)
+        if meant.kind == "energy":
+            remedy = "a constraint is an equation of the motion"
+            e.fault("equation", f"the energy {name!r} cannot stand here", remedy)
+    moving = [meant for meant in used.values() if meant.level is not None]
+    rates = [name for name, meant in used.items() if meant.level == 1]
+    if not moving and not e.at_fault("equation"):
+        e.fault("equation", "there is no coordinate in it", f"coordinates: {', '.join(e.known('coordinate'))}")
+    if {*rates} & symbols_of(gradient(expression, [e.graph.symbol(name) for name in rates])):
+        message = f"it is not linear in {', '.join(rates)}"
+        e.fault("equation", message, "a nonholonomic constraint is linear in the velocities")
+    kind = "length" if any(meant.measure == "length" for meant in moving) else "angle"
+    return Equation(e.name, expression, kind, VELOCITY if rates else POSITION)
+
+
+TYPES = table(
+    ElementType(
+        "coupling",
+        "a relation between coordinates: a linear one, or any equation.",
+        {
+            "coordinates": Field("factors", "coordinate -> factor: the sum of factor times coordinate is the offset"),
+            "offset": Field("expression", "offset of the sum, an expression of parameters", default=0),
+            "equation": Field(
+                "expression",
+                "instead, what is held at 0: of t, parameters, coordinates, places of markers; with velocities, in "
+                "which it must be linear, the constraint is nonholonomic",
+                level=OUTPUT,
+            ),
+        },
+        _coupling,
+        one_of=("coordinates", "equation"),
+    )
+)

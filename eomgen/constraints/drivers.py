@@ -9,12 +9,20 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
+from ..graph.substitute import symbols_of
+from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .base import Condition, Constraint, View, on_two_bodies
+
+#: Kinds of tables whose second derivative jumps between points.
+ROUGH = ("monotone",)
 
 
 @dataclass(frozen=True)
@@ -86,3 +94,73 @@ class AngleDriver(Driver):
 
     def is_defined(self, view: View) -> bool:
         return view.turn(self.start, self.end)[2]
+
+
+def _driver(e: Entry) -> Driver | None:
+    value = _value(e)
+    if "marker" not in e.values:
+        for key in ("axis", "on"):
+            e.refuse(key, "belongs to a driver of a marker")
+    if "coordinate" in e.values:
+        found = e.coordinate("coordinate")
+        if found is not None and found.kind == "parameter":
+            message = f"{found.name!r} is an Euler parameter, which cannot move on its own"
+            e.fault("coordinate", message, "drive an angle or markers, or use Euler angles")
+        return None if found is None else CoordinateDriver(e.name, value, e.symbol(found), found.kind)
+    if "marker" in e.values:
+        marker, on, axis = e.marker("marker"), e.marker("on"), e.axis("axis")
+        if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
+            return None
+        return PlaceDriver(e.name, value, marker, axis, on)
+    key = "between" if "between" in e.values else "angle"
+    pair = e.pair(key)
+    if pair is None or not on_two_bodies(e, key, *pair):
+        return None
+    return (DistanceDriver if key == "between" else AngleDriver)(e.name, value, *pair)
+
+
+def _value(e: Entry) -> Expr:
+    """The motion: an expression of t, parameters, inputs and functions that are smooth enough."""
+    value, graph = e.law("value"), e.graph
+    for name in sorted(symbols_of([value])):
+        kind = e.meaning(name).kind
+        if kind not in ("", "time", "parameter", "input"):
+            remedy = "a driver moves by t, parameters and inputs; a coupling relates coordinates"
+            e.fault("value", f"the {kind} {name!r} cannot stand here", remedy)
+    called = {graph.nodes[i][0] for i in reachable(graph, [value.id])} & graph.calls.keys()
+    for function, orders in (graph.calls[operation] for operation in sorted(called)):
+        table_kind = e.table_kind(function.name)
+        if table_kind is not None and (table_kind in ROUGH or any(orders)):
+            derived = f"of the derivative of table {function.name!r}"
+            what = derived if any(orders) else f"of {table_kind} table {function.name!r}"
+            remedy = "take the value of a table of kind cubic, natural or periodic, whose curvature is continuous"
+            e.fault("value", f"the acceleration {what} jumps at its points", remedy)
+    return value
+
+
+TYPES = table(
+    ElementType(
+        "driver",
+        "a motion prescribed over time: of a coordinate, a distance, an angle or the place of a marker.",
+        {
+            "coordinate": Field("joint", "a joint of one degree, or a coordinate, that is driven"),
+            "value": Field(
+                "expression",
+                "motion over time (rad or m), of t, parameters, inputs, functions; its second derivative should be "
+                "continuous",
+                required=True,
+                level=MOTION,
+            ),
+            "between": Field("pair", "two markers whose distance is driven; they must not meet"),
+            "angle": Field(
+                "pair",
+                "two markers with z axes that stay in line; the turn of the second about z of the first is driven",
+            ),
+            "marker": Field("marker", "a marker of which one coordinate is driven"),
+            "axis": Field("axis", "along which the marker's place counts, in the axes of on", default="x"),
+            "on": Field("marker", "from where the marker's place counts (ground)", default="ground"),
+        },
+        _driver,
+        one_of=("coordinate", "between", "angle", "marker"),
+    )
+)

@@ -1,10 +1,13 @@
-"""Constraint elements: gear pairs, planetary sets, racks and belts, as relations between coordinates."""
+"""Constraint elements: gear pairs, racks and belts, as relations between coordinates."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from ..graph.core import Expr
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
+from ..graph.core import Expr, sin
 from ..records import dataclass
 from .base import Condition, Constraint, View
 
@@ -57,45 +60,88 @@ class Rack(Constraint):
         return [Condition("travel", self.rack - self.radius * self.pinion - self.offset, "length")]
 
 
-@dataclass(frozen=True)
-class Planetary(Constraint):
-    """A planetary set; angles of sun, ring and carrier from the frame, that of the planet from the carrier.
+def _ratio(e: Entry) -> Expr | None:
+    """Second size over the first, by radii, teeth or sines of cone angles."""
+    key = next((key for key in ("radii", "teeth", "cones") if key in e.values), "radii")
+    sizes = e.several(key, 2)
+    for k, size in enumerate(sizes or ()):
+        e.judge(f"{key}[{k}]", size, lambda x: x > 0, "give a size greater than 0")
+    if sizes is None or e.at_fault(key):
+        return None
+    a, b = (sin(x) for x in sizes) if key == "cones" else sizes
+    return b / a
 
-    Sun and planet mesh outside, ring and planet inside (Willis; Norton, Design of Machinery, sec. 9.9):
 
-        r_s (sun - carrier) + r_p planet = 0,    r_r (ring - carrier) - r_p planet = 0,
+def _gear(e: Entry) -> Gear | None:
+    pair, ratio = e.two_coordinates("joints", "angle"), _ratio(e)
+    if pair is None or ratio is None:
+        return None
+    ratio = -ratio if e.flag("internal") else ratio
+    return Gear(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"))
 
-    and, without the planet, their sum r_s sun + r_r ring = (r_s + r_r) carrier.  A wheel that is fixed to the frame has
-    the angle 0; one whose radius is None is not there.
-    """
 
-    type_name: ClassVar[str] = "planetary"
-    written: ClassVar[bool] = True
-    sun: Expr
-    ring: Expr
-    carrier: Expr
-    planet: Expr | None  #: angle from the carrier; None if the planets are not bodies of the model
-    sun_radius: Expr | None
-    ring_radius: Expr | None
-    planet_radius: Expr | None
-    phase: Expr
+def _belt(e: Entry) -> Belt | None:
+    pair, ratio = e.two_coordinates("joints", "angle"), _ratio(e)
+    if pair is None or ratio is None:
+        return None
+    ratio = ratio if e.flag("crossed") else -ratio
+    return Belt(e.name, e.symbol(pair[0]), e.symbol(pair[1]), ratio, e.law("phase"))
 
-    def conditions(self, view: View) -> list[Condition]:
-        r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
-        rows: list[Condition] = []
-        if self.planet is None:
-            if r_s is not None and r_r is not None:
-                mean = (r_s * self.sun + r_r * self.ring) / (r_s + r_r)
-                rows.append(Condition("ratio", mean - self.carrier - self.phase, "angle"))
-            return rows
-        if r_p is None and r_s is not None and r_r is not None:
-            r_p = 0.5 * (r_r - r_s)
-        if r_p is None:
-            return rows
-        if r_s is not None:
-            sun = r_s / r_p * (self.sun - self.carrier) + self.planet
-            rows.append(Condition("sun_mesh", sun - self.phase, "angle"))
-        if r_r is not None:
-            ring = r_r / r_p * (self.ring - self.carrier) - self.planet
-            rows.append(Condition("ring_mesh", ring, "angle"))
-        return rows
+
+def _rack(e: Entry) -> Rack | None:
+    pinion, travel = e.coordinate("pinion", "angle"), e.coordinate("rack", "length")
+    if pinion is None or travel is None:
+        return None
+    e.require_one_carrier("", pinion, travel)
+    return Rack(e.name, e.symbol(pinion), e.symbol(travel), e.law("radius"), e.law("offset"))
+
+
+_JOINTS = Field("joints", "two joints of one degree, or coordinates, whose axes one part carries", required=True)
+_RADII = Field("two", "base or pitch circle radii (m), in the order of the joints")
+_TEETH = Field("two", "numbers of teeth")
+_PHASE = Field("expression", "first angle where the second is 0 (rad)", default=0)
+_JOINT = Field("joint", "a joint of one degree, or a coordinate", required=True)
+
+TYPES = table(
+    ElementType(
+        "gear",
+        "two gears that mesh: r_a a + r_b b = r_a phase, with a minus where one is internal.",
+        {
+            "joints": _JOINTS,
+            "radii": _RADII,
+            "teeth": _TEETH,
+            "cones": Field(
+                "two",
+                "pitch cone angles of a bevel pair (rad), both z axes pointing away from where they meet, or to it",
+            ),
+            "internal": Field("flag", "whether both turn the same way", default=False),
+            "phase": _PHASE,
+        },
+        _gear,
+        one_of=("radii", "teeth", "cones"),
+    ),
+    ElementType(
+        "rack",
+        "a pinion that rolls on a rack: s = radius angle + offset (m).",
+        {
+            "pinion": _JOINT._replace(doc="joint of the pinion"),
+            "rack": _JOINT._replace(doc="joint of the rack"),
+            "radius": Field("expression", "radius (m); negative if the rack moves the other way", required=True),
+            "offset": Field("expression", "travel where the pinion's angle is 0 (m)", default=0),
+        },
+        _rack,
+    ),
+    ElementType(
+        "belt",
+        "a belt without slip on two pulleys: r_a a = r_b b, with a minus where it crosses.",
+        {
+            "joints": _JOINTS,
+            "radii": _RADII,
+            "teeth": _TEETH,
+            "crossed": Field("flag", "whether the belt crosses, so that the pulleys turn opposite ways", default=False),
+            "phase": _PHASE,
+        },
+        _belt,
+        one_of=("radii", "teeth"),
+    ),
+)

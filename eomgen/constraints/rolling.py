@@ -9,12 +9,15 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import VELOCITY, Condition, Constraint, View
+from .base import VELOCITY, Condition, Constraint, View, on_two_bodies
 
 #: What is wrong where the lowest point of a disc is not defined.
 LYING = "the disc lies flat (axle along the plane's normal)"
@@ -126,3 +129,52 @@ class KnifeEdge(Constraint):
         under = vec.add(view.velocity(self.on), vec.cross(view.angular_velocity(self.on), apart))
         slip = vec.dot(sideways, vec.sub(view.velocity(self.marker), under))
         return [Condition("slip", slip, "length", VELOCITY)]
+
+
+def _rolling(e: Entry) -> Constraint | None:
+    shape, wheel, plane, radius = e.choice("shape"), e.marker("wheel"), e.marker("plane"), e.positive("radius")
+    if shape == "sphere":
+        e.refuse("tube", "a sphere has no edge")
+    else:
+        e.refuse("no_spin", "only a sphere turns about the normal without slip along the plane")
+    if wheel is None or plane is None or not on_two_bodies(e, "plane", wheel, plane):
+        return None
+    if shape == "sphere":
+        return RollingSphere(e.name, wheel, plane, radius, e.flag("no_spin"))
+    return RollingDisc(e.name, wheel, plane, radius, e.law("tube"))
+
+
+def _knife_edge(e: Entry) -> Constraint | None:
+    marker, on, axis = e.marker("marker"), e.marker("on"), e.axis("axis")
+    if marker is None or on is None or not on_two_bodies(e, "on", marker, on):
+        return None
+    return KnifeEdge(e.name, marker, axis, on)
+
+
+TYPES = table(
+    ElementType(
+        "rolling",
+        "a wheel or ball that rolls on a plane without slip.",
+        {
+            "wheel": Field("marker", "marker at the centre; z is the axle of a disc", required=True),
+            "plane": Field(
+                "marker", "marker in the plane; z is its normal, on the side of the wheel (ground)", default="ground"
+            ),
+            "radius": Field("expression", "radius (m)", required=True),
+            "shape": Field("choice", "shape of the wheel", default="disc", choices=("disc", "sphere")),
+            "tube": Field("expression", "radius of the rounded edge of a disc, 0 for a sharp one (m)", default=0),
+            "no_spin": Field("flag", "whether a sphere cannot turn about the normal", default=False),
+        },
+        _rolling,
+    ),
+    ElementType(
+        "knife_edge",
+        "a blade: a marker that does not move along an axis of its own.",
+        {
+            "marker": Field("marker", "where the blade touches", required=True),
+            "axis": Field("axis", "direction without motion, in the marker's axes", default="y"),
+            "on": Field("marker", "the body on which it moves (ground)", default="ground"),
+        },
+        _knife_edge,
+    ),
+)

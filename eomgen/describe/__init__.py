@@ -2,14 +2,12 @@
 
 from .builder import Builder
 from .description import Description
-from .fields import FORCE as FORCE_FIELDS
 from .handles import BodyHandle, JointHandle, MarkerHandle
 from .mechanism import Mechanism
 from .schema import model_schema
 from .yaml_file import describe_yaml_file
 
 __all__ = [
-    "FORCE_FIELDS",
     "BodyHandle",
     "Builder",
     "Description",

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from ..constraints import CONSTRAINTS
 from ..errors import ModelError
+from ..forces import FORCES
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -15,16 +17,16 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from .build_cam_points import declare_contacts
-from .build_constraints import build_constraints
+from .build_elements import build_elements
 from .build_equations import build_equations, check_energies, declare_equations
 from .build_events import build_events
-from .build_forces import build_forces
 from .build_functions import build_functions
 from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, Description, Entry, Faults, items
+from .element_entry import Surroundings
 from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .inertia import read_body
@@ -81,10 +83,11 @@ def build(description: Description) -> Mechanism:
     inputs = tuple(_with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
     bodies = _bodies(reader, sections["bodies"])
     joints = build_joints(reader, specs)
-    forces = build_forces(reader, sections["forces"], specs, bodies, parameters)
+    around = Surroundings(reader, specs, joints, bodies, contacts)
+    forces = build_elements(around, "force", sections["forces"], FORCES)
     lagrangian = build_lagrangian(reader, lagrangian_values)
     given = build_equations(reader, given_values)
-    constraints = build_constraints(reader, sections["constraints"], specs, joints, contacts, len(bodies))
+    constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
     gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
     outputs = _outputs(reader, sections["outputs"])
     events = build_events(reader, sections["events"])

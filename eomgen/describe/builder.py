@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Self
 
+from ..constraints import CONSTRAINTS
+from ..forces import FORCES
 from ..joints import JOINTS
 from .build import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
-from .fields import FORCE as FORCE_FIELDS
-from .fields_constraints import CONSTRAINT
+from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
-from .model_constraints import ConstraintMethods
-from .model_forces import ForceMethods
 from .model_functions import FunctionMethods
 from .model_joints import JointMethods
 from .model_totals import TotalMethods
@@ -28,7 +27,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Builder(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, FunctionMethods, TotalMethods):
+class Builder(BodyMethods, JointMethods, ElementMethods, FunctionMethods, TotalMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
@@ -293,7 +292,7 @@ class Builder(BodyMethods, JointMethods, ForceMethods, ConstraintMethods, Functi
 
         near = suggestion(name, [n for n in dir(type(self)) if not n.startswith("_")])
         hint = near or (
-            f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCE_FIELDS)}; constraints: {', '.join(CONSTRAINT)}"
+            f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"
         )
         raise AttributeError(f"a Model has no attribute {name!r}; {hint}")
 

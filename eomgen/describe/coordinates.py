@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
+from ..elements.entry import Found
 from ..graph.shown import quoted, shown
 from .build_joints import Declared
 from .names import nearest
 from .reading import Reader
 from .sympy_face import name_of
-
-
-class Found(NamedTuple):
-    """A coordinate: its name, 'angle' or 'length', and the joint it belongs to (None: a bare Lagrangian's own)."""
-
-    name: str
-    kind: str
-    joint: str | None
 
 
 def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value: Any) -> Found | None:

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from itertools import product
 
+from ..elements.field import CONSTANT as CONSTANT
+from ..elements.field import MOTION as MOTION
+from ..elements.field import NUMBER as NUMBER
+from ..elements.field import OUTPUT as OUTPUT
+from ..elements.field import Field as Field
+from ..elements.field import Fields as Fields
 from ..joints import JOINTS
 from ..numeric.splines import KINDS as TABLES
 from ..solids import SOLIDS
-from .field import CONSTANT as CONSTANT
-from .field import MOTION as MOTION
-from .field import NUMBER as NUMBER
-from .field import OUTPUT as OUTPUT
-from .field import Field as Field
-from .field import Fields as Fields
-from .force_fields import FORCE as FORCE
-from .force_fields import ONE_OF as ONE_OF
-from .force_fields import force_fields as force_fields
 from .mechanism import Simulation
 
 #: kind -> how a message describes it

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..constraints import CONSTRAINTS
+from ..constraints.planetary import WHEELS
+from ..elements.element_type import Types
+from ..forces import FORCES
 from ..joints import JOINTS
 from ..numeric.inertia import CHECKS
 from .fields import (
@@ -13,7 +17,6 @@ from .fields import (
     DISPLAY,
     EQUATIONS,
     EVENT,
-    FORCE,
     FUNCTION,
     GROUND,
     INERTIA,
@@ -22,7 +25,6 @@ from .fields import (
     LIMITS,
     MARKER,
     MODEL,
-    ONE_OF,
     OUTPUT_FIELDS,
     PARAMETER,
     PLACED,
@@ -32,12 +34,10 @@ from .fields import (
     SOLID,
     Field,
     Fields,
-    force_fields,
     function_fields,
     joint_fields,
     solid_fields,
 )
-from .fields_constraints import CONSTRAINT, ONE_OF_CONSTRAINT, WHEELS, constraint_fields
 from .names import LONGEST
 
 Schema = dict[str, Any]
@@ -186,17 +186,10 @@ def _body() -> Schema:
     return {**_table(BODY), "anyOf": given}
 
 
-def _force(type_name: str) -> Schema:
-    schema = _typed(force_fields(type_name), type_name)
-    if type_name in ONE_OF:
-        schema["oneOf"] = [{"required": [key]} for key in ONE_OF[type_name]]
-    return schema
-
-
-def _constraint(type_name: str) -> Schema:
-    schema = _typed(constraint_fields(type_name), type_name)
-    if type_name in ONE_OF_CONSTRAINT:
-        schema["oneOf"] = [{"required": [key]} for key in ONE_OF_CONSTRAINT[type_name]]
+def _element(what: str, types: Types, type_name: str) -> Schema:
+    schema = _typed(types[type_name].fields(what, types), type_name)
+    if types[type_name].one_of:
+        schema["oneOf"] = [{"required": [key]} for key in types[type_name].one_of]
     return schema
 
 
@@ -234,8 +227,10 @@ def model_schema() -> dict[str, Any]:
         ),
         "bodies": _section(_body(), MODEL["bodies"].doc),
         "joints": _section({"oneOf": [_typed(joint_fields(name), name) for name in JOINTS]}, MODEL["joints"].doc),
-        "forces": _section({"oneOf": [_force(name) for name in FORCE]}, MODEL["forces"].doc),
-        "constraints": _section({"oneOf": [_constraint(name) for name in CONSTRAINT]}, MODEL["constraints"].doc),
+        "forces": _section({"oneOf": [_element("force", FORCES, name) for name in FORCES]}, MODEL["forces"].doc),
+        "constraints": _section(
+            {"oneOf": [_element("constraint", CONSTRAINTS, name) for name in CONSTRAINTS]}, MODEL["constraints"].doc
+        ),
         "outputs": _section(_short("outputs", OUTPUT_FIELDS), MODEL["outputs"].doc),
         "events": _section(_short("events", EVENT), MODEL["events"].doc),
         "lagrangian": {**_table(LAGRANGIAN), "description": MODEL["lagrangian"].doc},

@@ -1,4 +1,4 @@
-"""Stage describe, one field: what a key of a section holds and what its expressions may depend on."""
+"""Elements, one field: what a key of an entry holds and what its expressions may depend on."""
 
 from __future__ import annotations
 

@@ -1,38 +1,24 @@
-"""Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the literal table of the classes."""
+"""Force elements: geometry (a path or a marker) times a law; :data:`FORCES` is the table of their types."""
 
+from ..elements.element_type import ElementType, Types
+from . import actuators, attraction, bushing, contact, friction, laws, muscle, springs, stops
+from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
 from .base import CoordinateLoad, Force, Load, MarkerLoad, View
 from .bushing import Bushing
-from .contact import Contact, PointPlane, SpherePlane, SphereSphere
-from .elements import Actuator, BodyTorque, Damper, PointForce, Spring
+from .contact import Contact, SpherePlane, SphereSphere
 from .friction import Friction, JointFriction
-from .laws import Element, TorsionalElement
+from .laws import Element
 from .muscle import Muscle
 from .normal_laws import HuntCrossley
 from .paths import JointCoordinate, Line, Path, Turn
-from .routes import Cylinder, Route
+from .routes import Route
+from .springs import Damper, Spring
 from .stops import JointStop
 
-FORCES: dict[str, type[Force]] = {
-    force.type_name: force
-    for force in (
-        Spring,
-        Damper,
-        Actuator,
-        Element,
-        TorsionalElement,
-        PointForce,
-        BodyTorque,
-        Bushing,
-        PointGravity,
-        JointFriction,
-        JointStop,
-        PointPlane,
-        SpherePlane,
-        SphereSphere,
-        Muscle,
-    )
-}
+FORCES: Types = {}
+for _home in (actuators, springs, laws, bushing, attraction, friction, stops, contact, muscle):
+    FORCES |= _home.TYPES
 
 __all__ = [
     "FORCES",
@@ -41,9 +27,9 @@ __all__ = [
     "Bushing",
     "Contact",
     "CoordinateLoad",
-    "Cylinder",
     "Damper",
     "Element",
+    "ElementType",
     "Force",
     "Friction",
     "HuntCrossley",
@@ -57,12 +43,10 @@ __all__ = [
     "Path",
     "PointForce",
     "PointGravity",
-    "PointPlane",
     "Route",
     "SpherePlane",
     "SphereSphere",
     "Spring",
-    "TorsionalElement",
     "Turn",
     "View",
 ]

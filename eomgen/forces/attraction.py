@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from ..frames import Marker
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
+from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
@@ -30,7 +31,6 @@ class PointGravity(Force):
     The opposite wrench acts on the body of the centre; two bodies attract each other if mu = G times the mass there.
     """
 
-    type_name: ClassVar[str] = "point_gravity"
     center: Marker
     body: Marker  #: at the centre of mass, in the body's axes
     mu: Expr
@@ -68,3 +68,36 @@ class PointGravity(Force):
             _, along, trace = self._second(view, u)
             energy = energy - 0.5 * self.mu / r**3 * (trace - 3.0 * along)
         return energy
+
+
+def _point_gravity(e: Entry) -> PointGravity | None:
+    center = e.marker("center") if "center" in e.values else None
+    mu, extent, found = e.positive("mu"), e.choice("extent"), e.body("body")
+    if found is None:
+        return None
+    index, body = found
+    if center is not None and center.body == index:
+        e.fault("center", f"lies on {body.name!r} itself", "give a marker of ground or of another body")
+    marker = Marker(index, Frame(vec.identity(e.graph), body.com), f"{body.name} at its centre of mass")
+    inertia = body.inertia if extent == "maccullagh" else None
+    return None if center is None else PointGravity(e.name, center, marker, mu, body.mass, inertia)
+
+
+TYPES = table(
+    ElementType(
+        "point_gravity",
+        "the gravity of a point on a body, whose reaction acts at the point.",
+        {
+            "center": Field("marker", "what attracts", required=True),
+            "body": Field("name", "the body that is attracted, at its centre of mass", required=True),
+            "mu": Field("expression", "gravitational parameter G M of the centre (m^3/s^2)", required=True),
+            "extent": Field(
+                "choice",
+                "the body as a point, or with its inertia to second order: gravity-gradient torque and its force",
+                default="point",
+                choices=("point", "maccullagh"),
+            ),
+        },
+        _point_gravity,
+    )
+)

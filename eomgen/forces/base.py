@@ -54,7 +54,6 @@ Load = MarkerLoad | CoordinateLoad
 class Force(ABC):
     """A force element.  ``name`` is the user's; a subclass adds its markers and laws."""
 
-    type_name: ClassVar[str]
     uses_value: ClassVar[bool] = False  #: whether its law looks at the value of its path, not at the rate alone
     name: str
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from itertools import combinations
+from typing import cast
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .base import Force, Load, MarkerLoad, View
+from .paths import BETWEEN
 
 Row6 = tuple[Expr, Expr, Expr, Expr, Expr, Expr]
 Mat6 = tuple[Row6, Row6, Row6, Row6, Row6, Row6]
@@ -26,7 +31,6 @@ class Bushing(Force):
     its opposite at the same point on the first body.  K is symmetric; V = y^T K y / 2.
     """
 
-    type_name: ClassVar[str] = "bushing"
     first: Marker
     second: Marker
     stiffness: Mat6
@@ -96,3 +100,37 @@ def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
             total = total + entry * x
         result.append(total)
     return result
+
+
+def _bushing(e: Entry) -> Bushing | None:
+    pair, stiffness, damping = e.pair(), e.matrix("stiffness", 6), e.matrix("damping", 6)
+    for i, j in combinations(range(6), 2) if stiffness is not None else ():
+        difference = cast(Mat6, stiffness)[j][i] - cast(Mat6, stiffness)[i][j]
+        if difference.is_zero:
+            continue
+        if difference.value is not None:
+            e.fault(f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal")
+        else:
+            e.judge(f"stiffness[{j}][{i}]", difference, lambda x: x == 0, "less [j][i]; they must be equal")
+    if pair is None or stiffness is None or damping is None:
+        return None
+    return Bushing(e.name, *pair, cast(Mat6, stiffness), cast(Mat6, damping))
+
+
+TYPES = table(
+    ElementType(
+        "bushing",
+        "a bushing: displacements of the second marker from the first, in its axes, times full matrices.",
+        {
+            "between": BETWEEN._replace(required=True),
+            "stiffness": Field(
+                "matrix6",
+                "six values for the diagonal, three of forces and three of torques, or a symmetric 6 x 6 matrix "
+                "(N/m, N, N m/rad)",
+                required=True,
+            ),
+            "damping": Field("matrix6", "the same per velocity", default=(0,) * 6, level=MOTION),
+        },
+        _bushing,
+    )
+)

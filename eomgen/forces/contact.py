@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field, Fields
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .base import Force, Load, MarkerLoad, View
-from .friction import Friction
-from .normal_laws import HuntCrossley
+from .friction import FRICTION, Friction, read_friction
+from .normal_laws import NORMAL, HuntCrossley, read_normal_law
 
 #: Normal (ground axes, from the first body to the second), penetration (m), arms of the contact point from the markers.
 Touch = tuple[Vec3, Expr, Vec3, Vec3]
@@ -82,7 +84,6 @@ class SpherePlane(Contact):
     A radius of 0 makes it a point.
     """
 
-    type_name: ClassVar[str] = "sphere_plane"
     radius: Expr
 
     def touch(self, view: View) -> Touch:
@@ -94,17 +95,9 @@ class SpherePlane(Contact):
 
 
 @dataclass(frozen=True)
-class PointPlane(SpherePlane):
-    """A point, the second marker's origin, on the plane through the first marker."""
-
-    type_name: ClassVar[str] = "point_plane"
-
-
-@dataclass(frozen=True)
 class SphereSphere(Contact):
     """Two spheres about the markers; undefined where their centres coincide."""
 
-    type_name: ClassVar[str] = "sphere_sphere"
     radii: tuple[Expr, Expr]
 
     def touch(self, view: View) -> Touch:
@@ -115,3 +108,55 @@ class SphereSphere(Contact):
         first = vec.scale(self.radii[0] - 0.5 * depth, normal)
         second = vec.scale(0.5 * depth - self.radii[1], normal)
         return normal, depth, first, second
+
+
+def _friction(e: Entry) -> Friction | None:
+    return read_friction(e, "friction", "static_friction", "viscous_friction")
+
+
+def _on_plane(e: Entry) -> SpherePlane | None:
+    pair, law, friction = e.pair(), read_normal_law(e), _friction(e)
+    radius = e.positive("radius") if "radius" in e.fields else e.graph.zero
+    return None if pair is None else SpherePlane(e.name, *pair, law, friction, radius)
+
+
+def _two_spheres(e: Entry) -> SphereSphere | None:
+    pair, law, friction, radii = e.pair(), read_normal_law(e), _friction(e), e.several("radii", 2)
+    if pair is None or radii is None:
+        return None
+    for k, radius in enumerate(radii):
+        e.judge(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
+    return SphereSphere(e.name, *pair, law, friction, (radii[0], radii[1]))
+
+
+_ENDS = "the plane (z points out of the solid) and the {0}"
+_CONTACT: Fields = {**NORMAL, **FRICTION}
+
+TYPES = table(
+    ElementType(
+        "point_plane",
+        "contact of a point, the second marker, with the plane of the first, z pointing out of the solid.",
+        {"between": Field("pair", _ENDS.format("point"), required=True), **_CONTACT},
+        _on_plane,
+    ),
+    ElementType(
+        "sphere_plane",
+        "contact of a sphere about the second marker with the plane of the first, z pointing out of the solid.",
+        {
+            "between": Field("pair", _ENDS.format("sphere's centre"), required=True),
+            "radius": Field("expression", "radius of the sphere (m)", required=True),
+            **_CONTACT,
+        },
+        _on_plane,
+    ),
+    ElementType(
+        "sphere_sphere",
+        "contact of two spheres about two markers.",
+        {
+            "between": Field("pair", "the centres", required=True),
+            "radii": Field("radii", "radii of the spheres (m)", required=True),
+            **_CONTACT,
+        },
+        _two_spheres,
+    ),
+)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field, Fields
 from ..graph.core import Expr
 from ..records import dataclass
 from .base import Force, Load, View
-from .paths import Path
+from .paths import ON_JOINT, Path, read_coordinate
+from .springs import Damper
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,69 @@ class JointFriction(Force):
     depend on the joint's reactions, unless the coefficients are given so.
     """
 
-    type_name: ClassVar[str] = "friction"
     path: Path
     law: Friction
 
     def loads(self, view: View) -> list[Load]:
         _, rate = self.path.measure(view)
         return self.path.loads(view, -self.law.along(rate))
+
+
+#: Of contacts, as parts of the normal force.
+FRICTION: Fields = {
+    "friction": Field("expression", "coefficient of sliding friction", level=MOTION),
+    "static_friction": Field("expression", "coefficient at the onset of sliding; needs stribeck", level=MOTION),
+    "stribeck": Field("expression", "sliding velocity (m/s) over which static friction falls to sliding friction"),
+    "viscous_friction": Field("expression", "friction per normal force and velocity (s/m)", default=0, level=MOTION),
+    "smoothing": Field("expression", "sliding velocity (m/s) below which friction is smoothed"),
+}
+
+
+def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool = False) -> Friction | None:
+    """Dry friction from the keys of its parts; None without Coulomb's part, beside which viscous may stand alone."""
+    if dynamic not in e.values:
+        for key in (static, "stribeck", "smoothing", *(() if alone else (viscous,))):
+            if key in e.values:
+                e.fault(key, f"there is no {dynamic}", f"give {dynamic}, or leave it out")
+        return None
+    level = e.law(dynamic)
+    e.judge(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
+    if "smoothing" not in e.values:
+        e.fault("smoothing", "is missing", "give the velocity below which friction is smoothed")
+        return None
+    if (static in e.values) != ("stribeck" in e.values):
+        missing = "stribeck" if static in e.values else static
+        e.fault(missing, "is missing", f"{static} and stribeck go together")
+        return None
+    onset = e.given(static)
+    if onset is not None:
+        e.judge(static, onset, lambda x: x >= 0, "must be 0 or greater")
+    stribeck = e.positive("stribeck") if "stribeck" in e.values else None
+    return Friction(level, e.positive("smoothing"), e.law(viscous), onset, stribeck)
+
+
+def _joint_friction(e: Entry) -> Force | None:
+    path, viscous = read_coordinate(e), e.law("viscous")
+    dry = read_friction(e, "coulomb", "static", "viscous", alone=True)
+    if dry is None and "viscous" not in e.values and not e.at_fault():
+        e.fault("", "has no law", "give viscous, or coulomb and smoothing, or both")
+    if path is None:
+        return None
+    return Damper(e.name, path, viscous) if dry is None else JointFriction(e.name, path, dry)
+
+
+TYPES = table(
+    ElementType(
+        "friction",
+        "friction of a joint's coordinate: viscous, Coulomb's with Stribeck's effect, or both.",
+        {
+            "joint": ON_JOINT._replace(required=True),
+            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", default=0, level=MOTION),
+            "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION),
+            "static": Field("expression", "friction at the onset of sliding; needs stribeck", level=MOTION),
+            "stribeck": Field("expression", "velocity over which static friction falls to Coulomb's (rad/s or m/s)"),
+            "smoothing": Field("expression", "velocity below which Coulomb friction is smoothed (rad/s or m/s)"),
+        },
+        _joint_friction,
+    )
+)

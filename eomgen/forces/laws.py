@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field, Fields
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
 from ..records import dataclass
 from .base import Force, Load, View
-from .paths import Path
+from .paths import BETWEEN, ON_JOINT, Path, read_angle
+from .routes import VIA, read_joint_or_path
 
 
 @dataclass(frozen=True)
@@ -20,7 +25,6 @@ class Element(Force):
     law for the path's.  Only the potential V(value) counts as energy; the law is taken as it is, conservative or not.
     """
 
-    type_name: ClassVar[str] = "element"
     uses_value: ClassVar[bool] = True
     path: Path
     value: Expr
@@ -45,8 +49,54 @@ class Element(Force):
         return [] if self.law.is_zero else self.path.loads(view, self._here(view, self.law))
 
 
-@dataclass(frozen=True)
-class TorsionalElement(Element):
-    """The same of an angle (N m)."""
+def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], Element | None]:
+    """The law knows ``length`` or ``angle``, and ``rate``."""
 
-    type_name: ClassVar[str] = "torsional_element"
+    def read(e: Entry) -> Element | None:
+        where = path(e)
+        if "law" not in e.values and "potential" not in e.values:
+            e.fault("", "has no law", "give law, potential or both")
+        on = e.coordinate("joint") if "joint" in e.values and where is not None else None
+        word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
+        value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
+        law, energy = e.law("law", {word: value, "rate": rate}), e.law("potential", {word: value})
+        return None if where is None else Element(e.name, where, value, rate, law, energy)
+
+    return read
+
+
+def _law(of: str, unit: str) -> Fields:
+    return {
+        "law": Field(
+            "expression",
+            f"{unit} that drives the coordinate up or pushes the markers apart, of {of}, rate and all that forces know",
+            default=0,
+            level=MOTION,
+        ),
+        "potential": Field(
+            "expression", f"potential energy V of {of} (J); the force -dV/d{of} comes with it", default=0
+        ),
+    }
+
+
+TYPES = table(
+    ElementType(
+        "element",
+        "a force of any law along a joint's coordinate, the line between two markers, or a path.",
+        {
+            "joint": ON_JOINT,
+            "between": BETWEEN,
+            **_law("length", "force (N; of angle, N m, where the coordinate is one)"),
+            "via": VIA,
+        },
+        _element(read_joint_or_path, False),
+        one_of=("joint", "between"),
+    ),
+    ElementType(
+        "torsional_element",
+        "a torque of any law on an angle: of a joint, or of the second marker about the z axis of the first.",
+        {"joint": ON_JOINT, "between": BETWEEN, **_law("angle", "torque (N m)")},
+        _element(read_angle, True),
+        one_of=("joint", "between"),
+    ),
+)

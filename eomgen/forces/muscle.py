@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
 from .base import Force, Load, View
-from .paths import Path
+from .paths import BETWEEN, Path
+from .routes import VIA, read_path
 
 # Constants of the curves: De Groote, Kinney, Rao and Fregly (2016), Evaluation of direct collocation optimal control
 # problem formulations for solving the muscle redundancy problem, Ann. Biomed. Eng. 44, 2922-2936, supplement.
@@ -54,7 +58,6 @@ class Muscle(Force):
     outside.  The thickness of the muscle, l_opt sin alpha_opt, stays.
     """
 
-    type_name: ClassVar[str] = "muscle"
     uses_value: ClassVar[bool] = True
     path: Path
     activation: Expr
@@ -81,3 +84,41 @@ class Muscle(Force):
     def loads(self, view: View) -> list[Load]:
         length, rate = self.path.measure(view)
         return self.path.loads(view, -self.tension(length, rate))
+
+
+#: Optimal lengths of the fibres in which they shorten in a second, at most: De Groote and others (2016).
+_SHORTENING = 10.0
+
+
+def _muscle(e: Entry) -> Muscle | None:
+    path, activation = read_path(e), e.law("activation")
+    e.judge("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
+    force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
+    velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else _SHORTENING * fiber_length
+    pennation, damping = e.law("pennation"), e.law("damping")
+    e.judge("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
+    if path is None:
+        return None
+    return Muscle(e.name, path, activation, force_max, fiber_length, slack_length, velocity_max, pennation, damping)
+
+
+TYPES = table(
+    ElementType(
+        "muscle",
+        "a Hill-type muscle with a rigid tendon (De Groote and others, 2016) from its origin to its insertion.",
+        {
+            "between": BETWEEN._replace(required=True),
+            "activation": Field("expression", "activation, 0 to 1", required=True, level=MOTION),
+            "force_max": Field("expression", "largest active force (N)", required=True),
+            "fiber_length": Field("expression", "optimal length of the fibres (m)", required=True),
+            "slack_length": Field("expression", "length of the tendon (m)", required=True),
+            "velocity_max": Field("expression", "fastest shortening of fibres (m/s), 10 lengths a second by default"),
+            "pennation": Field(
+                "expression", "angle of the fibres to the tendon at their optimal length (rad)", default=0
+            ),
+            "damping": Field("expression", "force at velocity_max over force_max", default=0.1),
+            "via": VIA,
+        },
+        _muscle,
+    )
+)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..elements.entry import Entry
+from ..elements.field import Field, Fields
 from ..graph.core import Expr
 from ..records import dataclass
 from .branches import beyond_zero
@@ -55,3 +57,47 @@ class HuntCrossley:
         """The potential of the elastic part, k d^(n + 1) / (n + 1) (J)."""
         power = self.exponent + 1.0
         return beyond_zero(depth, lambda d: self.stiffness * d**power / power)
+
+
+NORMAL: Fields = {
+    "stiffness": Field(
+        "expression",
+        "stiffness k in the force k d**n max(0, 1 + dissipation d_dot) of the penetration d (N/m**n)",
+        required=True,
+    ),
+    "exponent": Field("expression", "exponent n", default=1.5),
+    "dissipation": Field("expression", "dissipation (s/m); or give restitution and velocity"),
+    "restitution": Field("expression", "coefficient of restitution, from which the dissipation follows"),
+    "velocity": Field("expression", "velocity of impact (m/s) to which the restitution belongs"),
+    "formula": Field("choice", "how it follows", default=RESTITUTIONS[0], choices=RESTITUTIONS),
+}
+
+
+def read_normal_law(e: Entry) -> HuntCrossley:
+    """The law of the keys :data:`NORMAL`."""
+    stiffness, exponent = e.positive("stiffness"), e.law("exponent")
+    e.judge("exponent", exponent, lambda n: n >= 1, "must be at least 1, and more than 1 for a slope without a jump")
+    return HuntCrossley(stiffness, exponent, _dissipation(e))
+
+
+def _dissipation(e: Entry) -> Expr:
+    """Given as such, or through a coefficient of restitution; none of them means none."""
+    restitution, velocity = e.given("restitution"), e.given("velocity")
+    formula = e.choice("formula")
+    if "dissipation" in e.values:
+        for key in ("restitution", "velocity", "formula"):
+            if key in e.values:
+                e.fault(key, "the dissipation is given already", "leave out one of the two")
+        value = e.law("dissipation")
+        e.judge("dissipation", value, lambda x: x >= 0, "must be 0 or greater")
+        return value
+    if restitution is None and velocity is None:
+        if "formula" in e.values:
+            e.fault("formula", "there is no restitution", "give restitution and velocity, or leave it out")
+        return e.graph.zero
+    if restitution is None or velocity is None:
+        e.fault("velocity" if velocity is None else "restitution", "is missing", "restitution and velocity go together")
+        return e.stand_in
+    e.judge("restitution", restitution, lambda x: 0 < x <= 1, "must be greater than 0 and at most 1")
+    e.judge("velocity", velocity, lambda x: x > 0, "must be greater than 0")
+    return dissipation_of(restitution, velocity, formula)

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from ..elements.entry import Entry
+from ..elements.field import Field
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .base import CoordinateLoad, Load, MarkerLoad, View
+
+#: Keys that say along what a force acts.
+ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")
+BETWEEN = Field("pair", "two markers")
 
 
 @dataclass(frozen=True)
@@ -95,3 +101,26 @@ class JointCoordinate(Path):
 
     def loads(self, view: View, force: Expr) -> list[Load]:
         return [CoordinateLoad(self.name, force)]
+
+
+def read_coordinate(e: Entry, angle: bool = False) -> JointCoordinate | None:
+    """The coordinate meant by ``joint``: of a joint of one degree, or named itself."""
+    found = e.coordinate("joint") if "joint" in e.values else None
+    if found is None:
+        return None
+    if found.kind == "parameter":
+        remedy = "give the torque as a vector on the body: body: <body>, value: [x, y, z]"
+        e.fault("joint", f"{found.name!r} is an Euler parameter, which takes no torque", remedy)
+        return None
+    if angle and found.kind != "angle":
+        e.fault("joint", f"the coordinate {found.name!r} is a {found.kind}", "a torsional element acts on an angle")
+        return None
+    return JointCoordinate(found.name)
+
+
+def read_angle(e: Entry) -> Path | None:
+    """An angle: of a joint, or between two markers."""
+    if "joint" in e.values:
+        return read_coordinate(e, angle=True)
+    pair = e.pair() if "between" in e.values else None
+    return None if pair is None else Turn(*pair)

@@ -4,28 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..frames import Marker
+from ..elements.entry import Entry
+from ..elements.field import Field
+from ..frames import Cylinder, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
 from .base import Load, MarkerLoad, View
 from .branches import where
-from .paths import Line, Path
+from .paths import Line, Path, read_coordinate
 
 PI = 3.141592653589793
-
-
-@dataclass(frozen=True)
-class Cylinder:
-    """A smooth cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
-
-    The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.
-    """
-
-    marker: Marker
-    radius: Expr
-    sense: int
 
 
 class Piece(NamedTuple):
@@ -140,3 +130,22 @@ def _wrap(view: View, start: Marker, end: Marker, around: Cylinder) -> Piece:
         vec.sub(leave, arrive),
         chosen(torque, vec.zero(view.graph)),
     )
+
+
+VIA = Field("via", "markers that the path slides through and cylinders that it runs over, in order", default=())
+
+
+def read_path(e: Entry) -> Path | None:
+    """The line between two markers, or a path over what ``via`` lists."""
+    pair = e.pair() if "between" in e.values else None
+    via = e.via()
+    if pair is None or via is None:
+        return None
+    return Route(*pair, tuple(via)) if via else Line(*pair)
+
+
+def read_joint_or_path(e: Entry) -> Path | None:
+    """A joint's coordinate, or a line or path between markers."""
+    if "joint" in e.values and "via" in e.values:
+        e.fault("via", "a joint's coordinate has no path", "leave it out, or give between")
+    return read_coordinate(e) if "joint" in e.values else read_path(e)

@@ -1,16 +1,19 @@
-"""Force elements, their laws: springs, dampers, actuators along a path; forces and torques on a body."""
+"""Force elements, springs and dampers: linear laws along a path or on an angle."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
-from ..frames import Marker
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Force, Load, MarkerLoad, View
-from .paths import Line, Path
+from .base import Force, Load, View
+from .paths import BETWEEN, ON_JOINT, Line, Path, read_angle
+from .routes import VIA, read_path
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,6 @@ class Spring(Force):
     The law is conservative while k and s0 depend on parameters only, which the description checks.
     """
 
-    type_name: ClassVar[str] = "spring"
     uses_value: ClassVar[bool] = True
     path: Path
     stiffness: Expr
@@ -48,7 +50,6 @@ class Spring(Force):
 class Damper(Force):
     """Viscous damper: generalized force -c s' along the path (c in N s/m or N m s/rad)."""
 
-    type_name: ClassVar[str] = "damper"
     path: Path
     damping: Expr
 
@@ -57,45 +58,62 @@ class Damper(Force):
         return self.path.loads(view, -self.damping * rate)
 
 
-@dataclass(frozen=True)
-class Actuator(Force):
-    """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
-
-    type_name: ClassVar[str] = "actuator"
-    path: Path
-    value: Expr
-
-    def loads(self, view: View) -> list[Load]:
-        return self.path.loads(view, self.value)
+_STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True)
+_DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION)
+_MARKERS = BETWEEN._replace(required=True)
+_ANGLE = {"joint": ON_JOINT, "between": BETWEEN}
 
 
-def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
-    return vec.times(view.rotation(marker), value) if axes == "body" else value
+def _spring(path: Callable[[Entry], Path | None], rest: str) -> Callable[[Entry], Spring | None]:
+    def read(e: Entry) -> Spring | None:
+        where, stiffness, length = path(e), e.law("stiffness"), e.law(rest)
+        return None if where is None else Spring(e.name, where, stiffness, length)
+
+    return read
 
 
-@dataclass(frozen=True)
-class PointForce(Force):
-    """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
+def _damper(path: Callable[[Entry], Path | None]) -> Callable[[Entry], Damper | None]:
+    def read(e: Entry) -> Damper | None:
+        where, damping = path(e), e.law("damping")
+        return None if where is None else Damper(e.name, where, damping)
 
-    type_name: ClassVar[str] = "force"
-    marker: Marker
-    value: Vec3
-    axes: str = "ground"
-
-    def loads(self, view: View) -> list[Load]:
-        force = _in_ground_axes(view, self.marker, self.value, self.axes)
-        return [MarkerLoad(self.marker, force, vec.zero(view.graph))]
+    return read
 
 
-@dataclass(frozen=True)
-class BodyTorque(Force):
-    """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
-
-    type_name: ClassVar[str] = "torque"
-    marker: Marker
-    value: Vec3
-    axes: str = "ground"
-
-    def loads(self, view: View) -> list[Load]:
-        torque = _in_ground_axes(view, self.marker, self.value, self.axes)
-        return [MarkerLoad(self.marker, vec.zero(view.graph), torque)]
+TYPES = table(
+    ElementType(
+        "spring",
+        "a linear spring between two markers, or along a path over markers and cylinders.",
+        {
+            "between": _MARKERS,
+            "stiffness": _STIFFNESS,
+            "length": Field("expression", "length without force (m)", default=0),
+            "via": VIA,
+        },
+        _spring(read_path, "length"),
+    ),
+    ElementType(
+        "damper",
+        "a viscous damper between two markers, or along a path over markers and cylinders.",
+        {"between": _MARKERS, "damping": _DAMPING, "via": VIA},
+        _damper(read_path),
+    ),
+    ElementType(
+        "torsional_spring",
+        "a linear spring on an angle: of a joint, or of the second marker about the z axis of the first.",
+        {
+            **_ANGLE,
+            "stiffness": _STIFFNESS,
+            "angle": Field("expression", "angle without torque (rad)", default=0),
+        },
+        _spring(read_angle, "angle"),
+        one_of=("joint", "between"),
+    ),
+    ElementType(
+        "torsional_damper",
+        "a viscous damper on an angle: of a joint, or of the second marker about the z axis of the first.",
+        {**_ANGLE, "damping": _DAMPING},
+        _damper(read_angle),
+        one_of=("joint", "between"),
+    ),
+)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import Field
 from ..graph.core import Expr
 from ..records import dataclass
 from .base import Force, Load, View
-from .normal_laws import HuntCrossley
-from .paths import Path
+from .normal_laws import NORMAL, HuntCrossley, read_normal_law
+from .paths import ON_JOINT, Path, read_coordinate
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,6 @@ class JointStop(Force):
     Penetrations are q - upper and lower - q.  A stop never pulls.
     """
 
-    type_name: ClassVar[str] = "stop"
     uses_value: ClassVar[bool] = True
     path: Path
     lower: Expr | None
@@ -52,3 +54,29 @@ class JointStop(Force):
         for depth, rate, sense in self._depths(view):
             total = total + sense * (self.law.force(depth, rate) - self.law.elastic(depth))
         return self.path.loads(view, total)
+
+
+def _stop(e: Entry) -> JointStop | None:
+    path, law = read_coordinate(e), read_normal_law(e)
+    lower, upper = e.given("lower"), e.given("upper")
+    if lower is None and upper is None:
+        e.fault("", "has no limit", "give lower, upper or both")
+    if lower is not None and upper is not None:
+        e.judge("upper", upper - lower, lambda x: x > 0, "is upper - lower; lower must be less than upper")
+    return None if path is None else JointStop(e.name, path, lower, upper, law)
+
+
+TYPES = table(
+    ElementType(
+        "stop",
+        "stops of a joint's coordinate: below ``lower``, above ``upper`` or both.",
+        {
+            "joint": ON_JOINT._replace(required=True),
+            "stiffness": NORMAL["stiffness"],
+            "lower": Field("expression", "lower limit (rad or m)"),
+            "upper": Field("expression", "upper limit (rad or m)"),
+            **{key: field for key, field in NORMAL.items() if key != "stiffness"},
+        },
+        _stop,
+    )
+)

@@ -9,8 +9,7 @@ from ..constraints import RollingDisc
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError, Problem
 from ..forces import Line, Route
-from ..forces.routes import Cylinder
-from ..frames import Marker
+from ..frames import Cylinder, Marker
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of

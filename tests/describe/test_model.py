@@ -14,9 +14,9 @@ import sympy
 
 from eomgen import Model
 from eomgen.describe import Mechanism
-from eomgen.describe.fields import BODY, FORCE, INPUT, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
+from eomgen.describe.fields import BODY, INPUT, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
 from eomgen.errors import ModelError, UsageError
-from eomgen.forces import Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Turn
+from eomgen.forces import FORCES, Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Turn
 from eomgen.frames import GROUND
 from eomgen.joints import JOINTS
 
@@ -243,7 +243,8 @@ def test_every_joint_has_a_method_with_keys_of_the_table() -> None:
 
 def test_every_force_has_a_method_with_the_keys_of_the_table() -> None:
     places = {"between", "joint", "body", "marker", "on", "a", "b"}
-    for name, fields in FORCE.items():
+    for name, found in FORCES.items():
+        fields = found.keys
         given = arguments(getattr(Model, name))
         assert set(given) - places == set(fields) - places, name
         for key, field in fields.items():

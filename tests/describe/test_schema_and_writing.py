@@ -15,12 +15,13 @@ from jsonschema import Draft202012Validator
 
 from eomgen import Model, load
 from eomgen.describe import model_schema
-from eomgen.describe.fields import FORCE, MODEL
+from eomgen.describe.fields import MODEL
 from eomgen.describe.sympy_text import sympy_text
 from eomgen.describe.write_yaml import _text
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import Document, scalar
 from eomgen.errors import UsageError
+from eomgen.forces import FORCES
 from eomgen.graph import Graph, evaluate
 from eomgen.joints import JOINTS
 
@@ -44,7 +45,7 @@ def test_the_schema_accepts_the_documented_model(slider_crank_text: str) -> None
 def test_the_schema_knows_every_joint_and_force() -> None:
     properties = model_schema()["properties"]
     assert list(properties) == list(MODEL)
-    for section, table in (("joints", JOINTS), ("forces", FORCE)):
+    for section, table in (("joints", JOINTS), ("forces", FORCES)):
         types = [s["properties"]["type"]["const"] for s in properties[section]["additionalProperties"]["oneOf"]]
         assert types == list(table)
 

@@ -14,10 +14,11 @@ import pytest
 
 import eomgen
 from eomgen import rotations
-from eomgen.describe.fields import BODY, EQUATIONS, FORCE, FUNCTION, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
-from eomgen.describe.fields_constraints import CONSTRAINT
+from eomgen.constraints import CONSTRAINTS
+from eomgen.describe.fields import BODY, EQUATIONS, FUNCTION, LAGRANGIAN, MODEL, SIMULATION, SOLID, SOLID_KEYS
 from eomgen.describe.names import FUNCTIONS, QUANTITIES, TOTALS
 from eomgen.describe.scope import ENERGIES
+from eomgen.forces import FORCES
 from eomgen.joints import JOINTS
 from eomgen.program import KERNELS
 
@@ -104,8 +105,8 @@ def test_links_lead_somewhere() -> None:
 def test_the_model_file_page_knows_every_key() -> None:
     text = (ROOT / "docs" / "model_file.md").read_text(encoding="utf-8")
     words = set(re.findall(r"\w+", text))
-    keys = {*MODEL, *LAGRANGIAN, *EQUATIONS, *SIMULATION, *JOINTS, *FORCE, *FUNCTIONS, *QUANTITIES}
-    keys |= {key for fields in FORCE.values() for key in fields} | {o for j in JOINTS.values() for o in j.options}
+    keys = {*MODEL, *LAGRANGIAN, *EQUATIONS, *SIMULATION, *JOINTS, *FORCES, *FUNCTIONS, *QUANTITIES}
+    keys |= {key for found in FORCES.values() for key in found.keys} | {o for j in JOINTS.values() for o in j.options}
     keys |= {*BODY, *SOLID, *TOTALS, *ENERGIES} | SOLID_KEYS
     assert keys - words == set()
 
@@ -131,7 +132,7 @@ def test_the_pages_know_kernels_sequences_rotations_and_methods() -> None:
             if key not in ("self", "name")
         ]
         assert shown == ", ".join(p.name if p.default is p.empty else f"{p.name}={p.default}" for p in taken), name
-    assert set(CONSTRAINT) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
+    assert set(CONSTRAINTS) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
 
 
 def test_the_readme_shows_the_slider_crank_that_ships() -> None:

@@ -12,9 +12,9 @@ from hostile.nasty_texts import NASTY
 import eomgen as eg
 from eomgen import pipeline
 from eomgen.api.equations import Equations
-from eomgen.describe import fields, fields_constraints, force_fields
-from eomgen.describe.field import Field
+from eomgen.describe import fields
 from eomgen.describe.yaml_file import describe_yaml
+from eomgen.elements.field import Field
 from eomgen.emit import emit_package
 from eomgen.program import Program
 
@@ -83,7 +83,7 @@ def files_of(key: str, target: str) -> dict[str, str]:
 
 def text_fields() -> Iterator[tuple[str, str]]:
     """Table and key of every field that holds a text or the name of a file, in all tables there are."""
-    for module in (fields, force_fields, fields_constraints):
+    for module in (fields,):
         for table, value in vars(module).items():
             if table.isupper() and isinstance(value, dict):
                 inner = [value, *(part for part in value.values() if isinstance(part, dict))]

@@ -62,7 +62,7 @@ FAULTS = (
         ("tests/joints/test_every_type.py::test_subspace_is_the_derivative_of_the_pose[universal]",),
     ),
     Fault(
-        "gear-internal", "eomgen/describe/build_couplings.py",
+        "gear-internal", "eomgen/constraints/gears.py",
         'ratio = -ratio if e.flag("internal") else ratio',
         'ratio = ratio if e.flag("internal") else -ratio',
         "outside and inside gears are exchanged",
@@ -76,7 +76,7 @@ FAULTS = (
         ("tests/constraints/test_gears.py::test_pairs_turn_in_the_ratio_of_their_radii[keys0--0.4]",),
     ),
     Fault(
-        "planetary-ring", "eomgen/constraints/gears.py",
+        "planetary-ring", "eomgen/constraints/planetary.py",
         "r_r / r_p * (self.ring - self.carrier) - self.planet",
         "r_r / r_p * (self.ring - self.carrier) + self.planet",
         "ring and planet mesh outside",
@@ -125,21 +125,21 @@ FAULTS = (
         ("tests/constraints/test_drivers.py::test_the_place_of_a_marker_along_an_axis_of_another",),
     ),
     Fault(
-        "spring-energy", "eomgen/forces/elements.py",
+        "spring-energy", "eomgen/forces/springs.py",
         "return 0.5 * self.stiffness * (stretch * stretch)",
         "return self.stiffness * (stretch * stretch)",
         "energy of a spring without its 1/2",
         ("tests/forces/test_energies_of_springs.py::test_a_mass_on_a_spring[0.4-embedding]",),
     ),
     Fault(
-        "spring-rest", "eomgen/forces/elements.py",
+        "spring-rest", "eomgen/forces/springs.py",
         "-self.stiffness * (value - self.rest)",
         "-self.stiffness * value",
         "a spring forgets its rest length",
         ("tests/forces/test_energies_of_springs.py",),
     ),
     Fault(
-        "body-force-axes", "eomgen/forces/elements.py",
+        "body-force-axes", "eomgen/forces/actuators.py",
         'vec.times(view.rotation(marker), value) if axes == "body"',
         'vec.transpose_times(view.rotation(marker), value) if axes == "body"',
         "a force in body axes is turned by the transposed rotation",

@@ -16,7 +16,7 @@ import eomgen.emit
 import eomgen.program.collect as collect
 from eomgen.api.equations import Equations
 from eomgen.api.module import Module
-from eomgen.forces.elements import Spring
+from eomgen.forces.springs import Spring
 from eomgen.verification import Verification, check_reactions, check_runs
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

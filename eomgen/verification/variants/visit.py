@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from ...constraints import CONSTRAINTS
 from ...describe.description import GROUND_NAME, Description, Entry
 from ...describe.fields import (
     BODY,
@@ -17,10 +18,9 @@ from ...describe.fields import (
     LAGRANGIAN,
     OUTPUT_FIELDS,
     Fields,
-    force_fields,
     joint_fields,
 )
-from ...describe.fields_constraints import constraint_fields
+from ...forces import FORCES
 
 
 class Slot(NamedTuple):
@@ -107,9 +107,9 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     if section == "joints":
         return joint_fields(values["type"])
     if section == "forces":
-        return force_fields(values["type"])
+        return FORCES[values["type"]].fields("force", FORCES)
     if section == "constraints":
-        return constraint_fields(values["type"])
+        return CONSTRAINTS[values["type"]].fields("constraint", CONSTRAINTS)
     return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 

@@ -1,0 +1,137 @@
+"""Constraint elements: planetary sets, as relations between the angles of sun, ring, carrier and planet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry, Found
+from ..elements.field import Field
+from ..graph.core import Expr
+from ..limits.descriptions import TENSOR
+from ..records import dataclass
+from .base import Condition, Constraint, View
+
+#: The gears of a planetary set.
+WHEELS = ("sun", "planet", "ring")
+
+
+@dataclass(frozen=True)
+class Planetary(Constraint):
+    """A planetary set; angles of sun, ring and carrier from the frame, that of the planet from the carrier.
+
+    Sun and planet mesh outside, ring and planet inside (Willis; Norton, Design of Machinery, sec. 9.9):
+
+        r_s (sun - carrier) + r_p planet = 0,    r_r (ring - carrier) - r_p planet = 0,
+
+    and, without the planet, their sum r_s sun + r_r ring = (r_s + r_r) carrier.  A wheel that is fixed to the frame has
+    the angle 0; one whose radius is None is not there.
+    """
+
+    type_name: ClassVar[str] = "planetary"
+    written: ClassVar[bool] = True
+    sun: Expr
+    ring: Expr
+    carrier: Expr
+    planet: Expr | None  #: angle from the carrier; None if the planets are not bodies of the model
+    sun_radius: Expr | None
+    ring_radius: Expr | None
+    planet_radius: Expr | None
+    phase: Expr
+
+    def conditions(self, view: View) -> list[Condition]:
+        r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
+        rows: list[Condition] = []
+        if self.planet is None:
+            if r_s is not None and r_r is not None:
+                mean = (r_s * self.sun + r_r * self.ring) / (r_s + r_r)
+                rows.append(Condition("ratio", mean - self.carrier - self.phase, "angle"))
+            return rows
+        if r_p is None and r_s is not None and r_r is not None:
+            r_p = 0.5 * (r_r - r_s)
+        if r_p is None:
+            return rows
+        if r_s is not None:
+            sun = r_s / r_p * (self.sun - self.carrier) + self.planet
+            rows.append(Condition("sun_mesh", sun - self.phase, "angle"))
+        if r_r is not None:
+            ring = r_r / r_p * (self.ring - self.carrier) - self.planet
+            rows.append(Condition("ring_mesh", ring, "angle"))
+        return rows
+
+
+def _planetary(e: Entry) -> Planetary | None:
+    """Angles are measured from the frame; the planet's from the frame or the carrier."""
+    key = "radii" if "radii" in e.values else "teeth"
+    sizes = e.sizes(key, WHEELS)
+    found = {part: e.coordinate(part, "angle") for part in ("sun", "ring", "carrier", "planet") if part in e.values}
+    if sizes is not None:
+        _fit(e, key, sizes)
+    if any(x is None for x in found.values()) or sizes is None or e.at_fault():
+        return None
+    parts: dict[str, Found] = {part: x for part, x in found.items() if x is not None}
+    for part in ("sun", "ring"):
+        if part in parts and part not in sizes:
+            e.fault(key, f"the {part} has a joint, and no size", f"give {key} of the {part}")
+    main = [parts[part] for part in ("sun", "ring", "carrier") if part in parts]
+    for other in main[1:]:
+        e.require_one_carrier("", main[0], other)
+    outer = {"sun", "ring"} & sizes.keys()
+    if not outer or ("planet" not in parts and len(outer) < 2):
+        e.fault(key, "no ratio follows from these wheels", "give sun and ring, or planet and one more")
+    if "planet" in parts and len(sizes) < 2:
+        e.fault(key, "one size gives no ratio", f"give two of {', '.join(WHEELS)}")
+    if len(parts) < (2 if "planet" in parts else 1) or not main:
+        e.fault("", "too few of its parts move", "give joints of sun, ring, carrier, planet")
+    if e.at_fault():
+        return None
+    sun, ring, carrier = (e.symbol(parts[p]) if p in parts else e.graph.zero for p in ("sun", "ring", "carrier"))
+    r_s, r_r, r_p = (sizes.get(wheel) for wheel in ("sun", "ring", "planet"))
+    return Planetary(e.name, sun, ring, carrier, _planet(e, parts, carrier), r_s, r_r, r_p, e.law("phase"))
+
+
+def _fit(e: Entry, key: str, sizes: Mapping[str, Expr]) -> None:
+    """Note numbers of wheels that do not fit into each other."""
+    numbers = {wheel: size.value for wheel, size in sizes.items() if size.value is not None}
+    if {"sun", "ring"} <= numbers.keys() and numbers["ring"] <= numbers["sun"]:
+        message = f"ring {numbers['ring']:g} is not larger than sun {numbers['sun']:g}"
+        e.fault(key, message, "the sun stands inside the ring")
+    elif len(numbers) == 3 and abs(numbers["ring"] - numbers["sun"] - 2 * numbers["planet"]) > TENSOR * numbers["ring"]:
+        message = f"ring {numbers['ring']:g} is not sun {numbers['sun']:g} + 2 planet {numbers['planet']:g}"
+        e.fault(key, message, "the wheels of a planetary set fit into each other; leave one out")
+
+
+def _planet(e: Entry, parts: Mapping[str, Found], carrier: Expr) -> Expr | None:
+    """The planet's angle from the carrier."""
+    if "planet" not in parts:
+        return None
+    planet, base = e.symbol(parts["planet"]), e.carrier(parts["planet"])
+    if base is None or "carrier" not in parts or base == e.carried(parts["carrier"]):
+        return planet
+    if base == e.carrier(parts["carrier"]):
+        return planet - carrier
+    message = f"{parts['planet'].name!r} is measured neither from the carrier nor from the frame"
+    e.fault("planet", message, "make one of them the predecessor of its joint")
+    return None
+
+
+_FIXED = "joint that turns the {0} relative to the frame; fixed if left out"
+
+TYPES = table(
+    ElementType(
+        "planetary",
+        "the meshing wheels of a planetary set (Willis).",
+        {
+            **{part: Field("joint", _FIXED.format(part)) for part in ("sun", "ring", "carrier")},
+            "planet": Field("joint", "joint of a planet, on the carrier or on the frame, if planets are bodies"),
+            "radii": Field("wheels", "radii of sun, planet, ring that are there (m)"),
+            "teeth": Field("wheels", "numbers of teeth of sun, planet, ring that are there"),
+            "phase": Field(
+                "expression", "what the equation of the sun gives in the reference position (rad)", default=0
+            ),
+        },
+        _planetary,
+        one_of=("radii", "teeth"),
+    )
+)

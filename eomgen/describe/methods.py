@@ -1,0 +1,197 @@
+"""Stage describe, methods of the builder: a type of element -> the method of Model that adds one, documented.
+
+Arguments, defaults and their documentation are those of the type's keys, so that Python and model files cannot differ.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter, Signature
+from typing import Any, NamedTuple
+
+from ..elements.element_type import ElementType
+from ..elements.field import Field
+from ..errors import UsageError
+from .described import Described
+from .description import items
+from .handles import JointHandle, MarkerHandle
+from .keywords import check_keywords
+from .references import joint_reference, marker_reference
+
+#: Kind of a key -> what its argument is called in documentation, and its annotation.
+ARGUMENTS = {
+    "marker": ("handle or str", "Any"),
+    "pair": ("handles or str", "Sequence[Any]"),
+    "joint": ("handle or str", "Any"),
+    "joints": ("handles or str", "Sequence[Any]"),
+    "name": ("handle or str", "Any"),
+    "names": ("sequence of str", "Sequence[Any]"),
+    "vector": ("sequence of three", "Sequence[Value]"),
+    "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
+    "via": ("sequence", "Sequence[Any]"),
+    "matrix6": ("sequence", "Sequence[Any]"),
+    "radii": ("sequence of two", "Sequence[Value]"),
+    "two": ("sequence of two", "Sequence[Value]"),
+    "wheels": ("mapping", "Mapping[str, Value]"),
+    "factors": ("mapping", "Mapping[Any, Value]"),
+    "flag": ("bool", "bool"),
+    "choice": ("str", "str"),
+    "axis": ("str or three floats", "str | Sequence[float]"),
+}
+_SCALAR = ("scalar", "Value")
+_WIDTH = 112  #: of the text of a method's documentation
+
+
+class Argument(NamedTuple):
+    """An argument of a method: the key that it gives, and how."""
+
+    name: str
+    key: str
+    kind: str
+    annotation: str
+    default: Any
+    doc: str
+
+
+def arguments_of(found: ElementType) -> list[Argument]:
+    """The arguments of the method that adds an element, after its name; ``*between`` is called so."""
+    made: list[Argument] = []
+    for key, field in found.keys.items():
+        made += _arguments(found, key, field, any(one.default is not Parameter.empty for one in made))
+    star = [one for one in made if one.name.startswith("*")]
+    return star + [one for one in made if not one.name.startswith("*")]
+
+
+def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[Argument]:
+    kind, annotation = ARGUMENTS.get(field.kind, _SCALAR)
+    if field.kind == "choice":
+        kind = "{" + ", ".join(f'"{word}"' for word in field.choices) + "}"
+    doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
+    plain = field.default if isinstance(field.default, (int, float, str)) else None
+    given: Any = Parameter.empty if field.required and not later else plain
+    if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
+        on = "A joint or coordinate for one value, a body or marker for three."
+        return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
+    if {"joint", "between"} <= {*found.one_of} and key in ("joint", "between"):
+        if key == "joint":
+            return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
+        return [Argument("*between", key, kind, "Any", None, "One joint or coordinate, or two markers.")]
+    if field.required and field.kind in ("pair", "joints"):
+        single = ARGUMENTS["marker"]
+        return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in ("a", "b")]
+    return [Argument(key, key, kind, annotation, given, doc)]
+
+
+def signature_of(found: ElementType) -> Signature:
+    """The signature of the method."""
+    made = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
+    way: Any = Parameter.POSITIONAL_OR_KEYWORD
+    for one in arguments_of(found):
+        if one.name.startswith("*"):
+            made.append(Parameter(one.name[1:], Parameter.VAR_POSITIONAL))
+            way = Parameter.KEYWORD_ONLY
+        else:
+            default = None if way == Parameter.KEYWORD_ONLY and one.default is Parameter.empty else one.default
+            made.append(Parameter(one.name, way, default=default))
+    return Signature(made)
+
+
+def documentation_of(found: ElementType) -> str:
+    """The documentation of the method, in the manner of NumPy."""
+    lines = textwrap.wrap(f"Add {found.doc}", _WIDTH)
+    lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
+    every, skip = arguments_of(found), False
+    for k, one in enumerate(every):
+        if skip:
+            skip = False
+            continue
+        names = one.name
+        if k + 1 < len(every) and every[k + 1].key == one.key:
+            names, skip = f"{one.name}, {every[k + 1].name}", True
+        optional = "" if found.keys[one.key].required or one.key in found.one_of else ", optional"
+        lines.append(f"{names} : {one.kind}{optional}")
+        lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return "\n".join(lines)
+
+
+def method_of(section: str, found: ElementType) -> Callable[..., None]:
+    """The method that adds an element of a type to its section of a description."""
+    signature, every = signature_of(found), arguments_of(found)
+    allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
+
+    def add(self: Described, *args: Any, **keys: Any) -> None:
+        check_keywords(found.name, keys, allowed)
+        try:
+            bound = signature.bind(self, *args, **keys).arguments
+        except TypeError as error:
+            raise TypeError(f"{found.name}() {error}") from None
+        given = {key: value for key, value in bound.items() if key not in ("self", "name") and value is not None}
+        if "between" in given and any(one.name == "*between" for one in every):
+            _take_value(found, given)
+        self._description.add(section, bound["name"], {"type": found.name, **_entry(self, found, bound["name"], given)})
+
+    add.__name__, add.__qualname__ = found.name, f"Model.{found.name}"
+    add.__doc__ = documentation_of(found)
+    add.__signature__ = signature  # type: ignore[attr-defined]
+    return add
+
+
+def _take_value(found: ElementType, given: dict[str, Any]) -> None:
+    """The first required value may follow what the element acts on without its keyword."""
+    missing = [key for key, field in found.keys.items() if field.required and key not in given]
+    if missing and len(given["between"]) > 1:
+        *given["between"], given[missing[0]] = given["between"]
+
+
+def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """What a model file would write."""
+    entry, kinds = dict[str, Any](), {key: field.kind for key, field in found.keys.items()}
+    if "on" in given and "on" not in kinds:
+        on = given.pop("on")
+        several = items(given.get("value")) is not None
+        given["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
+    if "a" in given and "a" not in kinds:
+        key = next(key for key, kind in kinds.items() if kind in ("pair", "joints"))
+        entry[key] = [_reference(model, kinds[key], part) for part in (given.pop("a"), given.pop("b"))]
+    elif {"joint", "between"} <= {*found.one_of}:
+        entry |= _where(model, given.pop("between", ()), given.pop("joint", None))
+    for key in [key for key in kinds if key in given]:
+        entry[key] = _converted(model, found, name, key, given[key])
+    return {key: value for key, value in entry.items() if value is not None}
+
+
+def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, Any]:
+    if joint is not None and not between:
+        return {"joint": joint_reference(model, joint)}
+    if joint is None and len(between) == 1:
+        return {"joint": joint_reference(model, between[0])}
+    if joint is None and len(between) == 2:
+        return {"between": [marker_reference(model, marker) for marker in between]}
+    raise UsageError("give one joint or two markers, and then the values")
+
+
+def _reference(model: Described, kind: str, value: Any) -> Any:
+    return joint_reference(model, value) if kind in ("joint", "joints", "factors") else marker_reference(model, value)
+
+
+def _converted(model: Described, found: ElementType, name: Any, key: str, value: Any) -> Any:
+    kind = found.keys[key].kind
+    if kind == "marker" and isinstance(value, JointHandle) and key in found.remedies:
+        raise UsageError(f"{found.name} {name!r} acts at a marker, which {value!r} is not; {found.remedies[key]}")
+    if kind in ("marker", "joint") or (kind == "name" and isinstance(value, MarkerHandle)):
+        return _reference(model, kind, value)
+    if kind in ("pair", "joints"):
+        return [_reference(model, kind, part) for part in value]
+    if kind == "factors" and isinstance(value, Mapping):
+        return {_reference(model, kind, part): factor for part, factor in value.items()}
+    if kind == "via":
+        return [_stop(model, stop) for stop in value] or None
+    return value
+
+
+def _stop(model: Described, stop: Any) -> Any:
+    """A marker, or a cylinder as a mapping of around, radius, sense."""
+    if not (isinstance(stop, Mapping) and "around" in stop):
+        return marker_reference(model, stop)
+    return {key: marker_reference(model, x) if key == "around" else x for key, x in stop.items()}

@@ -1,0 +1,52 @@
+"""Elements, one type: its word in model files, its keys, and the function that makes an element of an entry.
+
+The tables of types (:data:`~eomgen.forces.FORCES` ...) drive the check of model files, their JSON Schema, the methods
+of Model and their documentation, so that a new type is one row, in the file of its class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from .entry import Entry
+from .field import Field, Fields
+
+
+class ElementType(NamedTuple):
+    """A type of element.
+
+    Attributes
+    ----------
+    name : str
+        The word in model files, and the method of Model.
+    doc : str
+        What it is, in one sentence that goes on from "Add".
+    keys : Fields
+        Its keys besides ``type``, in the order of the method's arguments.
+    read : callable
+        Entry -> the element; None where the entry has a fault, which is noted.
+    one_of : tuple of str
+        Keys of which exactly one is given.
+    remedies : mapping of str to str
+        What to do instead, for keys that people give something of another kind.
+    """
+
+    name: str
+    doc: str
+    keys: Fields
+    read: Callable[[Entry], Any]
+    one_of: tuple[str, ...] = ()
+    remedies: Mapping[str, str] = {}
+
+    def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
+        """All keys, ``type`` among them."""
+        return {"type": Field("choice", f"type of the {what}", required=True, choices=tuple(types)), **self.keys}
+
+
+Types = dict[str, ElementType]
+
+
+def table(*types: ElementType) -> Types:
+    """Types by their names."""
+    return {one.name: one for one in types}

@@ -1,0 +1,155 @@
+"""Elements, one entry: what the function that reads a type of element may ask of an entry of a model file.
+
+The reader itself is :class:`~eomgen.describe.element_entry.ElementEntry`; elements know this much of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from ..frames import Cylinder, Marker
+from ..graph.core import Expr, Graph
+from ..graph.vectors import Mat3, Vec3
+from .field import Fields
+
+
+class Found(NamedTuple):
+    """A coordinate: its name, 'angle', 'length' or 'parameter', and its joint (None: a bare Lagrangian's own)."""
+
+    name: str
+    kind: str
+    joint: str | None
+
+
+class Meaning(NamedTuple):
+    """What a name in an expression stands for.
+
+    ``kind`` is a word such as coordinate, velocity, parameter, time, marker (its motion) or energy; ``level`` counts
+    derivatives of motions, None of other things; ``measure`` is 'length' or 'angle' of motions.
+    """
+
+    kind: str
+    level: int | None = None
+    measure: str = ""
+
+
+class BodyData(Protocol):
+    """Mass, centre of mass and inertia of a body, in its axes."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def mass(self) -> Expr: ...
+    @property
+    def com(self) -> Vec3: ...
+    @property
+    def inertia(self) -> Mat3: ...
+
+
+class Entry(Protocol):
+    """An entry on its way to an element.
+
+    Every method reads one key, notes what is wrong with it as a fault of that key, and returns None or a stand-in then,
+    so that one pass finds all faults.
+    """
+
+    name: str
+    values: dict[str, Any]  #: what the user gave, by key
+    fields: Fields  #: the keys of its type
+    graph: Graph
+    stand_in: Expr  #: in place of an expression that is at fault
+
+    # -- faults ---------------------------------------------------------------------------------------------------
+    def fault(self, key: str, message: str, remedy: str = "") -> None:
+        """Note a fault of one key, or of the entry as a whole (``""``)."""
+
+    def at_fault(self, key: str = "") -> bool:
+        """Whether a fault of the key, or any, has been noted."""
+
+    def refuse(self, key: str, why: str) -> None:
+        """Note a key that has no meaning beside the others, if it is given."""
+
+    def judge(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
+        """Note an expression whose number, as far as the declared values of parameters tell, breaks a rule."""
+
+    # -- values ---------------------------------------------------------------------------------------------------
+    def law(self, key: str, local: Mapping[str, Expr] | None = None, exclusive: bool = True) -> Expr:
+        """An expression, or the default of its key.
+
+        ``local`` are names that it alone knows; with ``exclusive`` none of them may be a name of the model too.
+        """
+
+    def given(self, key: str) -> Expr | None:
+        """An expression, if the key is given."""
+
+    def positive(self, key: str) -> Expr:
+        """An expression that must be greater than 0."""
+
+    def several(self, key: str, count: int) -> tuple[Expr, ...] | None:
+        """So many expressions."""
+
+    def sizes(self, key: str, names: Sequence[str]) -> dict[str, Expr] | None:
+        """Expressions greater than 0 by their names, of which some may be missing."""
+
+    def vector(self, key: str) -> Vec3:
+        """Three expressions."""
+
+    def matrix(self, key: str, size: int) -> tuple[tuple[Expr, ...], ...] | None:
+        """A square matrix, given as such or by its diagonal."""
+
+    def choice(self, key: str) -> str:
+        """One of the words of a key."""
+
+    def flag(self, key: str) -> bool:
+        """True or false."""
+
+    # -- parts of the mechanism -----------------------------------------------------------------------------------
+    def marker(self, key: str) -> Marker | None:
+        """A marker."""
+
+    def pair(self, key: str = "between") -> tuple[Marker, Marker] | None:
+        """Two markers."""
+
+    def axis(self, key: str) -> Vec3:
+        """A direction of length 1."""
+
+    def via(self, key: str = "via") -> Sequence[Marker | Cylinder] | None:
+        """What a path runs over, in order; None if anything is wrong with it."""
+
+    def coordinate(self, key: str = "joint", kind: str = "") -> Found | None:
+        """The coordinate that a joint, or its own name, means; of a kind, if one is asked for."""
+
+    def body(self, key: str = "body") -> tuple[int, BodyData] | None:
+        """The index of a body, and its mass."""
+
+    # -- coordinates and names ------------------------------------------------------------------------------------
+    def symbol(self, found: Found) -> Expr:
+        """The symbol of a coordinate."""
+
+    def two_coordinates(self, key: str, kind: str = "") -> tuple[Found, Found] | None:
+        """Two different coordinates, measured from one body."""
+
+    def factors(self, key: str) -> list[tuple[Found, Expr]] | None:
+        """Coordinates and their factors, in one order however they are given."""
+
+    def require_one_carrier(self, key: str, a: Found, b: Found) -> None:
+        """Note two coordinates that are measured from different bodies."""
+
+    def carrier(self, coordinate: Found) -> int | None:
+        """The body from which a coordinate is measured, bodies that are welded together counting as one."""
+
+    def carried(self, coordinate: Found) -> int | None:
+        """The body that a coordinate moves."""
+
+    def meaning(self, name: str) -> Meaning:
+        """What a name in an expression stands for."""
+
+    def known(self, kind: str) -> list[str]:
+        """The model's names of a kind."""
+
+    def table_kind(self, function: str) -> str | None:
+        """The kind of a function that is a table."""
+
+    def contact_point(self, axis: Marker) -> tuple[Marker, Expr] | None:
+        """A massless body about a marker's axis, whose x axis points to a contact, and the angle that turns it."""

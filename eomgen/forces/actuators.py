@@ -1,0 +1,131 @@
+"""Force elements, given forces: along a path, at a point of a body, and torques on a body."""
+
+from __future__ import annotations
+
+from ..elements.element_type import ElementType, table
+from ..elements.entry import Entry
+from ..elements.field import MOTION, Field
+from ..frames import Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.vectors import Vec3
+from ..records import dataclass
+from .base import Force, Load, MarkerLoad, View
+from .paths import BETWEEN, ON_JOINT, Path, read_coordinate
+from .routes import VIA, read_joint_or_path
+
+
+@dataclass(frozen=True)
+class Actuator(Force):
+    """A given generalized force along the path: positive pushes markers apart or drives the coordinate (N or N m)."""
+
+    path: Path
+    value: Expr
+
+    def loads(self, view: View) -> list[Load]:
+        return self.path.loads(view, self.value)
+
+
+def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:
+    return vec.times(view.rotation(marker), value) if axes == "body" else value
+
+
+@dataclass(frozen=True)
+class PointForce(Force):
+    """A force at a marker's origin, given in ground axes or in the marker's own (``axes="body"``) (N)."""
+
+    marker: Marker
+    value: Vec3
+    axes: str = "ground"
+
+    def loads(self, view: View) -> list[Load]:
+        force = _in_ground_axes(view, self.marker, self.value, self.axes)
+        return [MarkerLoad(self.marker, force, vec.zero(view.graph))]
+
+
+@dataclass(frozen=True)
+class BodyTorque(Force):
+    """A torque on a body, given in ground axes or in the marker's own (``axes="body"``) (N m)."""
+
+    marker: Marker
+    value: Vec3
+    axes: str = "ground"
+
+    def loads(self, view: View) -> list[Load]:
+        torque = _in_ground_axes(view, self.marker, self.value, self.axes)
+        return [MarkerLoad(self.marker, vec.zero(view.graph), torque)]
+
+
+_AXES = Field("choice", "axes of the vector: ground, or the marker's own", default="ground", choices=("ground", "body"))
+
+
+def _actuator(e: Entry) -> Force | None:
+    path, value = read_joint_or_path(e), e.law("value")
+    return None if path is None else Actuator(e.name, path, value)
+
+
+def _force(e: Entry) -> Force | None:
+    value, axes = e.vector("value"), e.choice("axes")
+    marker = e.marker("marker") if "marker" in e.values else None
+    return None if marker is None else PointForce(e.name, marker, value, axes)
+
+
+def _torque(e: Entry) -> Force | None:
+    if "joint" in e.values:
+        e.refuse("axes", "a torque on a joint has no axes")
+        path, value = read_coordinate(e), e.law("value")
+        return None if path is None else Actuator(e.name, path, value)
+    marker = e.marker("body")
+    vector, axes = e.vector("value"), e.choice("axes")
+    return None if marker is None else BodyTorque(e.name, marker, vector, axes)
+
+
+TYPES = table(
+    ElementType(
+        "force",
+        "a force at a marker's origin.",
+        {
+            "marker": Field("marker", "where it acts", required=True),
+            "value": Field("vector", "force (N)", required=True, level=MOTION),
+            "axes": _AXES,
+        },
+        _force,
+        remedies={
+            "marker": "along a joint's coordinate take torque or actuator: N where it is a length, N m on an angle"
+        },
+    ),
+    ElementType(
+        "torque",
+        "a torque on a joint's coordinate (one value) or on a body (three values).",
+        {
+            "joint": ON_JOINT,
+            "body": Field("marker", "a body"),
+            "value": Field(
+                "value",
+                "torque (N m): one on a joint (N where its coordinate is a length), three on a body",
+                required=True,
+                level=MOTION,
+            ),
+            "axes": _AXES,
+        },
+        _torque,
+        one_of=("joint", "body"),
+    ),
+    ElementType(
+        "actuator",
+        "a given force: on a joint's coordinate, or along the line or a path between two markers.",
+        {
+            "joint": ON_JOINT,
+            "between": BETWEEN,
+            "value": Field(
+                "expression",
+                "positive drives the coordinate up, or pushes the markers apart (N or N m)",
+                required=True,
+                level=MOTION,
+            ),
+            "via": VIA,
+        },
+        _actuator,
+        one_of=("joint", "between"),
+    ),
+)
