@@ -18,5 +18,5 @@ def build_elements(around: Surroundings, what: str, entries: list[Entry], types:
 
 def _build(e: ElementEntry, what: str, types: Types) -> Any:
     found = e.type_of(what, types)
-    element = None if found is None else found.read(e)
+    element = None if found is None or found.read is None else found.read(e)
     return None if e.at_fault() else element

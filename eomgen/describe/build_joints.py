@@ -15,7 +15,7 @@ from ..joints import JOINTS, Joint, Shape
 from ..records import dataclass
 from .checks import check_names, unknown_key
 from .description import Entry, items
-from .fields import JOINT, JOINT_DATA, JOINT_OPTIONS, KINDS, MOTION, Field, joint_fields
+from .fields import KINDS, Field, joint_fields
 from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
@@ -50,7 +50,8 @@ def coordinate_names(
 def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
     """A joint from its raw keys, whose faults are told elsewhere."""
     kind = JOINTS[type_name]
-    return kind(**{key: values[key] for key in kind.options if isinstance(values.get(key), str)})
+    given = {key: values[key] for key in kind.options if isinstance(values.get(key), str)}
+    return kind(**{key: None for key, field in kind.options.items() if field.required} | given)
 
 
 def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
@@ -144,7 +145,7 @@ def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
     fields = joint_fields(type_name)
     for key in entry.values:
         if key not in fields:
-            others = {*JOINT, *JOINT_OPTIONS, *JOINT_DATA, "axis", "coordinate", "coordinates"}
+            others = set().union(*map(joint_fields, JOINTS))
             elsewhere = key in others
             message = f"a {type_name} joint has no {key!r}" if elsewhere else "unknown key"
             reader.faults.add(f"{entry.path}.{key}", message, unknown_key(key, fields))
@@ -179,33 +180,24 @@ def _with_expressions(reader: Reader, declared: Declared) -> Joint:
     """The joint with those of its options that are expressions."""
     joint, entry = declared.joint, declared.entry
     found: dict[str, Any] = {}
-    for option in joint.options:
-        kind, path = JOINT_OPTIONS[option].kind, f"{entry.path}.{option}"
-        if kind not in _LATER or option not in entry.values:
+    for option, field in joint.options.items():
+        path = f"{entry.path}.{option}"
+        if field.kind not in _LATER or option not in entry.values:
             continue
-        if kind == "shape":
-            found[option] = _shape(reader, path, entry.values[option], declared.coordinates[: _PARAMETERS[option]])
+        if field.kind == "shape":
+            found[option] = _shape(reader, path, entry.values[option], field, declared.coordinates[: field.own])
             continue
         found[option] = reader.expression(path, entry.values[option])
-        if found[option].is_zero:
-            reader.faults.add(path, "is 0", f"{JOINT_OPTIONS[option].doc}; {_NOTHING[option]}")
+        if found[option].is_zero and field.not_zero:
+            reader.faults.add(path, "is 0", f"{field.doc}; {field.not_zero}")
         elif option == "length" and (found[option].value or 0.0) < 0.0:
             reader.faults.add(path, f"is {found[option].value:g}", "give a length greater than 0")
     return replace(joint, **found)
 
 
-_NOTHING = {
-    "pitch": "a screw without advance is a revolute joint",
-    "length": "a rod without length is a spherical joint",
-}
-
-
-_PARAMETERS = {"curve": 1, "surface": 2}
-
-
-def _shape(reader: Reader, path: str, value: Any, own: tuple[str, ...]) -> Shape:
+def _shape(reader: Reader, path: str, value: Any, field: Field, own: tuple[str, ...]) -> Shape:
     """A point as expressions of parameters of the model and of the joint's own first coordinates."""
-    point = reader.vector(path, value, MOTION)
+    point = reader.vector(path, value, field.level)
     allowed = {*reader.names.of("parameter"), *own}
     shown = " and ".join(own)
     for name in sorted(symbols_of(point) - allowed):

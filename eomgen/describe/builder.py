@@ -14,7 +14,6 @@ from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
 from .model_functions import FunctionMethods
-from .model_joints import JointMethods
 from .model_totals import TotalMethods
 from .sympy_face import symbol
 
@@ -27,7 +26,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Builder(BodyMethods, JointMethods, ElementMethods, FunctionMethods, TotalMethods):
+class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
@@ -285,7 +284,7 @@ class Builder(BodyMethods, JointMethods, ElementMethods, FunctionMethods, TotalM
     # -- display --------------------------------------------------------------------------------------------------
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_"):
-            method = self._joint_method(name)
+            method = self._method(name)
             if method is not None:
                 return method
         from .names import suggestion

@@ -1,9 +1,24 @@
 """Stage describe, the builder's elements: a method for every type in the tables; element_methods.pyi lists them."""
 
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
 from ..constraints import CONSTRAINTS
+from ..elements.element_type import ElementType
 from ..forces import FORCES
+from ..joints import JOINTS
 from .described import Described
+from .fields import joint_type
+from .handles import JointHandle
 from .methods import method_of
+from .references import marker_reference
+
+
+def tables() -> dict[str, dict[str, ElementType]]:
+    """Section -> its types, those that were added to the tables after eomgen's own among them."""
+    return {"joints": {name: joint_type(name) for name in JOINTS}, "forces": FORCES, "constraints": CONSTRAINTS}
 
 
 class ElementMethods(Described):
@@ -12,7 +27,36 @@ class ElementMethods(Described):
     Where a joint is asked for, a coordinate (its SymPy symbol or its name) says which one of several is meant.
     """
 
+    def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
+        """Add a joint of any type.
 
-for _section, _types in (("forces", FORCES), ("constraints", CONSTRAINTS)):
+        Parameters
+        ----------
+        type : str
+            A type of joint, e.g. ``"revolute"``.
+        name : str
+            Identifier.
+        predecessor, successor : handle or str
+            Bodies or markers.
+        **keys
+            Whatever the method of the type takes.
+
+        Returns
+        -------
+        JointHandle
+        """
+        between = [marker_reference(self, predecessor), marker_reference(self, successor)]
+        given = {key: value for key, value in keys.items() if value is not None}
+        return JointHandle(self, self._description.add("joints", name, {"type": type, "between": between, **given}))
+
+    def _method(self, name: str) -> Any:
+        """The method of a type that was added to the tables later; None if there is none."""
+        for section, types in tables().items():
+            if name in types:
+                return partial(method_of(section, types[name]), self)
+        return None
+
+
+for _section, _types in tables().items():
     for _found in _types.values():
         setattr(ElementMethods, _found.name, method_of(_section, _found))

@@ -5,8 +5,9 @@ This one table drives the check of Python calls, the keys of model files and the
 
 from __future__ import annotations
 
-from itertools import product
+import inspect
 
+from ..elements.element_type import ElementType
 from ..elements.field import CONSTANT as CONSTANT
 from ..elements.field import MOTION as MOTION
 from ..elements.field import NUMBER as NUMBER
@@ -66,7 +67,6 @@ KINDS = {
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
-SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
 _UNIT = Field("text", "unit, for display", default="")
@@ -193,7 +193,9 @@ GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 
 JOINT: Fields = {
     "type": Field("choice", "type of the joint", required=True, choices=tuple(JOINTS)),
-    "between": Field("pair", "predecessor and successor", required=True),
+    "between": Field(
+        "pair", "bodies or markers; coordinates are the motion of the second relative to the first", required=True
+    ),
 }
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
@@ -204,20 +206,6 @@ JOINT_DATA: Fields = {
     "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
     "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
 }
-JOINT_OPTIONS: Fields = {
-    "sequence": Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES),
-    "pitch": Field("expression", "advance in one turn (m), negative for a left-handed thread", required=True),
-    "length": Field("expression", "length of the rod (m)", required=True),
-    "curve": Field("shape", "point of the curve in the predecessor's axes (m), by the joint's s", required=True),
-    "surface": Field("shape", "point of the surface in the predecessor's axes (m), by the joint's u, v", required=True),
-    "rotation": Field(
-        "choice",
-        "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
-        default="euler_angles",
-        choices=("euler_angles", "euler_parameters"),
-    ),
-}
-
 LAGRANGIAN: Fields = {
     "coordinates": Field("names", "generalized coordinates, in order", required=True),
     "expression": Field("expression", "L(q, q_dot, t) = T - V", required=True, level=MOTION),
@@ -274,21 +262,27 @@ MODEL: Fields = {
 SHORT = {"parameters": "value", "inputs": "value", "outputs": "expression", "events": "expression"}
 
 
+def joint_type(type_name: str) -> ElementType:
+    """One joint type as the type of an element."""
+    text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
+    keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
+    return ElementType(type_name, f"a joint of type {type_name}.  {text}", keys, ends=("predecessor", "successor"))
+
+
 def joint_fields(type_name: str) -> Fields:
     """The keys of one joint type."""
     joint = JOINTS[type_name]
-    fields = dict(JOINT)
+    fields = JOINT | {key: field for key, field in joint.options.items() if field.required}
     if joint.has_axis:
         fields["axis"] = AXIS
     if len(joint.coordinates) == 1:
         fields["coordinate"] = COORDINATE
+    fields |= joint.options
     if joint.coordinates:
         fields["coordinates"] = COORDINATES
         fields["limits"] = JOINT_DATA["limits"]
     if len(joint.coordinates) == 1:
         fields |= JOINT_DATA
-    for option in joint.options:
-        fields[option] = JOINT_OPTIONS.get(option, Field("text", option))
     return fields
 
 

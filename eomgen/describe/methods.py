@@ -25,7 +25,7 @@ ARGUMENTS = {
     "pair": ("handles or str", "Sequence[Any]"),
     "joint": ("handle or str", "Any"),
     "joints": ("handles or str", "Sequence[Any]"),
-    "name": ("handle or str", "Any"),
+    "name": ("str, symbol or handle", "Any"),
     "names": ("sequence of str", "Sequence[Any]"),
     "vector": ("sequence of three", "Sequence[Value]"),
     "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
@@ -37,10 +37,13 @@ ARGUMENTS = {
     "factors": ("mapping", "Mapping[Any, Value]"),
     "flag": ("bool", "bool"),
     "choice": ("str", "str"),
+    "shape": ("sequence of three", "Sequence[Value]"),
+    "limits": ("mapping", "Mapping[str, float]"),
+    "number": ("float", "float"),
     "axis": ("str or three floats", "str | Sequence[float]"),
 }
 _SCALAR = ("scalar", "Value")
-_WIDTH = 112  #: of the text of a method's documentation
+_WIDTH = 108  #: of the text of a method's documentation
 
 
 class Argument(NamedTuple):
@@ -79,7 +82,7 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
         return [Argument("*between", key, kind, "Any", None, "One joint or coordinate, or two markers.")]
     if field.required and field.kind in ("pair", "joints"):
         single = ARGUMENTS["marker"]
-        return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in ("a", "b")]
+        return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in found.ends]
     return [Argument(key, key, kind, annotation, given, doc)]
 
 
@@ -99,7 +102,9 @@ def signature_of(found: ElementType) -> Signature:
 
 def documentation_of(found: ElementType) -> str:
     """The documentation of the method, in the manner of NumPy."""
-    lines = textwrap.wrap(f"Add {found.doc}", _WIDTH)
+    summary, _, more = found.doc.partition(".  ")
+    lines = textwrap.wrap(f"Add {summary.removesuffix('.')}.", _WIDTH)
+    lines += ["", *textwrap.wrap(more, _WIDTH)] if more else []
     lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
     every, skip = arguments_of(found), False
     for k, one in enumerate(every):
@@ -115,12 +120,12 @@ def documentation_of(found: ElementType) -> str:
     return "\n".join(lines)
 
 
-def method_of(section: str, found: ElementType) -> Callable[..., None]:
-    """The method that adds an element of a type to its section of a description."""
+def method_of(section: str, found: ElementType) -> Callable[..., Any]:
+    """The method that adds an element of a type to its section of a description; of a joint, it returns the handle."""
     signature, every = signature_of(found), arguments_of(found)
     allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
 
-    def add(self: Described, *args: Any, **keys: Any) -> None:
+    def add(self: Described, *args: Any, **keys: Any) -> Any:
         check_keywords(found.name, keys, allowed)
         try:
             bound = signature.bind(self, *args, **keys).arguments
@@ -129,7 +134,9 @@ def method_of(section: str, found: ElementType) -> Callable[..., None]:
         given = {key: value for key, value in bound.items() if key not in ("self", "name") and value is not None}
         if "between" in given and any(one.name == "*between" for one in every):
             _take_value(found, given)
-        self._description.add(section, bound["name"], {"type": found.name, **_entry(self, found, bound["name"], given)})
+        values = {"type": found.name, **_entry(self, found, bound["name"], given)}
+        entry = self._description.add(section, bound["name"], values)
+        return JointHandle(self, entry) if section == "joints" else None
 
     add.__name__, add.__qualname__ = found.name, f"Model.{found.name}"
     add.__doc__ = documentation_of(found)
@@ -151,9 +158,10 @@ def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any
         on = given.pop("on")
         several = items(given.get("value")) is not None
         given["body" if isinstance(on, MarkerHandle) or (several and not isinstance(on, JointHandle)) else "joint"] = on
-    if "a" in given and "a" not in kinds:
+    first, second = found.ends
+    if first in given and first not in kinds:
         key = next(key for key, kind in kinds.items() if kind in ("pair", "joints"))
-        entry[key] = [_reference(model, kinds[key], part) for part in (given.pop("a"), given.pop("b"))]
+        entry[key] = [_reference(model, kinds[key], part) for part in (given.pop(first), given.pop(second))]
     elif {"joint", "between"} <= {*found.one_of}:
         entry |= _where(model, given.pop("between", ()), given.pop("joint", None))
     for key in [key for key in kinds if key in given]:

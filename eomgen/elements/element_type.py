@@ -25,19 +25,22 @@ class ElementType(NamedTuple):
     keys : Fields
         Its keys besides ``type``, in the order of the method's arguments.
     read : callable
-        Entry -> the element; None where the entry has a fault, which is noted.
+        Entry -> the element; None where the entry has a fault, which is noted.  Joints are read otherwise.
     one_of : tuple of str
         Keys of which exactly one is given.
     remedies : mapping of str to str
         What to do instead, for keys that people give something of another kind.
+    ends : tuple of str
+        What the arguments of the method are called that a key of two markers or joints has.
     """
 
     name: str
     doc: str
     keys: Fields
-    read: Callable[[Entry], Any]
+    read: Callable[[Entry], Any] | None = None
     one_of: tuple[str, ...] = ()
     remedies: Mapping[str, str] = {}
+    ends: tuple[str, str] = ("a", "b")
 
     def fields(self, what: str, types: Mapping[str, Any]) -> Fields:
         """All keys, ``type`` among them."""

@@ -15,7 +15,8 @@ class Field(NamedTuple):
     """What one key holds.
 
     ``kind`` is one of :data:`~eomgen.describe.fields.KINDS`; ``level`` says what its expressions may depend on;
-    ``choices`` lists the words of a choice.
+    ``choices`` lists the words of a choice; ``own`` is how many of the first coordinates of its own joint an expression
+    depends on; ``not_zero`` says what to take instead where 0 has no meaning.
     """
 
     kind: str
@@ -24,6 +25,8 @@ class Field(NamedTuple):
     default: Any = None
     level: int = CONSTANT
     choices: tuple[str, ...] = ()
+    own: int = 0
+    not_zero: str = ""
 
 
 Fields = dict[str, Field]

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from itertools import product
 from typing import ClassVar, NamedTuple
 
+from ..elements.field import Field, Fields
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
@@ -59,6 +61,14 @@ class Shape(NamedTuple):
     parameters: tuple[Expr, ...]
 
 
+#: Sequences of axes of Euler angles: no axis follows itself.
+SEQUENCES = tuple("".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] and s[1] != s[2])
+SEQUENCE = Field("choice", "axes of the intrinsic Euler angles", default="xyz", choices=SEQUENCES)
+LENGTH = Field(
+    "expression", "length of the rod (m)", required=True, not_zero="a rod without length is a spherical joint"
+)
+
+
 @dataclass(frozen=True)
 class Joint(ABC):
     """Questions every joint type answers.
@@ -67,7 +77,7 @@ class Joint(ABC):
     ----------------
     type_name : the word in model files and the Model's method
     has_axis : whether ``axis=`` is accepted
-    options : names of further keywords of this type (fields of the dataclass)
+    options : further keys of this type, which are fields of the dataclass
     coordinates : the coordinates, in order
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
@@ -79,7 +89,7 @@ class Joint(ABC):
     has_axis: ClassVar[bool] = True
     role: ClassVar[str] = "either"
     counts_turns: ClassVar[bool] = False
-    options: ClassVar[tuple[str, ...]] = ()
+    options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
     balls: ClassVar[tuple[Ball, ...]] = ()
 

@@ -6,18 +6,29 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.field import MOTION, Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Closure, Coordinate, Joint, Shape
+from .base import SEQUENCE, Closure, Coordinate, Joint, Shape
 from .rotations import euler, euler_rates
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)
 ON_SURFACE = (Coordinate("_u", "length"), Coordinate("_v", "length"))
+CURVE = Field(
+    "shape", "point of the curve in the predecessor's axes (m), by the joint's s", required=True, level=MOTION, own=1
+)
+SURFACE = Field(
+    "shape",
+    "point of the surface in the predecessor's axes (m), by the joint's u, v",
+    required=True,
+    level=MOTION,
+    own=2,
+)
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,7 @@ class CurveSlider(Guide):
     """The origin of S slides along a curve of P, without turning: a bead on a wire.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "curve_slider"
-    options: ClassVar[tuple[str, ...]] = ("curve",)
+    options: ClassVar[Fields] = {"curve": CURVE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
     curve: Shape
 
@@ -94,7 +105,7 @@ class SurfaceSlider(Guide):
     """The origin of S slides on a surface of P, without turning: a particle in a bowl.  Allows 2, removes 4."""
 
     type_name: ClassVar[str] = "surface_slider"
-    options: ClassVar[tuple[str, ...]] = ("surface",)
+    options: ClassVar[Fields] = {"surface": SURFACE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ON_SURFACE
     surface: Shape
 
@@ -111,7 +122,7 @@ class PointOnCurve(Turning):
     """
 
     type_name: ClassVar[str] = "point_on_curve"
-    options: ClassVar[tuple[str, ...]] = ("curve", "sequence")
+    options: ClassVar[Fields] = {"curve": CURVE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ALONG_CURVE, *ANGLES)
     curve: Shape
     sequence: str = "xyz"
@@ -126,7 +137,7 @@ class PointOnSurface(Turning):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "point_on_surface"
-    options: ClassVar[tuple[str, ...]] = ("surface", "sequence")
+    options: ClassVar[Fields] = {"surface": SURFACE, "sequence": SEQUENCE}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (*ON_SURFACE, *ANGLES)
     surface: Shape
     sequence: str = "xyz"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.field import Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
 from ..graph.vectors import Mat3, Vec3
@@ -76,7 +77,14 @@ class Screw(Joint):
     """
 
     type_name: ClassVar[str] = "screw"
-    options: ClassVar[tuple[str, ...]] = ("pitch",)
+    options: ClassVar[Fields] = {
+        "pitch": Field(
+            "expression",
+            "advance in one turn (m), negative for a left-handed thread",
+            required=True,
+            not_zero="a screw without advance is a revolute joint",
+        )
+    }
     counts_turns: ClassVar[bool] = True
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
     pitch: Expr

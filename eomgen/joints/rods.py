@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.field import Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Closure, Joint
+from .base import LENGTH, Closure, Joint
 from .closures import along, parallel_axes, same_orientation
 
 
@@ -48,7 +49,7 @@ class Distance(Constraint):
 
     type_name: ClassVar[str] = "distance"
     has_axis: ClassVar[bool] = False
-    options: ClassVar[tuple[str, ...]] = ("length",)
+    options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 1
     length: Expr
 
@@ -61,7 +62,7 @@ class RevoluteSpherical(Constraint):
     """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "revolute_spherical"
-    options: ClassVar[tuple[str, ...]] = ("length",)
+    options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 2
     length: Expr
 

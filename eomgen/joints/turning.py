@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
+from ..elements.field import Field, Fields
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Ball, Closure, Coordinate, Joint
+from .base import SEQUENCE, Ball, Closure, Coordinate, Joint
 from .closures import along
 from .rotations import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
+ROTATION = Field(
+    "choice",
+    "how a rotation is described: three Euler angles, or four Euler parameters, which are never singular",
+    default="euler_angles",
+    choices=("euler_angles", "euler_parameters"),
+)
 PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
 
 
@@ -28,7 +35,7 @@ class Turning(Joint):
     """
 
     has_axis: ClassVar[bool] = False
-    options: ClassVar[tuple[str, ...]] = ("sequence", "rotation")
+    options: ClassVar[Fields] = {"sequence": SEQUENCE, "rotation": ROTATION}
     place: ClassVar[tuple[Coordinate, ...]] = ()
     sequence: str = "xyz"
     rotation: str = "euler_angles"

@@ -125,7 +125,7 @@ BROKEN = [
     ("{tip: {at: [l, 0, 0]", "{tip: {at: [l, 0]", 13, "bodies.rod.markers.tip.at", "is not three numbers", ""),
     ("type: torque", "type: tork", 21, "forces.motor.type", "no force of type 'tork'", "did you mean 'torque'?"),
     ("joint: A, value", "value", 21, "forces.motor", "joint or body is missing", "joint, body"),
-    ("joint: A, value", "joint: A, body: rod, value", 21, "forces.motor", "both joint and body are given", "joint, body"),
+    ("joint: A, value", "joint: A, body: rod, value", 21, "forces.motor", "both joint and body are", "joint, body"),
     ("joint: A, value", "joint: AA, value", 21, "forces.motor.joint", "no joint 'AA'", "did you mean 'A'?"),
     ("stiffness: 200, ", "", 22, "forces.k1.stiffness", "is missing", "a number or an expression"),
     ("stiffness: 200", "stiffnes: 200", 22, "forces.k1.stiffnes", "unknown key", "did you mean 'stiffness'?"),

@@ -13,8 +13,8 @@ import pytest
 import sympy
 
 from eomgen import Model
-from eomgen.describe import Mechanism
-from eomgen.describe.fields import BODY, INPUT, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
+from eomgen.describe import Mechanism, stubs
+from eomgen.describe.fields import AXIS, BODY, INPUT, MODEL, OUTPUT_FIELDS, PARAMETER, joint_fields
 from eomgen.errors import ModelError, UsageError
 from eomgen.forces import FORCES, Actuator, BodyTorque, Damper, JointCoordinate, Line, PointForce, Spring, Turn
 from eomgen.frames import GROUND
@@ -224,21 +224,18 @@ def arguments(method: Callable[..., object]) -> dict[str, object]:
 
 
 def test_every_joint_has_a_method_with_keys_of_the_table() -> None:
-    model = Model("m")
     for name in JOINTS:
         fields = joint_fields(name)
-        own = set(fields) - {"type", "between"}
-        method = getattr(Model, name, None)
-        if method is None:  # rare ones take keys only
-            assert callable(getattr(model, name))
-            continue
-        given = set(arguments(method)) - {"predecessor", "successor"}
-        others = given & {"data", "keys"}
-        assert given - others <= own, name
-        assert {key for key in own if fields[key].required} <= given
-        written = {"axis", "coordinate", "sequence", "rotation"} & own
-        assert written <= given or "keys" in given, name
-        assert bool(others) == bool(own - given - {"coordinates"}), name
+        given = arguments(getattr(Model, name))
+        assert set(given) == {*fields, "predecessor", "successor"} - {"type", "between"}
+        required = [key for key, default in given.items() if default is inspect.Parameter.empty]
+        assert set(required) == {"predecessor", "successor"} | {key for key in given if fields.get(key, AXIS).required}
+
+
+def test_editors_read_the_same_methods() -> None:
+    """``python -m eomgen.describe.stubs`` writes the file anew."""
+    assert stubs.HOME.read_text(encoding="utf-8") == stubs.stub()
+    compile(stubs.stub(), "element_methods.pyi", "exec")
 
 
 def test_every_force_has_a_method_with_the_keys_of_the_table() -> None:

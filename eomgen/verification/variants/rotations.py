@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...describe.description import Description, Entry
-from ...describe.fields import SEQUENCES
+from ...joints.base import SEQUENCES
 from ...numeric import algebra
 from .turns import matrix_of
 from .variant import NotApplicable, References, States, Variant, coordinates_of, drop

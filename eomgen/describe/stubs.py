@@ -1,0 +1,74 @@
+"""Stage describe, stubs: the tables of types -> element_methods.pyi, for editors and type checkers.
+
+``python -m eomgen.describe.stubs`` writes it anew; a test holds it to the tables.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from inspect import Parameter, cleandoc
+from pathlib import Path
+
+from ..elements.element_type import ElementType
+from .element_methods import ElementMethods, tables
+from .methods import arguments_of, documentation_of
+
+HOME = Path(__file__).with_name("element_methods.pyi")
+_HEAD = """# Written by python -m eomgen.describe.stubs from the tables of types.
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..elements.element_type import ElementType
+from .described import Described
+from .handles import JointHandle
+
+Value = Any  # a number, a text or a SymPy expression
+
+def tables() -> dict[str, dict[str, ElementType]]: ...
+
+class ElementMethods(Described):
+    def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
+{0}
+    def _method(self, name: str) -> Any: ...
+"""
+
+
+def stub() -> str:
+    """The text of element_methods.pyi."""
+    text = _HEAD.format(_quoted(ElementMethods.joint.__doc__ or ""))
+    for section, types in tables().items():
+        for found in types.values():
+            text += _method(section, found)
+    return text
+
+
+def _method(section: str, found: ElementType) -> str:
+    listed, keywords = ["self", "name: str"], False
+    for one in arguments_of(found):
+        if one.name.startswith("*"):
+            listed.append(f"{one.name}: {one.annotation}")
+            keywords = True
+            continue
+        annotation, default = one.annotation, ""
+        if keywords or one.default is not Parameter.empty:
+            plain = None if one.default is Parameter.empty else one.default
+            default = f" = {plain!r}"
+            annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
+        listed.append(f"{one.name}: {annotation}{default}")
+    result = "JointHandle" if section == "joints" else "None"
+    head = f"    def {found.name}({', '.join(listed)}) -> {result}:"
+    if len(head) > 120:
+        inside = ",\n        ".join(listed)
+        head = f"    def {found.name}(\n        {inside},\n    ) -> {result}:"
+    return f"{head}\n{_quoted(documentation_of(found))}"
+
+
+def _quoted(doc: str) -> str:
+    text = cleandoc(doc)
+    closing = "\n" if "\n" in text else ""
+    return textwrap.indent(f'"""{text}{closing}"""\n', "        ", lambda line: bool(line.strip()))
+
+
+if __name__ == "__main__":
+    HOME.write_text(stub(), encoding="utf-8")
