@@ -266,7 +266,8 @@ def joint_type(type_name: str) -> ElementType:
     """One joint type as the type of an element."""
     text = " ".join((inspect.getdoc(JOINTS[type_name]) or "").partition("\n\n")[0].split())
     keys = {key: field for key, field in joint_fields(type_name).items() if key != "type"}
-    return ElementType(type_name, f"a joint of type {type_name}.  {text}", keys, ends=("predecessor", "successor"))
+    doc = f"a joint of type {type_name}: {text[:1].lower()}{text[1:]}".replace(". Allows", ".  Allows")
+    return ElementType(type_name, doc, keys, ends=("predecessor", "successor"))
 
 
 def joint_fields(type_name: str) -> Fields:

@@ -1,6 +1,7 @@
 """Stage describe, stubs: the tables of types -> element_methods.pyi, for editors and type checkers.
 
-``python -m eomgen.describe.stubs`` writes it anew; a test holds it to the tables.
+``python -m eomgen.describe.stubs`` writes it anew; a test holds it to the tables.  It has the first sentence of each
+method; ``help(Model.spring)`` has the rest.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from .element_methods import ElementMethods, tables
 from .methods import arguments_of, documentation_of
 
 HOME = Path(__file__).with_name("element_methods.pyi")
-_HEAD = """# Written by python -m eomgen.describe.stubs from the tables of types.
+_HEAD = '''# Written by python -m eomgen.describe.stubs from the tables of types.
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -29,14 +30,14 @@ def tables() -> dict[str, dict[str, ElementType]]: ...
 
 class ElementMethods(Described):
     def joint(self, type: str, name: str, predecessor: Any, successor: Any, **keys: Any) -> JointHandle:
-{0}
+        """{0}"""
     def _method(self, name: str) -> Any: ...
-"""
+'''
 
 
 def stub() -> str:
     """The text of element_methods.pyi."""
-    text = _HEAD.format(_quoted(ElementMethods.joint.__doc__ or ""))
+    text = _HEAD.format(_summary(ElementMethods.joint.__doc__ or ""))
     for section, types in tables().items():
         for found in types.values():
             text += _method(section, found)
@@ -57,17 +58,16 @@ def _method(section: str, found: ElementType) -> str:
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
         listed.append(f"{one.name}: {annotation}{default}")
     result = "JointHandle" if section == "joints" else "None"
-    head = f"    def {found.name}({', '.join(listed)}) -> {result}:"
-    if len(head) > 120:
-        inside = ",\n        ".join(listed)
-        head = f"    def {found.name}(\n        {inside},\n    ) -> {result}:"
-    return f"{head}\n{_quoted(documentation_of(found))}"
+    parts = [f"{part},".replace(" ", "\0") for part in listed]  # no line ends within an argument
+    parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
+    text = f"def\0{found.name}({' '.join(parts)}"
+    head = [line.replace("\0", " ") for line in textwrap.wrap(text, 116, subsequent_indent="    ")]
+    doc = textwrap.wrap(f'"""{_summary(documentation_of(found))}"""', 112)
+    return textwrap.indent("\n".join([*head, *(f"    {line}" for line in doc), ""]), "    ")
 
 
-def _quoted(doc: str) -> str:
-    text = cleandoc(doc)
-    closing = "\n" if "\n" in text else ""
-    return textwrap.indent(f'"""{text}{closing}"""\n', "        ", lambda line: bool(line.strip()))
+def _summary(doc: str) -> str:
+    return " ".join(cleandoc(doc).partition("\n\n")[0].split())
 
 
 if __name__ == "__main__":
