@@ -15,7 +15,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_number
+from ..runtime.room import read_count, read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
@@ -128,7 +128,7 @@ class Workspace:
             raise UsageError(
                 f"{what}() needs {d} outputs over {d} or more coordinates, not {len(self.of)} over {len(self.over)}"
             )
-        _, width, raster = covered(self.values, resolution)
+        _, width, raster = covered(self.values, read_count("resolution", resolution, 1))
         return float(np.count_nonzero(raster) * np.prod(width))
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -98,9 +98,7 @@ def collect_cases(
     UsageError
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
-    lengths: dict[str, int] = (
-        {} if count is None else {"count": read_count("count must be a whole number of runs", count)}
-    )
+    lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
     p = _bound("parameter", module.p_names, module.p, parameters, lengths)
     u = _bound("input", module.u_names, module.u, inputs, lengths)
     states, values = None, {}

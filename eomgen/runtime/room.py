@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from math import isfinite
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -147,16 +148,28 @@ def read_number(what: str, given: Any) -> float:
     return result
 
 
-def read_count(what: str, given: Any) -> int:
-    """A whole number that is not negative.
+def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -> int:
+    """A whole number within limits.
 
     Raises
     ------
     UsageError
     """
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
-        raise UsageError(f"{what}, not {shown(given)}")
-    return int(given)
+    found = as_count(given)
+    if found is None or found < least or (most is not None and found > most):
+        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise UsageError(f"{what} must be a whole number {limits}, not {shown(given)}")
+    return found
+
+
+def as_count(given: Any) -> int | None:
+    """A whole number of Python, NumPy or SymPy; None if it is none, as True and 2.0 are."""
+    if isinstance(given, (bool, float)):
+        return None
+    try:
+        return index(given)
+    except Exception:  # of an object's own __index__ too
+        return None
 
 
 def read_flag(what: str, given: Any) -> bool:

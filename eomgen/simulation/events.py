@@ -19,6 +19,7 @@ from ..limits.runs import CROWD, INSTANT
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.names import check_names, require_time_and_state
+from ..runtime.room import as_count, shown
 from ..runtime.tapes import Formula, is_formula, record_tape, values_together
 
 if TYPE_CHECKING:
@@ -241,12 +242,14 @@ def _unwatched(t: float, x: Array) -> float:
 
 def _times(name: str, given: Any) -> int:
     """At which time an event ends the run: 0 for never."""
-    whole = isinstance(given, (bool, int, np.bool_, np.integer)) or (isinstance(given, float) and given.is_integer())
-    if given is None or (whole and given >= 0):
-        return int(given or 0)
-    raise UsageError(
-        f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), not {given!r}"
-    )
+    plain = given is None or isinstance(given, (bool, np.bool_)) or (isinstance(given, float) and given.is_integer())
+    found = int(given or 0) if plain else as_count(given)
+    if found is None or found < 0:
+        raise UsageError(
+            f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), "
+            f"not {shown(given)}"
+        )
+    return found
 
 
 def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
