@@ -7,7 +7,9 @@ for a run are its names, expressions as text, or functions f(t, x) with SciPy's 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -252,9 +254,22 @@ def _times(name: str, given: Any) -> int:
     return found
 
 
+_SILENT: ContextVar[bool] = ContextVar("events_silent", default=False)
+
+
+@contextmanager
+def told_by_the_caller() -> Iterator[None]:
+    """Within it :func:`warn_of_unknown` is silent: a run that is part of another call, which warns itself."""
+    token = _SILENT.set(True)
+    try:
+        yield
+    finally:
+        _SILENT.reset(token)
+
+
 def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
     """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
-    if names:
+    if names and not _SILENT.get():
         warnings.warn(
             f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
             "found; look for a logarithm, root or quotient outside its domain",
