@@ -19,7 +19,8 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_flag, read_number, read_numbers, require_room, shown
+from ..runtime.room import read_flag, read_number, read_numbers, require_room
+from ..texts import shown
 from .following import Follower
 from .gaps import describe_gap
 from .ground import Ground

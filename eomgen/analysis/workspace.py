@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric import algebra
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_count, read_number
+from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge

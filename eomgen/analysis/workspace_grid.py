@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.counts import as_count, read_count
 from ..numeric.scales import Array
 from ..runtime.names import read_names, unknown
-from ..runtime.room import as_count, as_real, read_count, read_number, read_numbers, shown
+from ..runtime.room import as_real, read_number, read_numbers
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import UsageError
-from ..runtime.room import as_count, read_count, shown
+from ..numeric.counts import as_count, read_count
+from ..texts import shown
 from .compiler import CompilerInfo
 
 #: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code

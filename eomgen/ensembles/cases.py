@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EomgenError, UsageError
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.names import check_names
-from ..runtime.room import read_count, read_numbers, require_room
+from ..runtime.room import read_numbers, require_room
 from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.counts import as_count
 from ..runtime.names import require
-from ..runtime.room import as_count
 from .block import LOST, MEANING, Block, Plan, find_events
 from .blocks import RUNS, Kept, keep, reduce_block
 from .cases import Cases

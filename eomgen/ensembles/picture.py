@@ -6,8 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..numeric.counts import read_count
 from ..runtime.names import require
-from ..runtime.room import read_count
 from ..texts import visible
 
 

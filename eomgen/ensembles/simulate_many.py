@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.counts import read_count
 from ..runtime.names import check_names
-from ..runtime.room import read_count, require_room, require_steps
+from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
 from ..simulation.compiled import can_run

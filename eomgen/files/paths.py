@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from ..runtime.room import shown
+from ..texts import shown
 
 
 def as_path(what: str, given: Any) -> Path:

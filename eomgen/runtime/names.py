@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
-from .room import shown
+from ..texts import shown
 
 
 class UnknownNameError(UsageError, KeyError):

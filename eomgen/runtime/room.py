@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from math import isfinite
-from operator import index
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..numeric.scales import Array
+from ..texts import shown
 
 #: What Python or NumPy would make a float of, or NaN, though it is no real number.
 UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))
@@ -148,30 +148,6 @@ def read_number(what: str, given: Any) -> float:
     return result
 
 
-def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -> int:
-    """A whole number within limits.
-
-    Raises
-    ------
-    UsageError
-    """
-    found = as_count(given)
-    if found is None or found < least or (most is not None and found > most):
-        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise UsageError(f"{what} must be a whole number {limits}, not {shown(given)}")
-    return found
-
-
-def as_count(given: Any) -> int | None:
-    """A whole number of Python, NumPy or SymPy; None if it is none, as True and 2.0 are."""
-    if isinstance(given, (bool, float)):
-        return None
-    try:
-        return index(given)
-    except Exception:  # of an object's own __index__ too
-        return None
-
-
 def read_flag(what: str, given: Any) -> bool:
     """True or False.
 
@@ -189,12 +165,3 @@ def _floats(given: Any, wanted: str) -> Array:
     if found is None:
         raise UsageError(f"{wanted}, not {shown(given)}")
     return found
-
-
-def shown(given: Any) -> str:
-    """What was given, in one line of a message."""
-    try:
-        text = " ".join(repr(given).split())
-    except Exception:  # its own __repr__, or an integer of thousands of digits
-        return f"an object of type {type(given).__name__}, which cannot be shown"
-    return text if len(text) <= 80 else f"{text[:80]}..."

@@ -19,8 +19,9 @@ from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays
 from ..runtime.identity import code_digest, differences, digest
-from ..runtime.room import read_number, shown
+from ..runtime.room import read_number
 from ..runtime.tapes import DeclaredSignal, Formula
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

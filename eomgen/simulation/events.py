@@ -18,11 +18,12 @@ import numpy as np
 from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
 from ..limits.runs import CROWD, INSTANT
+from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.names import check_names, require_time_and_state
-from ..runtime.room import as_count, shown
 from ..runtime.tapes import Formula, is_formula, record_tape, values_together
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -13,9 +13,9 @@ from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..errors import SimulationError, UsageError
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
-from ..runtime.room import read_count
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Residuals, Trajectory
 from .impact_trajectory import ImpactRun

@@ -15,7 +15,8 @@ import numpy as np
 from ..errors import EomgenError, UsageError
 from ..limits.rounding import EPS
 from ..limits.runs import MOST_STATES
-from ..runtime.room import read_count, shown
+from ..numeric.counts import read_count
+from ..texts import shown
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification

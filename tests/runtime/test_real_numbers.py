@@ -13,7 +13,8 @@ import pytest
 import sympy
 
 import eomgen as eg
-from eomgen.runtime.room import as_real, shown
+from eomgen.runtime.room import as_real
+from eomgen.texts import shown
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TARGETS = ("cython", "numpy")
