@@ -9,6 +9,7 @@ from typing import Any
 from .api.model import Model
 from .describe import describe_yaml_file
 from .errors import ModelError, UsageError
+from .files.paths import as_name
 from .numeric.inertia import CHECKS, word_of_check
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
@@ -49,10 +50,7 @@ def load(
     ModelError
         The file cannot be read as a model; what can only be judged as a whole is told by ``Model.mechanism``.
     """
-    try:
-        path = os.fsdecode(path)
-    except TypeError:
-        raise UsageError(f"{path!r:.200} is not the path of a file: give a text or a pathlib.Path") from None
+    path = as_name("path", path)
     suffix = os.path.splitext(path)[1].lower()
     if suffix in ROBOTS:
         from .robots import describe_file  # only where it is needed: MJCF brings its own compiler

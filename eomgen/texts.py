@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 #: Characters of the generated lines that hold a comment or a literal.
 WIDTH = 114
@@ -129,3 +130,12 @@ def html_table(title: str, facts: Iterable[tuple[str, str]], doc: str = "") -> s
     left = "style='text-align:left'"
     rows = "".join(f"<tr><th {left}>{html_text(a)}</th><td {left}>{html_text(b)}</td></tr>" for a, b in facts)
     return f"<b>{html_text(title)}</b>{f'<p>{html_text(doc)}</p>' if doc else ''}<table>{rows}</table>"
+
+
+def shown(given: Any) -> str:
+    """What was given, in one line of a message."""
+    try:
+        text = " ".join(repr(given).split())
+    except Exception:  # its own __repr__, or an integer of thousands of digits
+        return f"an object of type {type(given).__name__}, which cannot be shown"
+    return text if len(text) <= 80 else f"{text[:80]}..."

@@ -24,7 +24,8 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.names import read_names
-from ..runtime.room import read_number, read_numbers, shown
+from ..runtime.room import read_number, read_numbers
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

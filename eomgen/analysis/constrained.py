@@ -12,7 +12,8 @@ from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..numeric import algebra
 from ..numeric.scales import Array, Scales
-from ..runtime.room import as_real, read_numbers, shown
+from ..runtime.room import as_real, read_numbers
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

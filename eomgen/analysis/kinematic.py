@@ -19,9 +19,11 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_flag, read_number, read_numbers, require_room, shown
+from ..runtime.room import read_flag, read_number, read_numbers, require_room
+from ..texts import shown
 from .following import Follower
 from .gaps import describe_gap
+from .ground import Ground
 from .motions import KinematicAnalysis, keep
 from .singular import Singular
 from .tracks import Track
@@ -310,6 +312,7 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
     columns: list[tuple[Array, Array, Array]] = []
     found: list[Singular] = []
     stop: Singular | None = None
+    ground = Ground(asked.t, asked.y)
     count = 0
     for first, last in pieces:
         t, y = float(asked.t[first]), asked.y[:, first]
@@ -317,7 +320,8 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
         length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
         path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0, initial=0.0)
-        track = Track(follower, path, q, length)
+        track = Track(follower, path, q, length, ground.known(first, last) * length)
+        ground.walked(first, last, track.smooth)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([track.holds(s) for s in along])
         taken = np.arange(len(along))[new][reach[new]]

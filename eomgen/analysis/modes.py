@@ -6,7 +6,7 @@ damped ones are the eigenvalues of A.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -155,7 +155,7 @@ def modes(
     *,
     p: Any = None,
     u: Any = None,
-    independent: Any = None,
+    independent: Sequence[str] | None = None,
 ) -> Modes:
     """Natural frequencies, mode shapes and damping ratios of small motions about an equilibrium.
 

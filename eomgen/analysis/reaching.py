@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..runtime.names import unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_number, read_numbers, shown
+from ..runtime.room import read_number, read_numbers
+from ..texts import shown
 from .following import Follower
 from .gaps import describe_gap
 from .kinematic import complete, start_from

@@ -16,7 +16,7 @@ ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean anoth
 
 
 class Track:
-    """A walk from s = 0 to ``end``, or as far as it goes.
+    """A walk from s = 0 to ``end``, or as far as it goes; the way to ``known`` is smooth and was walked before.
 
     Attributes
     ----------
@@ -28,10 +28,10 @@ class Track:
         Change points on the way.
     """
 
-    def __init__(self, follower: Follower, path: Path, start: Array, end: float) -> None:
+    def __init__(self, follower: Follower, path: Path, start: Array, end: float, known: float = 0.0) -> None:
         self.follower, self.path, self.end = follower, path, end
         self.walk = walk = Walk(follower, path, start)
-        whole = walk.to(end)
+        whole = walk.to(end, known)
         self.bridges, self.singular = judge_walk(walk)
         self.stop: Singular | None = None
         self.reached = end
@@ -41,6 +41,11 @@ class Track:
         self.nodes = np.array([p.s for p in walk.points])
         self._values = np.array([p.q for p in walk.points]).T
         self._slopes = np.array([follower.scales.rates(p.q, p.tangent.rate) for p in walk.points]).T
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it came to its end without a stop, a change point or a leap."""
+        return not (self.stop or self.singular or self.bridges or self.walk.leaps)
 
     def holds(self, s: float) -> bool:
         """Whether s can be reached."""

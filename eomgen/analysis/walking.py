@@ -74,14 +74,17 @@ class Walk:
         q = self.follower.position(*self.path.at(s), guess)
         return None if q is None else Point(s, q, self.tangent(s, q))
 
-    def to(self, end: float) -> bool:
-        """Walk on until s = end, or beyond if a leap ends there; returns False where the way is blocked before."""
-        longest = end / FEWEST  # however still it stands: a pulse must not be stepped over
+    def to(self, end: float, known: float = 0.0) -> bool:
+        """Walk on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
+
+        Up to s = ``known`` the way was walked before and is smooth, so that only the motion limits the steps.
+        """
         for _ in range(STEPS):
             here = self.points[-1]
             left = end - here.s
             if left <= 0.0:
                 return True
+            longest = max(end / FEWEST, known - here.s)  # however still it stands: a pulse must not be stepped over
             rate = largest(here.tangent.rate / self.follower.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric import algebra
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.names import require, unknown
 from ..runtime.refusals import require_velocities
@@ -128,7 +129,7 @@ class Workspace:
             raise UsageError(
                 f"{what}() needs {d} outputs over {d} or more coordinates, not {len(self.of)} over {len(self.over)}"
             )
-        _, width, raster = covered(self.values, resolution)
+        _, width, raster = covered(self.values, read_count("resolution", resolution, 1))
         return float(np.count_nonzero(raster) * np.prod(width))
 
     def to_pandas(self) -> pandas.DataFrame:

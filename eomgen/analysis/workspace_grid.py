@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.counts import as_count, read_count
 from ..numeric.scales import Array
 from ..runtime.names import read_names, unknown
-from ..runtime.room import as_real, read_count, read_number, read_numbers, shown
+from ..runtime.room import as_real, read_number, read_numbers
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -64,7 +66,7 @@ def read_grid(
     ------
     UsageError
     """
-    layout, points = module.layout, read_count("points must be a whole number", points)
+    layout, points = module.layout, read_count("points", points)
     if not isinstance(over, Mapping) or not over:
         raise UsageError(
             f"over names coordinates and their values, such as {{'theta': (0, 6.28, 73)}}, not {shown(over)}"
@@ -104,13 +106,9 @@ def _kind(layout: Layout, name: str) -> str:
 def _axis(name: str, given: Any) -> Array:
     """Values of one axis from (low, high, count) or from the values themselves."""
     what = f"over {name}: give (low, high, count) or two or more rising or falling values"
-    if isinstance(given, tuple) and len(given) == 3 and isinstance(given[2], (int, np.integer)):
-        count = given[2]
-        if isinstance(count, bool) or count < 2:
-            raise UsageError(f"{what}; a count is at least 2, not {count!r}")
-        if count > 10_000_000:
-            raise UsageError(f"over {name}: {count} values are too many")
-        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), int(count))
+    if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
+        count = read_count(f"over {name}: the third of (low, high, count)", given[2], 2, 10_000_000)
+        given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
     values = as_real(given)
     if values is None:
         raise UsageError(f"{what}, not {shown(given)}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
 from ..derivation import Derivation
+from ..runtime.names import find_lacking
 from .module import Module
 
 if TYPE_CHECKING:
@@ -35,6 +36,11 @@ class Equations(Derivation):
     system_size : tuple of int or None
         Unknowns and entries of that linear system.
     """
+
+    if not TYPE_CHECKING:  # type checkers know all attributes
+
+        def __getattr__(self, name: str) -> Any:
+            return find_lacking(self, "Equations", name)
 
     def compile(self, target: str = "cython", kernels: Sequence[str] | None = None, **options: Any) -> Module:
         """Generate code, compile it and load it.

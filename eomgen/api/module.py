@@ -11,6 +11,7 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from ..runtime.bound_model import BoundModel
+from ..runtime.names import find_lacking
 from ..runtime.refusals import require_velocities
 
 if TYPE_CHECKING:
@@ -181,10 +182,7 @@ class Module(BoundModel):
             from ..simulation.steppers import find_solver
 
             return find_solver(self, name)
-        if (own := getattr(type(self), name, None)) is not None:
-            return own.__get__(self)  # a property that this model does not have: once more, for its own reason
-        calls = ", ".join(sorted(n for n in (*dir(type(self)), *self.__dict__) if not n.startswith("_")))
-        raise AttributeError(f"a Module has no attribute {name!r}; there are: {calls}")
+        return find_lacking(self, "a Module", name)
 
     def __repr__(self) -> str:
         from ..runtime.report import line

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import UsageError
+from ..numeric.counts import as_count, read_count
+from ..texts import shown
 from .compiler import CompilerInfo
 
 #: gcc: -O1. Measured with gcc 12 on one call of a right-hand side, beside -O2, which vectorises straight-line code
@@ -52,12 +54,17 @@ class Options:
     jobs: int | None = None
 
     def __post_init__(self) -> None:
-        if self.optimize not in (None, 0, 1, 2, 3):
-            raise UsageError(f"optimize must be None, 0, 1, 2 or 3, not {self.optimize!r}")
-        if self.lanes not in (None, 0, 2, 4, 8):
-            raise UsageError(f"lanes must be None, 0, 2, 4 or 8, not {self.lanes!r}")
+        for name, allowed in (("optimize", (0, 1, 2, 3)), ("lanes", (0, 2, 4, 8))):
+            if (given := getattr(self, name)) is None:
+                continue
+            if as_count(given) not in allowed:
+                *but, last = allowed
+                raise UsageError(f"{name} must be None, {', '.join(map(str, but))} or {last}, not {shown(given)}")
+            object.__setattr__(self, name, as_count(given))
+        if self.jobs is not None:
+            object.__setattr__(self, "jobs", read_count("jobs, files compiled at a time,", self.jobs, 1))
         if not isinstance(self.compiler, str | None):
-            raise UsageError(f"compiler must be a text, the command line of a compiler, not {self.compiler!r}")
+            raise UsageError(f"compiler must be a text, the command line of a compiler, not {shown(self.compiler)}")
         if isinstance(self.extra, str):
             raise UsageError(f"extra must be a sequence of flags, not the text {self.extra!r}")
         object.__setattr__(self, "extra", tuple(self.extra))

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import ExpressionError
+from ..files.paths import usable_name
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
@@ -137,14 +138,10 @@ class Reader:
         if not isinstance(value, str | os.PathLike):
             self.wrong(path, value, "file")
             return None
-        name = str(os.fspath(value))
-        try:
-            usable = b"\0" not in os.fsencode(name)
-        except UnicodeEncodeError:
-            usable = False
-        if not usable:
-            self.faults.add(path, f"{name!r} holds a character that no file name can", "rename the file")
-        return name if usable else None
+        name = usable_name(value)
+        if name is None:
+            self.faults.add(path, f"{value!r:.200} is empty, or holds a character that no file name can", "rename it")
+        return name
 
     def flag(self, path: str, value: Any) -> bool:
         """True or false; True when it is neither."""

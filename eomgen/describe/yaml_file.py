@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ModelError, Problem
+from ..files.paths import as_name
 from ..files.reading import open_plain
 from .description import SECTIONS, Description, Faults
 from .fields import KINDS, MODEL, SHORT
@@ -39,7 +40,7 @@ def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = Fal
     ModelError
         The file is not YAML or not a mapping.
     """
-    name = os.fsdecode(path)
+    name = as_name("path", path)
     with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:

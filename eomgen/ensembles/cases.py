@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EomgenError, UsageError
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.names import check_names
-from ..runtime.room import read_count, read_numbers, require_room
+from ..runtime.room import read_numbers, require_room
 from ..simulation.run_arguments import find_state
 
 if TYPE_CHECKING:
@@ -98,9 +99,7 @@ def collect_cases(
     UsageError
         Unknown names, values that are not finite, and lengths that differ, all named.
     """
-    lengths: dict[str, int] = (
-        {} if count is None else {"count": read_count("count must be a whole number of runs", count)}
-    )
+    lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
     p = _bound("parameter", module.p_names, module.p, parameters, lengths)
     u = _bound("input", module.u_names, module.u, inputs, lengths)
     states, values = None, {}

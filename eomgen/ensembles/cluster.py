@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.counts import as_count
 from ..runtime.names import require
 from .block import LOST, MEANING, Block, Plan, find_events
 from .blocks import RUNS, Kept, keep, reduce_block
@@ -40,8 +41,8 @@ def open_client(cluster: Any) -> Iterator[Any]:
     distributed: Any = require("distributed", "eomgen[cluster]", "cluster=")
     if isinstance(cluster, distributed.Client):
         yield cluster
-    elif cluster is True or cluster == "local" or (isinstance(cluster, int) and cluster > 0):
-        workers = None if cluster is True or cluster == "local" else cluster
+    elif cluster is True or (isinstance(cluster, str) and cluster == "local") or (as_count(cluster) or 0) > 0:
+        workers = as_count(cluster)
         if workers is None:
             import os
 

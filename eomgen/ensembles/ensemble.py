@@ -36,7 +36,7 @@ class Failure(NamedTuple):
 
 
 class Ensemble:
-    """The result of :meth:`Module.simulate_many`.
+    """The result of :meth:`~..api.module.Module.simulate_many`.
 
     ``ens["theta"]`` is the column (k,) at the end of the runs, or (m, k) at the times ``t_eval``: coordinates,
     velocities and outputs.  Runs that failed hold NaN; ``reached`` has the states they came to.

@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..numeric.counts import read_count
 from ..runtime.names import require
 from ..texts import visible
 
@@ -25,7 +26,7 @@ class Columns(Protocol):
 
 def draw(ensemble: Columns, name: str, ax: Any, limit: int) -> Any:
     """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
-    values = ensemble[name]
+    values, limit = ensemble[name], read_count("limit, of the runs drawn,", limit, 1)
     if ax is None:
         plt: Any = require("matplotlib.pyplot", "matplotlib", "plot")
         ax = plt.subplots(figsize=(7, 4), layout="constrained")[1]

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
-from ..runtime.room import shown
+from ..texts import shown
 from .block import EVENT, Block, Plan, inputs_at
 from .cases import Cases
 

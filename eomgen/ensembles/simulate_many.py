@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..numeric.counts import read_count
 from ..runtime.names import check_names
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
@@ -123,7 +124,7 @@ def simulate_many(
     reduction = choose_reduction(reduce)
     named = tuple(constants) if isinstance(constants, Mapping) else () if constants is None else module.u_names
     plan = _plan(module, span, method, t_eval, tables, named, max_steps, step, options, (events, keep_events))
-    threads = _positive("threads", threads, os.cpu_count() or 1)
+    threads = (os.cpu_count() or 1) if threads is None else read_count("threads", threads, 1)
     watch = Progress(0.0, float(cases.count), 0.0 if progress else 2.0, "{:.0f} runs") if wanted(progress) else None
     each = module.n_x * (1 if plan.t_eval is None else len(plan.t_eval))
     each += plan.keep_events * (2 + module.n_x) if find_events(module, plan).names else 0
@@ -142,7 +143,7 @@ def simulate_many(
 
             client = stack.enter_context(open_client(cluster))
             workers = count_workers(client)
-        length = _positive("block", block, choose_size(cases.count, size, workers or 1))
+        length = choose_size(cases.count, size, workers or 1) if block is None else read_count("block", block, 1)
         if store is not None and block is None:
             lanes = WIDEST if module.layout.rank == 0 and not find_events(module, plan).names else 1
             length = stored_length(store) or min(length, max(lanes * threads, -(-cases.count // STORED)))
@@ -215,7 +216,7 @@ def _plan(
     chosen = check_tolerances(module.n_x, abs(end - start), chosen)
     require_steps("max_step", float(chosen.get("max_step", np.inf)), start, end)
     times = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
-    most, keep = _positive("max_steps", max_steps, 1), _positive("keep_events", watched[1], 1)
+    most, keep = read_count("max_steps", max_steps, 1), read_count("keep_events", watched[1], 1)
     plan = Plan((start, end), method, chosen, most, times, tables, watched[0], keep, constants)
     find_events(module, plan)
     return plan
@@ -243,14 +244,6 @@ def _separate(layout: Layout, inputs: Any) -> tuple[dict[str, Any], Any]:
             raise UsageError(f"input {rate} is not the rate of {name}, which is a number in each run; give {rate} as 0")
     held = {rate: 0.0 for rate, (name, _, _) in still.items() if name in rest}
     return tables, {**{name: x for name, x in rest.items() if name not in only}, **held} or None
-
-
-def _positive(what: str, given: Any, default: int) -> int:
-    if given is None:
-        return default
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 1:
-        raise UsageError(f"{what} must be a whole number of at least 1, not {given!r}")
-    return int(given)
 
 
 def _open_store(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
+from ..texts import shown
 
 
 def as_path(what: str, given: Any) -> Path:
@@ -15,13 +16,29 @@ def as_path(what: str, given: Any) -> Path:
     Raises
     ------
     UsageError
-        It is something else, empty, or holds a NUL, which no name can.
+        It is something else (bytes too), empty, or holds what no name can: a NUL, half of a surrogate pair.
     """
+    return Path(as_name(what, given))
+
+
+def as_name(what: str, given: Any) -> str:
+    """The same as text, as it was written.
+
+    Raises
+    ------
+    UsageError
+    """
+    name = usable_name(given)
+    if name is None:
+        raise UsageError(f"{what} must be the name of a file or folder, as text or Path, not {shown(given)}")
+    return name
+
+
+def usable_name(given: Any) -> str | None:
+    """The text of a path; None where it is none."""
     try:
-        path = os.fspath(given)
-        os.fsencode(path)
-    except (TypeError, UnicodeEncodeError):
-        path = b""
-    if not isinstance(path, str) or not path or "\0" in path:
-        raise UsageError(f"{what} must be the name of a file or folder, as text or Path, not {given!r:.80}")
-    return Path(path)
+        name = os.fspath(given)
+        usable = isinstance(name, str) and name and b"\0" not in os.fsencode(name)
+    except Exception:  # of an object's own __fspath__ too
+        return None
+    return name if usable else None

@@ -10,6 +10,7 @@ import stat
 from typing import BinaryIO
 
 from ..errors import UsageError
+from .paths import as_name
 
 #: What a name may stand for that is no plain file.
 KINDS = (
@@ -37,11 +38,8 @@ def open_plain(path: str | os.PathLike[str], *, follow: bool = True) -> BinaryIO
     OSError
         It is not there, or cannot be read.
     """
-    try:
-        name = os.fspath(path)
-        status = os.stat(name, follow_symlinks=follow)
-    except (TypeError, ValueError) as error:  # no path, NUL, or half a surrogate pair
-        raise UsageError(f"{path!r:.200} is not the name of a file: {error}") from None
+    name = as_name("path", path)
+    status = os.stat(name, follow_symlinks=follow)
     _require_plain(name, status)  # a socket cannot be opened, and some devices act when they are
     flags = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)
     descriptor = os.open(name, flags if follow else flags | getattr(os, "O_NOFOLLOW", 0))

@@ -109,7 +109,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
 
 def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> None:
     """Write a picture of matplotlib; the ending says its kind; see :func:`whole_file`."""
-    kind = Path(path).suffix[1:].lower()
+    kind = as_path("path", path).suffix[1:].lower()
     with whole_file(path) as file:
         figure.savefig(file, format=kind or None, **options)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from ..errors import MissingDependencyError, UsageError
+from ..files.paths import as_path
 from ..files.writing import save_figure
 
 TREE, CUT, ELEMENT, BODY = "#1f4e79", "#c0392b", "#7d5ba6", "#eaf1f8"
@@ -77,7 +78,7 @@ def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any
         ax = Figure(figsize=size, layout="constrained").add_subplot()
     if file is not None:
         known = ax.figure.canvas.get_supported_filetypes()
-        if Path(file).suffix[1:].lower() not in known:
+        if as_path("file", file).suffix[1:].lower() not in known:
             raise UsageError(f"{file}: the ending says what kind of picture; there are .{', .'.join(sorted(known))}")
     font = max(SMALLEST, min(LARGEST, 10.0 * 40.0 / WIDE / max(places.columns, 27)))
     tree = {branch["joint"] for branch in report.tree}

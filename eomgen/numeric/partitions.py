@@ -67,6 +67,7 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     n = J.shape[1]
     preferred = np.ones(n, dtype=bool)
     preferred[np.asarray(independent, dtype=np.intp)] = False
+    columns = np.flatnonzero(preferred)
     work = np.array(J)
     size = float(np.abs(J).max()) if J.size else 0.0
     rows = np.empty(rank, dtype=np.intp)
@@ -76,9 +77,9 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
         magnitude = np.abs(work)
         magnitude[rows[:step]] = 0.0
         magnitude[:, dependent[:step]] = 0.0
-        row, column, best = _best(magnitude[:, preferred])
+        row, column, best = _best(magnitude.take(columns, axis=1))
         if best > 0.0:
-            column = int(np.flatnonzero(preferred)[column])
+            column = int(columns[column])
         if not strict:
             row_any, column_any, best_any = _best(magnitude)
             weakest = min(weakest, best_any)
@@ -94,15 +95,15 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
         smallest = min(smallest, best)
         rows[step], dependent[step] = row, column
         pivot_row = work[row] / work[row, column]
-        work -= np.outer(work[:, column], pivot_row)
+        work -= work[:, column, None] * pivot_row
         work[row] = pivot_row
     chosen = set(dependent.tolist())
     order = [int(i) for i in independent if int(i) not in chosen]
     kept = np.array(order + [i for i in range(n) if i not in chosen and i not in set(order)], dtype=np.intp)
-    inverse: Array = np.asarray(algebra.inv(J[np.ix_(rows, dependent)]), dtype=np.float64)
+    inverse: Array = np.asarray(algebra.inv(J[rows[:, None], dependent]), dtype=np.float64)
     B = np.zeros((n, n - rank))
     B[kept, np.arange(n - rank)] = 1.0
-    B[dependent] = -inverse @ J[np.ix_(rows, kept)]
+    B[dependent] = -inverse @ J[rows[:, None], kept]
     relative = (smallest / size, weakest / size) if size else (1.0, 1.0)
     return Partition(dependent, kept, rows, inverse, B, *relative)
 

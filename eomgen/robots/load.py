@@ -13,6 +13,7 @@ import numpy as np
 from ..describe.description import Description
 from ..describe.names import nearest
 from ..errors import ModelError, UsageError
+from ..files.paths import as_name
 from ..limits.files import LARGEST
 from ..numeric.inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
@@ -94,8 +95,8 @@ def make_options(given: dict[str, Any]) -> Options:
     given = {key: _names(key, value) if key in ("actuate", "lock") else value for key, value in given.items()}
     if not _is_number(given.get("snap", 0.0)) or given.get("snap", 0.0) < 0.0:
         raise UsageError(f"snap={given['snap']!r}: an angle (rad), 0 or positive")
-    if not isinstance(given.get("assets"), str | os.PathLike | None):
-        raise UsageError(f"assets={given['assets']!r}: the path of a folder")
+    if given.get("assets") is not None:
+        as_name("assets", given["assets"])
     return Options(**given)
 
 

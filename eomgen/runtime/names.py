@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
-from .room import shown
+from ..texts import shown
 
 
 class UnknownNameError(UsageError, KeyError):
@@ -19,18 +19,38 @@ class UnknownNameError(UsageError, KeyError):
 
 def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
     """The error for an unknown name, with near misses or, if there are none, what there is."""
+    return UnknownNameError(f"no {what} {name!r}; {_hint(name, allowed)}")
+
+
+def find_lacking(one: object, kind: str, name: str) -> Any:
+    """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
+
+    Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
+
+    Raises
+    ------
+    AttributeError
+        With near misses; a property that raised one raises its own again.
+    """
+    if name.startswith("_"):
+        raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
+    if (own := getattr(type(one), name, None)) is not None:
+        return own.__get__(one)
+    public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
+    raise AttributeError(f"{kind} has no attribute {name!r}; {_hint(name, public, len(public))}", name=name)
+
+
+def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
     from difflib import get_close_matches  # only needed when something went wrong
 
     choice = list(dict.fromkeys(allowed))
     near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
     if near:
-        hint = f"did you mean {' or '.join(near)}?"
-    elif not choice:
-        hint = "there are none"
-    else:
-        shown = ", ".join(choice[:20])
-        hint = f"there {'is' if len(choice) == 1 else 'are'} {shown}{' ...' if len(choice) > 20 else ''}"
-    return UnknownNameError(f"no {what} {name!r}; {hint}")
+        return f"did you mean {' or '.join(near)}?"
+    if not choice:
+        return "there are none"
+    first = ", ".join(choice[:most])
+    return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
 
 
 def check_names(

@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from ..errors import STATUS, EvaluationError, NonFiniteError
 from ..kernel_table import NAMED
 from ..numeric.scales import Array
+from ..texts import shown
 from .layout import Layout
 from .numpy_drivers import Drivers
-from .room import as_real, read_vector, shown
+from .room import as_real, read_vector
 
 #: f(t, x, u, c) -> out
 Block: TypeAlias = Callable[[Any, Array, Array, Array], Array]

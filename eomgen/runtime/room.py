@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import nullcontext
 from math import isfinite
 from typing import Any
 
@@ -11,9 +11,13 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.runs import MOST_NUMBERS, MOST_STEPS
 from ..numeric.scales import Array
+from ..texts import shown
 
 #: What Python or NumPy would make a float of, or NaN, though it is no real number.
 UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))
+#: Numbers that are read without a look at each.
+PLAIN = frozenset((float, int, bool, np.float64))
+DEEPEST = 64  #: lists in lists, as in NumPy
 
 
 def require_room(what: str, numbers: float, remedy: str) -> None:
@@ -46,20 +50,40 @@ def as_real(given: Any) -> Array | None:
     """What is given as an array of floats (float64), itself if it is one; None if these are no real numbers.
 
     Real numbers are what NumPy converts to float64: floats, integers, booleans, Fractions, Decimals, numbers of SymPy,
-    in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none.
+    in lists and arrays too.  Texts, dates, complex numbers, None and masked entries are none, nor is what fails to
+    convert, whatever it raises.  The compiled layer has the same rule in C, templates/cython/_numbers.pxi.
     """
-    if type(given) is np.ndarray and given.dtype == np.float64:
-        return given
     try:
+        if type(given) is np.ndarray:
+            if given.dtype == np.float64:
+                return given
+            if given.dtype.kind in "biuf" and given.itemsize <= 8:
+                return given.astype(float)
+        elif type(given) in (list, tuple) and PLAIN.issuperset(map(type, given)):
+            return np.array(given, dtype=float)
+        elif has_masked(given):
+            return None
         array = np.asarray(given)
         kind = array.dtype.kind
-        if kind not in "biufO" or (kind == "O" and any(isinstance(one, UNREAL) for one in array.flat)):
+        if kind not in "biufO":
             return None
-        if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
+        if kind == "O" and any(isinstance(one, UNREAL) or has_masked(one) for one in array.flat):
             return None
-        return array.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
+        with np.errstate(over="ignore") if array.itemsize > 8 else nullcontext():
+            return array.astype(float, copy=False)
+    except MemoryError:
+        raise
+    except Exception:  # of an object's own __array__, __float__, ...
         return None
+
+
+def has_masked(given: Any, depth: int = 0) -> bool:
+    """Whether NumPy would read the value under a masked entry, or NaN, in an array or in lists of these."""
+    if isinstance(given, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(given))
+    if not isinstance(given, (list, tuple)) or depth > DEEPEST or PLAIN.issuperset(map(type, given)):
+        return False
+    return any(has_masked(one, depth + 1) for one in given)
 
 
 def read_numbers(what: str, given: Any, width: float = 1.0) -> Array:
@@ -97,8 +121,11 @@ def read_times(what: str, given: Any, per_time: int) -> Array:
     ------
     UsageError
     """
-    with suppress(TypeError):  # no length: one number, or what is no list of times
-        require_room(f"{what} with {len(given)} times", len(given) * per_time, "give fewer, or run in parts")
+    try:
+        length = len(given)
+    except Exception:  # one number, or what is no list of times
+        length = 0
+    require_room(f"{what} with {length} times", length * per_time, "give fewer, or run in parts")
     return np.array(_floats(given, f"{what} must be a list of times in seconds"))
 
 
@@ -121,18 +148,6 @@ def read_number(what: str, given: Any) -> float:
     return result
 
 
-def read_count(what: str, given: Any) -> int:
-    """A whole number that is not negative.
-
-    Raises
-    ------
-    UsageError
-    """
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)) or given < 0:
-        raise UsageError(f"{what}, not {shown(given)}")
-    return int(given)
-
-
 def read_flag(what: str, given: Any) -> bool:
     """True or False.
 
@@ -150,9 +165,3 @@ def _floats(given: Any, wanted: str) -> Array:
     if found is None:
         raise UsageError(f"{wanted}, not {shown(given)}")
     return found
-
-
-def shown(given: Any) -> str:
-    """What was given, in one line of a message."""
-    text = " ".join(repr(given).split())
-    return text if len(text) <= 80 else f"{text[:80]}..."

@@ -14,7 +14,7 @@ from ..errors import UsageError
 from ..files.paths import as_path
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
-from .names import require, unknown
+from .names import find_lacking, require, unknown
 from .room import read_numbers
 from .storage import FORMAT, Stored, save
 
@@ -134,6 +134,11 @@ class Trajectory:
     def x_names(self) -> tuple[str, ...]:
         """Names of the rows of x."""
         return tuple(self.metadata["x_names"])
+
+    if not TYPE_CHECKING:  # type checkers know all attributes
+
+        def __getattr__(self, name: str) -> Any:
+            return find_lacking(self, f"a {type(self).__name__}", name)
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Sequence
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +19,9 @@ from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays
 from ..runtime.identity import code_digest, differences, digest
+from ..runtime.room import read_number
 from ..runtime.tapes import DeclaredSignal, Formula
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -54,11 +55,12 @@ class Checkpoint:
 
     def __init__(self, file: Any, every: float, resume: bool | None) -> None:
         path = as_path("checkpoint", file)
-        if isinstance(every, bool) or not isinstance(every, (int, float)) or not (every >= 0.0 and isfinite(every)):
-            raise UsageError(f"checkpoint_every must be a number of seconds, not {every!r}")
+        every = read_number("checkpoint_every", every)
+        if every < 0.0:
+            raise UsageError(f"checkpoint_every must be a number of seconds from 0, not {every}")
         if not isinstance(resume, bool | None):
-            raise UsageError(f"resume must be True, False or None, not {resume!r}")
-        self.file, self.every, self.resume = path, float(every), resume
+            raise UsageError(f"resume must be True, False or None, not {shown(resume)}")
+        self.file, self.every, self.resume = path, every, resume
         self.identity: dict[str, Any] = {}
         self.kept: dict[str, Any] | None = None
         self.warned = False

@@ -17,10 +17,10 @@ from ..errors import ZenoError
 from ..limits.rounding import EPS
 from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, Together, crowd_of
+from .event_values import EventValues
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, crowd_of
 
 GOLDEN = 0.3819660112501051
-AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call
 
 Found = TypeVar("Found")
 #: Yields times within a step, is sent the value of one event there, and returns what it looked for.
@@ -75,41 +75,24 @@ class Crossings:
         self.size, self.leaving, self.touch = np.empty(n), [0] * n, [0] * n
         self.resets, self.crowded, self.last = 0, 0, np.inf
         self.crowd = crowd_of([event.action for event in events])
-        self.together: dict[int, tuple[Together, list[int]]] = {}  #: what gives several values, and of which events
-        self.alone: list[int] = []
-        for i, event in enumerate(events):
-            if event.source is None:
-                self.alone.append(i)
-            else:
-                self.together.setdefault(id(event.source[0]), (event.source[0], []))[1].append(i)
+        self.values = EventValues(events)
 
     # -- values ---------------------------------------------------------------------------------------------------
-    def _values(self, t: float, x: Array) -> Array:
-        g = np.empty(len(self.events))
-        for i in self.alone:
-            g[i] = self.events[i](t, x)
-        for together, places in self.together.values():
-            values = together.values(t, x)
-            for i in places:
-                event = self.events[i]
-                g[i] = event.judge(t, float(values[event.source[1]]))  # type: ignore[index]
-        return g
-
     def _slopes(self, t: float, x: Array, f: Array, g: Array, length: float, way: float = 1.0) -> Array:
         """Rates of the values along the motion, by a short way along x', onward (1) or back (-1)."""
         h = way * ASIDE * (length or self.forward * max(abs(t), 1.0) * MOMENTARY)
-        return (self._values(t + h, x + h * f) - g) / h
+        return (self.values(t + h, x + h * f) - g) / h
 
     def arm(self, t: float, x: Array, length: float = 0.0) -> None:
         """Begin at a state; `length` is that of the step to come, with its sign, if it is known."""
-        self.g = self._values(t, x)
+        self.g = self.values(t, x)
         self.size = np.abs(self.g)
         self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
 
     # -- one step -------------------------------------------------------------------------------------------------
     def find(self, step: Step) -> tuple[float, bool] | None:
         """Note the zeros of a step, up to one at which the run stops: its time, and whether the run ends there."""
-        new, f = self._values(step.t, step.x), np.asarray(self.rhs(step.t, step.x))
+        new, f = self.values(step.t, step.x), np.asarray(self.rhs(step.t, step.x))
         self.slope_new = self._slopes(step.t, step.x, f, new, step.length)
         brackets = self._brackets(step, new)
         zeros = self._searched(step, [(z.event, self._zero(z)) for z in brackets])
@@ -140,9 +123,6 @@ class Crossings:
     def _state(step: Step, t: float) -> Array:
         return np.asarray(step.between(t))
 
-    def _value(self, step: Step, i: int, t: float) -> float:
-        return self.events[i](t, self._state(step, t))
-
     def _searched(self, step: Step, searches: Sequence[tuple[int, Search[Found]]]) -> list[Found]:
         """Results of searches in the values of events, all of which go on side by side."""
         results: dict[int, Found] = {}
@@ -161,28 +141,13 @@ class Crossings:
     def _scattered(self, step: Step, asked: Sequence[tuple[int, float]]) -> list[float]:
         """Values of events, each at its time."""
         if len(asked) < 2:
-            return [self._value(step, i, t) for i, t in asked]
+            return [self.events[i](t, self._state(step, t)) for i, t in asked]
         times = np.array([t for _, t in asked])
         states = np.ascontiguousarray(np.asarray(step.between(times)).T)
-        values: dict[int, float] = {}
-        for together, places in self.together.values():
-            if together.columns is None:
-                continue
-            watched = set(places)
-            mine = [k for k, (i, _) in enumerate(asked) if i in watched]
-            size = max(AT_ONCE // len(places), 1)
-            for part in (mine[n : n + size] for n in range(0, len(mine), size)):
-                table = together.columns(times[part], np.ascontiguousarray(states[part].T))
-                for column, k in enumerate(part):
-                    event = self.events[asked[k][0]]
-                    values[k] = event.judge(asked[k][1], float(table[event.source[1], column]))  # type: ignore[index]
-        for k, (i, t) in enumerate(asked):
-            if k not in values:
-                values[k] = self.events[i](t, states[k])
-        return [values[k] for k in range(len(asked))]
+        return self.values.each([i for i, _ in asked], times, states)
 
     def _brackets(self, step: Step, new: Array) -> list[Bracket]:
-        found: list[list[Bracket]] = []
+        found: list[Bracket] = []
         searched: list[tuple[int, Search[list[Bracket]]]] = []
         for i, event in enumerate(self.events):
             a, b = float(self.g[i]), float(new[i])
@@ -190,26 +155,26 @@ class Crossings:
             noted = a == 0.0 and bool(self.t[i]) and self.t[i][-1] == step.t_old
             if event.direction != UNWATCHED and not (noted and not self.leaving[i]):
                 if self.leaving[i]:
-                    found.append(self._after_reset(step, i, b))
+                    searched.append((i, self._after_reset(step, i, b)))
                 elif a == 0.0 and self.forward * float(self.slope[i]) * b < 0.0:
-                    found.append(self._from_zero(step, i, b))
+                    searched.append((i, self._from_zero(step, i, b)))
                 elif (a <= 0.0 <= b) or (a >= 0.0 >= b):
-                    found.append([Bracket(i, step.t_old, step.t, a, b)])
+                    found.append(Bracket(i, step.t_old, step.t, a, b))
                 elif isnan(a) != isnan(b):
                     searched.append((i, self._within_domain(step, i, a, b)))
                 elif self._may_touch(step, i, a, b):
                     searched.append((i, self._touching(step, i, a, b)))
                 self.size[i] = np.fmax(self.size[i], abs(b))
-        found += self._searched(step, searched)
-        every = sorted((z for few in found for z in few), key=lambda z: z.event)
-        return [z for z in every if not self.events[z.event].direction * (z.fb - z.fa) < 0.0]
+        found += [z for several in self._searched(step, searched) for z in several]
+        found.sort(key=lambda z: z.event)
+        return [z for z in found if not self.events[z.event].direction * (z.fb - z.fa) < 0.0]
 
-    def _after_reset(self, step: Step, i: int, last: float) -> list[Bracket]:
+    def _after_reset(self, step: Step, i: int, last: float) -> Search[list[Bracket]]:
         """A reset left the value at zero: it has to be seen on its side before it can come back."""
         t, g, seen, side = step.t_old, 0.0, False, self.leaving[i]
         for k in range(HALVED, -1, -1):
             later = step.t if k == 0 else step.t_old + (step.t - step.t_old) * 2.0**-k
-            value = last if k == 0 else self._value(step, i, later)
+            value = last if k == 0 else (yield later)
             if seen and value * side <= 0.0:
                 self.leaving[i] = 0
                 return [Bracket(i, t, later, g, value)]
@@ -222,13 +187,13 @@ class Crossings:
             raise self._endless(step.t)
         return [Bracket(i, step.t_old, step.t_old, float(side), 0.0)] if back else []
 
-    def _from_zero(self, step: Step, i: int, last: float) -> list[Bracket]:
+    def _from_zero(self, step: Step, i: int, last: float) -> Search[list[Bracket]]:
         """A value that is zero where a step begins, leaves to one side and ends on the other: two zeros."""
         side = 1.0 if self.forward * float(self.slope[i]) > 0.0 else -1.0
         t, g, seen = step.t_old, 0.0, False
         for k in range(HALVED, -1, -1):
             later = step.t if k == 0 else step.t_old + (step.t - step.t_old) * 2.0**-k
-            value = last if k == 0 else self._value(step, i, later)
+            value = last if k == 0 else (yield later)
             if seen and value * side <= 0.0:
                 return [Bracket(i, step.t_old, step.t_old, -side, 0.0), Bracket(i, t, later, g, value)]
             seen = seen or value * side > 0.0
@@ -348,7 +313,7 @@ class Crossings:
     # -- resets ---------------------------------------------------------------------------------------------------
     def arrive(self, t: float, x: Array, length: float) -> None:
         """Take note how fast values come, right before a reset."""
-        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self._values(t, x), length)
+        self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.values(t, x), length)
 
     def depart(self, t: float, x: Array, length: float = 0.0) -> None:
         """Go on from another state, after the events that fired.
@@ -359,7 +324,7 @@ class Crossings:
             Resets follow each other ever faster, or one leads nowhere.
         """
         arrived, came = self.slope, np.fmax(np.abs(self.slope), np.abs(self.slope_new))
-        self.g = self._values(t, x)
+        self.g = self.values(t, x)
         self.slope = self._slopes(t, x, np.asarray(self.rhs(t, x)), self.g, length)
         stuck = False
         for i, way in zip(self.fired, self.ways, strict=True):

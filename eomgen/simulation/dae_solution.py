@@ -20,6 +20,7 @@ from ..runtime.dae import DaeForm
 from ..runtime.names import require
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
+from .event_values import EventValues
 from .events import GO_ON, UNWATCHED, Events, warn_of_unknown
 from .integrate import Solution, require_end
 from .recording import record
@@ -138,6 +139,7 @@ class _Run:
         self.module, self.forcing, self.events, self.span, self.times = module, forcing, events, span, times
         every = [(event, i) for i, event in enumerate(events.listed(module, forcing)) if event.direction != UNWATCHED]
         self.listed, self.index = [event for event, _ in every], [i for _, i in every]
+        self.values = EventValues(self.listed)
         self.names = [events.names[i] for i in self.index]
         self.left = [event.terminal for event in self.listed]
         self.stops = [event.action != GO_ON or bool(event.terminal) for event in self.listed]
@@ -177,8 +179,9 @@ class _Run:
     def _begin(self, t: float, x: Array) -> Array:
         """The state after events whose value is zero at the start and does not leave it against their direction."""
         fired = []
-        for e, event in enumerate(self.listed):
-            if event(t, x) == 0.0 and event.direction * self.resets.side(event, t, x) >= 0.0:
+        for e in np.flatnonzero(self.values(t, x) == 0.0).tolist():
+            event = self.listed[e]
+            if event.direction * self.resets.side(event, t, x) >= 0.0:
                 fired.append(e)
         after = self._happen(t, x, fired) if fired else None
         if self.status:  # the start and the event, as simulate stores them
@@ -250,7 +253,7 @@ class _Run:
             form.jacobian(t, y, yp, cj, JJ, forcing(t, y[:n_x]))
 
         def values(t: float, y: Array, yp: Array, out: Array) -> None:
-            out[:] = [event(t, np.array(y[:n_x])) for event in listed]
+            out[:] = self.values(t, np.array(y[:n_x]))
 
         chosen: dict[str, Any] = {"max_num_steps": STEPS, "jacfn": jacobian, **self.options}
         if len(form.algebraic):

@@ -7,7 +7,9 @@ for a run are its names, expressions as text, or functions f(t, x) with SciPy's 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,10 +18,12 @@ import numpy as np
 from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
 from ..limits.runs import CROWD, INSTANT
+from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.names import check_names, require_time_and_state
 from ..runtime.tapes import Formula, is_formula, record_tape, values_together
+from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -241,17 +245,32 @@ def _unwatched(t: float, x: Array) -> float:
 
 def _times(name: str, given: Any) -> int:
     """At which time an event ends the run: 0 for never."""
-    whole = isinstance(given, (bool, int, np.bool_, np.integer)) or (isinstance(given, float) and given.is_integer())
-    if given is None or (whole and given >= 0):
-        return int(given or 0)
-    raise UsageError(
-        f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), not {given!r}"
-    )
+    plain = given is None or isinstance(given, (bool, np.bool_)) or (isinstance(given, float) and given.is_integer())
+    found = int(given or 0) if plain else as_count(given)
+    if found is None or found < 0:
+        raise UsageError(
+            f"event {name}: terminal must be true, false, or at which time it ends the run (1, 2, ...), "
+            f"not {shown(given)}"
+        )
+    return found
+
+
+_SILENT: ContextVar[bool] = ContextVar("events_silent", default=False)
+
+
+@contextmanager
+def told_by_the_caller() -> Iterator[None]:
+    """Within it :func:`warn_of_unknown` is silent: a run that is part of another call, which warns itself."""
+    token = _SILENT.set(True)
+    try:
+        yield
+    finally:
+        _SILENT.reset(token)
 
 
 def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
     """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
-    if names:
+    if names and not _SILENT.get():
         warnings.warn(
             f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
             "found; look for a logarithm, root or quotient outside its domain",

@@ -13,6 +13,7 @@ from ..analysis.impact_gaps import Gaps, allowance, check_gaps
 from ..errors import SimulationError, UsageError
 from ..limits.impacts import BEYOND, MOMENT, RESTING, STILL, TOUCHING
 from ..limits.runs import INSTANT
+from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.signals import Forcing
@@ -74,8 +75,7 @@ def simulate_impacts(
             raise UsageError(
                 f"simulate_impacts has no {key}=; the run it returns has t_events, and at(t) for any times"
             )
-    if isinstance(most, bool) or not isinstance(most, int) or most < 1:
-        raise UsageError(f"most is a number of impacts, 1 or more, not {most!r}")
+    most = read_count("most, the number of impacts,", most, 1)
     found, _ = check_gaps(module.layout, gaps)
     if not module.n_dof:
         raise UsageError(f"{module.name} has no freedom: its drivers move it, and no impact can change its motion")

@@ -13,7 +13,7 @@ from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.names import check_names
-from ..runtime.room import read_vector, require_steps
+from ..runtime.room import read_number, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
@@ -122,16 +122,18 @@ class Integrator:
             Wrong shapes or values, a time that is lost in rounding, or a call while another thread's goes on.
         """
         try:
+            if not (isinstance(t, float) and isinstance(h, float) and isfinite(t + h)):
+                t, h = read_number("t", t), read_number("h", h)
             end = t + h
             if not isfinite(end):
-                raise ValueError(f"t and t + h must be finite, not {t} and {end}")
+                raise ValueError(f"t + h must be finite, not {t} + {h}")
             if end == t and h != 0.0:
                 raise ValueError(f"h = {h} is lost in rounding at t = {t}")
             if "max_step" in self._options:
                 require_steps("max_step" if self._step is None else "step", self._options["max_step"], t, end)
             advance = self._plainly if self._compiled is None else self._compiled.advance
             result, trouble = advance(t, x, h, p, u, out)
-        except (TypeError, ValueError, OverflowError) as error:
+        except ValueError as error:
             raise UsageError(f"integrator of {self.module.name}: {error}") from None
         if trouble is not None:
             self._explain(trouble, result, end, p, u)
@@ -162,9 +164,9 @@ class Integrator:
         off = "The state cannot be brought onto the constraints."
         raise run.ended(t, end, self.method, off if status == RESET_FAILED else TOO_SMALL, x) from run.cause()
 
-    def _plainly(self, t: Any, x: Any, h: Any, p: Any, u: Any, out: Array | None) -> tuple[Array, None]:
+    def _plainly(self, t: float, x: Any, h: float, p: Any, u: Any, out: Array | None) -> tuple[Array, None]:
         """The same by SciPy, for a module without compiled steppers."""
-        layout, t, h = self.module.layout, float(t + 0.0), float(h + 0.0)
+        layout = self.module.layout
         state, p, u = _vector("x", x, layout.n_x), _vector("p", p, layout.n_p), _vector("u", u, layout.n_u)
         shape = (layout.n_x,)
         if out is not None and not (

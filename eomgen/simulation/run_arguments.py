@@ -14,8 +14,9 @@ from ..limits.constraints import ALIKE
 from ..limits.runs import ATOL, RTOL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.room import as_real, read_number, read_numbers, read_times, shown
+from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
+from ..texts import shown
 from .tolerances import check_step
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import NoDerivativeError, UsageError
 from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events
+from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events, Together
 from .impact_slopes import after_impact, after_reset
 from .sensitivity_result import EventSlopes
 from .sensitivity_start import keep_consistent
@@ -57,7 +57,10 @@ class Saltation:
         every = events.listed(self.module, run.forcing)
         self.listed = [(i, event) for i, event in enumerate(every) if event.direction != UNWATCHED]
         self.names = [events.names[i] for i, _ in self.listed]
+        sources = {id(event.source[0]): self._shared(event.source[0]) for event in every if event.source is not None}
         self.watched = [self._of_both(event, name) for (_, event), name in zip(self.listed, self.names, strict=True)]
+        for (_, event), both in zip(self.listed, self.watched, strict=True):
+            both.source = None if event.source is None else (sources[id(event.source[0])], event.source[1])
         self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
         self.found: list[EventSlopes] = []
 
@@ -65,6 +68,12 @@ class Saltation:
         """The same event of z = [x; S], at which the integrator stops whatever it does: rates may jump there."""
         action = STOP if event.action == GO_ON else event.action
         return Event(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
+
+    def _shared(self, source: Together) -> Together:
+        """What gives several values, of z too."""
+        n, columns = self.n, source.columns
+        every = None if columns is None else lambda t, z: columns(t, np.ascontiguousarray(z[:n]))
+        return Together(lambda t, z: source.values(t, z[:n]), every)
 
     def reset(self, t: float, z: Array, fired: Sequence[int]) -> Array:
         """z = [x; S] right after events that happened at time t."""

@@ -21,7 +21,7 @@ from ..runtime.names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
-from .events import Events, warn_of_unknown
+from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import Slopes
 from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
@@ -113,7 +113,8 @@ def sensitivities(
     require_steps("max_step", float(options.get("max_step", np.inf)), start, stop)
     alone = None
     if watched:
-        alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **options)
+        with told_by_the_caller():
+            alone = simulate(bound, (start, stop), x0, None, inputs, events=events, method=method, **options)
     bound.rhs(start, x0, u=forcing(start, x0))  # a failure here is the user's state, not the integration
     S0 = start_sensitivity(here, start, x0, held, columns, _inputs(run, start, x0))
     solver = choose_solver(method)

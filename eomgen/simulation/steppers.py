@@ -6,6 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
@@ -134,7 +135,9 @@ def _only_for_modules(fun: Any, *args: Any, **options: Any) -> Any:
     raise UsageError("method Taylor takes the rhs of its module, with its inputs constant, and no other function")
 
 
-def step(module: BoundModel, /, t: float, x: Any, h: float, u: Any = None, out: Array | None = None) -> Array:
+def step(
+    module: BoundModel, /, t: float, x: ArrayLike, h: float, u: ArrayLike | None = None, out: Array | None = None
+) -> Array:
     """One Runge-Kutta step (order 4) of size h, for real time: every step costs the same.
 
     Parameters
@@ -155,7 +158,9 @@ def step(module: BoundModel, /, t: float, x: Any, h: float, u: Any = None, out: 
     Raises
     ------
     UsageError
-        Events of the model reset its state, which a step does not watch.
+        Wrong shapes or values, or events of the model reset its state, which a step does not watch.
+    EvaluationError
+        An evaluation of the equations failed.
     """
     if module.layout.n_events and Events(module.layout, None).resets:
         raise UsageError(
@@ -163,13 +168,10 @@ def step(module: BoundModel, /, t: float, x: Any, h: float, u: Any = None, out: 
         )
     core = eager(module.core)
     if hasattr(core, "march"):
-        context = module.kernels.context
-        status, result = core.march(context, t, h, x, u, out, UsageError)
-        if status != 0:
-            module.kernels.fail(
-                "rhs", status, t, np.array(x, dtype=float), None, None if u is None else np.array(u, dtype=float)
-            )
-        return np.asarray(result)
+        status, result = core.march(module.kernels.context, t, h, x, u, out, UsageError)
+        if status == 0:
+            return np.asarray(result)
+    # in Python, or once more in Python to tell which of the four evaluations failed
     t, h, start = read_number("t", t), read_number("h", h), read_vector("x", x, module.n_x)
     if out is not None:
         fitting(out, start.shape)

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import LEAST_RTOL
-from ..runtime.room import as_real, read_number, shown
+from ..runtime.room import as_real, read_number
+from ..texts import shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
 

@@ -9,6 +9,7 @@ from stat import S_ISREG
 import numpy as np
 
 from ..errors import UsageError
+from ..files.paths import as_name
 from ..limits.files import MESH
 from ..records import dataclass
 
@@ -40,12 +41,11 @@ def measure_mesh(path: str) -> MeshProperties:
         There is no such file, it is no STL file, or its triangles do not bound a solid: the surface has holes, its
         triangles are wound inconsistently or inside out.  Also when trimesh is not installed.
     """
+    path = as_name("path", path)
     try:
         stat = os.stat(path)
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError as error:  # NUL, or half a surrogate pair
-        raise UsageError(f"{path!r} is not the name of a file: {error}") from None
     if not S_ISREG(stat.st_mode):
         raise UsageError(f"{path} is no plain file")
     if not path.lower().endswith(".stl"):

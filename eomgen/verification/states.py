@@ -20,7 +20,7 @@ Values = dict[str, Number]
 
 
 class System:
-    """A model's expressions in many digits, and its description: what a :class:`Truth` is found from.
+    """A model's expressions in many digits, and its description: what a :class:`~.truth.Truth` is found from.
 
     Parameters
     ----------

@@ -15,6 +15,8 @@ import numpy as np
 from ..errors import EomgenError, UsageError
 from ..limits.rounding import EPS
 from ..limits.runs import MOST_STATES
+from ..numeric.counts import read_count
+from ..texts import shown
 from .cases import random_cases
 from .comparison import failed
 from .finding import Finding, Verification
@@ -69,7 +71,7 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     compiled and compared with it too; with ``Equations.compile`` the model is not known, and they are left out.
     One of an exported package is compared with the figures that came with it, and with itself.
     """
-    _require(states, seed, seconds)
+    states, seed = _read(states, seed, seconds)
     start = perf_counter()
     found = _of_module(module, states, seed)
     left = max(LEAST, seconds - (perf_counter() - start))
@@ -77,19 +79,16 @@ def verify(module: BoundModel, /, *, states: int = STATES, seed: int = 0, second
     return Verification(module.name, tuple(found), perf_counter() - start)
 
 
-def _require(states: object, seed: object, seconds: object) -> None:
-    """Refuse what is no number of states, no seed, no time."""
-    if isinstance(states, bool) or not isinstance(states, int | np.integer) or not 1 <= states <= MOST_STATES:
-        what = f"the number of random states, a whole number from 1 to {MOST_STATES}"
-        raise UsageError(f"verify: states is {states!r:.80}; it is {what}")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise UsageError(f"verify: seed is {seed!r:.80}; it is a whole number from 0, of the random states")
+def _read(states: object, seed: object, seconds: object) -> tuple[int, int]:
+    """The number of states and the seed; what is none, or no time, is refused."""
     if (
         isinstance(seconds, bool)
         or not isinstance(seconds, int | float | np.integer | np.floating)
         or not seconds >= 0.0
     ):
-        raise UsageError(f"verify: seconds is {seconds!r:.80}; it is the time for all of it, a number from 0")
+        raise UsageError(f"verify: seconds must be the time for all of it, a number from 0, not {shown(seconds)}")
+    most = read_count("verify: states, the number of random states,", states, 1, MOST_STATES)
+    return most, read_count("verify: seed, of the random states,", seed)
 
 
 def _of_module(module: BoundModel, states: int, seed: int) -> list[Finding]:
@@ -131,7 +130,7 @@ def verify_model(
     seconds : float
         Time for all of it; variants have what is left, and at least :data:`LEAST`.
     """
-    _require(states, seed, seconds)
+    states, seed = _read(states, seed, seconds)
     start = perf_counter()
     found = _of_module(module, states, seed)
     found += _variants(module, model, seed, max(LEAST, seconds - (perf_counter() - start)))

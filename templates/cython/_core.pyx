@@ -292,7 +292,7 @@ cdef class Kernel:
             label, length, value = values[i]
             held.append(self.read(value, length, label, &batch.pieces[i], &columns))
         batch.time = Piece(<char *>&now, 1, 0, 0)
-        if isinstance(t, (np.ndarray, list, tuple)):
+        if not isinstance(t, (float, int)):
             t = doubles(t, "t", self.error, self.name, SCALAR)
         if isinstance(t, np.ndarray) and t.ndim > 0:
             if t.ndim > 1 or len(t) != columns:

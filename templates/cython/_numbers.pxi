@@ -2,6 +2,8 @@
 
 # What Python or NumPy would make a float of, or NaN, though it is no real number.
 cdef tuple UNREAL = (str, bytes, complex, np.complexfloating, np.datetime64, np.timedelta64, type(None))
+cdef enum:
+    DEEPEST = 64  # lists in lists, as in NumPy
 
 
 cdef cnp.ndarray doubles(object value, str label, object error, str name=None, int n=-1):
@@ -17,13 +19,26 @@ cdef cnp.ndarray doubles(object value, str label, object error, str name=None, i
 
 cdef cnp.ndarray converted(object value, str label, object error, str name, int n):
     """Real numbers, by the rule of as_real in eomgen's runtime/room.py."""
+    cdef cnp.ndarray found
+    cdef int kind
     try:
-        array = np.asarray(value)
-        kind = array.dtype.kind
-        real = kind in "biuf" or kind == "O" and not any([isinstance(one, UNREAL) for one in array.flat])
-        if real and not (isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value)):
-            return np.require(array, np.float64, "A")
-    except (TypeError, ValueError, OverflowError):
+        if cnp.PyArray_CheckExact(value):
+            kind = cnp.PyArray_TYPE(<cnp.ndarray>value)
+            if kind <= cnp.NPY_DOUBLE:  # booleans, integers, floats
+                return aligned(value)
+        elif type(value) is list or type(value) is tuple:
+            found = of_numbers(value)
+            if found is not None:
+                return found
+        if not has_masked(value, 0):
+            array = np.asarray(value)
+            if array.dtype.kind in "biuf" or array.dtype.kind == "O" and not any(
+                    [isinstance(one, UNREAL) or has_masked(one, 0) for one in array.flat]):
+                with np.errstate(over="ignore"):
+                    return aligned(array)
+    except MemoryError:
+        raise
+    except Exception:  # of an object's own __array__, __float__, ...
         pass
     if label in ("p", "u") and isinstance(value, dict):
         raise error(f"{label} of a call is an array in the order of {label}_names; by name: bind({label}={{...}})")
@@ -35,6 +50,35 @@ cdef cnp.ndarray converted(object value, str label, object error, str name, int 
     raise error(f"{called(label, name, n)} must {wanted}, not {shown(value)}")
 
 
+cdef cnp.ndarray aligned(object array):
+    return cnp.PyArray_FROM_OTF(
+        array, cnp.NPY_DOUBLE, cnp.NPY_ARRAY_ALIGNED | cnp.NPY_ARRAY_NOTSWAPPED | cnp.NPY_ARRAY_FORCECAST)
+
+
+cdef cnp.ndarray of_numbers(object given):
+    """A list or tuple of Python's own numbers as an array; None if it holds anything else."""
+    cdef cnp.npy_intp length = len(given), i = 0
+    cdef cnp.ndarray array = cnp.PyArray_EMPTY(1, &length, cnp.NPY_DOUBLE, 0)
+    cdef double *data = <double *>cnp.PyArray_DATA(array)
+    for one in given:
+        if i == length or not isinstance(one, (float, int)):
+            return None
+        data[i] = one
+        i += 1
+    return array if i == length else None
+
+
+cdef bint has_masked(object given, int depth) except -1:
+    """Whether NumPy would read the value under a masked entry, or NaN, in an array or in lists of these."""
+    if isinstance(given, np.ma.MaskedArray):
+        return np.ma.is_masked(given)
+    if depth <= DEEPEST and isinstance(given, (list, tuple)):
+        for one in given:
+            if not isinstance(one, (float, int)) and has_masked(one, depth + 1):
+                return True
+    return False
+
+
 cdef str called(str label, str name, int n):
     """What users call an argument: the x of some kernels is q."""
     label = "q" if label == "x" and n == len(_FACTS.get("q_names", ())) else label
@@ -42,7 +86,10 @@ cdef str called(str label, str name, int n):
 
 
 cdef str shown(object value):
-    text = " ".join(repr(value).split())
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # its own __repr__, or an integer of thousands of digits
+        return f"an object of type {type(value).__name__}, which cannot be shown"
     return text if len(text) <= 80 else text[:80] + "..."
 
 
@@ -61,6 +108,14 @@ cdef inline double moment(object t, str label, object error, str name=None) exce
             raise error(f"{label} must be a number, not {shown(t)}")
         raise error(f"{label} of {name} must be a number or have shape (k,), not {(<object>array).shape}")
     return (<double *>cnp.PyArray_DATA(array))[0]
+
+
+cdef double finite(object given, str label, object error) except? -7.0:
+    """A number that is neither NaN nor infinite."""
+    cdef double number = moment(given, label, error)
+    if not isfinite(number):
+        raise error(f"{label} must be finite, not {number}")
+    return number
 
 
 cdef cnp.ndarray vector(object value, int n, str label, object error):

@@ -322,7 +322,7 @@ cdef cnp.ndarray target(out, cnp.npy_intp n, error):
 def march(Context context not None, t, h, x, u=None, out=None, error=ValueError):
     """One Runge-Kutta step of size h from state x (n_x,) at time t; ``(status, state)``."""
     cdef int index = find("rhs", ValueError), n = MODEL.kernels[index].n_in, status
-    cdef double begin = moment(t, "t", error), size = moment(h, "h", error)
+    cdef double begin = finite(t, "t", error), size = finite(h, "h", error)
     cdef cnp.ndarray start = vector(x, n, "x", error), inputs = context.u
     cdef cnp.npy_intp length = n, n_work = MODEL.n_work + 5 * n
     cdef double[STACK] stack

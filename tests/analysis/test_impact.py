@@ -167,7 +167,7 @@ def test_what_is_refused(compiled: Callable[..., Any]) -> None:
         ({"initial": {"z": 0.0}}, "gap is -0.1 at the start; a gap is 0 or positive"),
         ({"span": -1.0}, "forward in time"),
         ({"gaps": {}}, "needs gaps"),
-        ({"most": 0}, "most is a number of impacts"),
+        ({"most": 0}, "most, the number of impacts, must be a whole number of at least 1, not 0"),
         ({"t_eval": [0.0]}, r"no t_eval=; the run it returns has t_events, and at\(t\)"),
     ):
         with pytest.raises(eg.UsageError, match=message):

@@ -6,6 +6,8 @@ tests/reference/slider_crank_kinematics.json.
 
 from __future__ import annotations
 
+from typing import Any
+
 import models
 import numpy as np
 import pytest
@@ -315,3 +317,41 @@ def test_change_points_where_the_determinant_only_touches_zero() -> None:
         for suffix, value in (("", theta), ("_dot", 2.0), ("_ddot", 1.0)):
             np.testing.assert_allclose(found[name + suffix], value, atol=1e-9)
     np.testing.assert_allclose([s.values["theta1"] for s in found.singular], [0, np.pi], atol=1e-10)
+
+
+@pytest.mark.parametrize("target", ["cython", "numpy"])
+def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    from eomgen.analysis.walking import Walk
+
+    count, real = [0], Walk.forward
+
+    def counted(self: Walk, *given: Any) -> Any:
+        count[0] += 1
+        return real(self, *given)
+
+    monkeypatch.setattr(Walk, "forward", counted)
+    module = eg.load(models.EXAMPLES / "four_bar.yaml").compile(target=target)
+    values = np.random.default_rng(0).normal(size=200)
+    found = module.kinematic_analysis(theta=values)
+    assert count[0] < 20 * len(values)  # 50 for each turn of the way back
+    order = np.argsort(values)
+    swept = module.kinematic_analysis(theta=values[order])
+    np.testing.assert_allclose(found.x[:, order], swept.x, atol=1e-12)
+    np.testing.assert_allclose(found.a[:, order], swept.a, atol=1e-10)
+
+
+def test_what_of_a_way_was_walked() -> None:
+    from eomgen.analysis.ground import Ground
+
+    y = np.array([[0.0, 2.0, 1.0, 4.0, -2.0], [1.0, 1.0, 1.0, 1.0, 1.0]])
+    ground, known = Ground(np.zeros(5), y), []
+    for k in range(4):
+        known.append(ground.known(k, k + 1))
+        ground.walked(k, k + 1, True)
+    np.testing.assert_allclose(known, [0.0, 1.0, 1 / 3, 4 / 6])
+    ground.walked(3, 4, False)  # a change point: from here on every way is walked as if it were the first
+    assert ground.known(1, 2) == 0.0
+    assert Ground(np.arange(5.0), y).known(0, 0) == 0.0
+    both = Ground(np.zeros(5), np.concatenate([y, y]))
+    both.walked(0, 1, True)
+    assert both.known(1, 2) == 0.0

@@ -39,7 +39,7 @@ RARE = {
     "branches",
     "integrator",
 }
-MOST, FEW = 100_000, 500  #: numbers of an array; of points at which a mechanism is closed one after the other
+MOST, FEW = 100_000, 2_000  #: numbers of an array; of points at which a mechanism is closed one after the other
 LONG = {"span", "points", "most", "of", "over", "within"}  #: arguments in which a large number rightly takes long
 #: Options of runs that stand behind **options.
 OPTIONS = {

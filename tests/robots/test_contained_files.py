@@ -350,7 +350,7 @@ def test_limits_of_joints_may_be_as_large_as_others_write_them(tmp_path: Path) -
         ({"actuate": {"j": 1}}, "names of joints"),
         ({"snap": "x"}, "snap='x': an angle"),
         ({"snap": -1.0}, "an angle"),
-        ({"assets": 5}, "assets=5: the path of a folder"),
+        ({"assets": 5}, "assets must be the name of a file or folder, as text or Path, not 5"),
         ({"floating": "yes"}, "floating='yes': allowed: True, False"),
         ({"mimic": ["coupling"]}, "allowed: independent, coupling"),
     ],
@@ -377,7 +377,7 @@ def test_pipes_folders_and_names_that_are_none_end_at_once(suffix: str, tmp_path
     with pytest.raises(eg.UsageError, match="is no plain file but a pipe"):
         eg.load(tmp_path / f"pipe{suffix}")
     for name in ("a\0", "\udc80\ud800"):
-        with pytest.raises(eg.UsageError, match="is not the name of a file"):
+        with pytest.raises(eg.UsageError, match="path must be the name of a file"):
             eg.load(name + suffix)
     (tmp_path / f"folder{suffix}").mkdir()
     with pytest.raises(eg.UsageError, match="is no plain file but a folder"):
@@ -395,5 +395,5 @@ def test_meshes_of_model_files_with_names_that_are_none_are_faults(tmp_path: Pat
         path.write_text(f'name: m\nbodies: {{b: {{solids: [{{type: mesh, file: "{name}", density: 1}}]}}}}\n')
         with pytest.raises(eg.ModelError, match=said):
             eg.load(path).check()
-    with pytest.raises(eg.UsageError, match="is not the name of a file"):
+    with pytest.raises(eg.UsageError, match="path must be the name of a file"):
         measure_mesh("a\0.stl")

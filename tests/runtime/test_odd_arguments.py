@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import eomgen as eg
 
@@ -50,9 +51,9 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "initial text": (lambda m: m.simulate(1.0, "ab"), "initial must hold real numbers, not 'ab'"),
     "initial complex": (lambda m: m.simulate(1.0, [1j, 0]), "initial must hold real numbers"),
     "runs": (lambda m: m.simulate_many(1.0, count=10**9), "simulate_many with 1000000000 runs would keep .* GiB"),
-    "runs as float": (lambda m: m.simulate_many(1.0, count=1e9), "count must be a whole number of runs"),
-    "runs negative": (lambda m: m.simulate_many(1.0, count=-1), "count must be a whole number of runs"),
-    "runs as text": (lambda m: m.simulate_many(1.0, count="a"), "count must be a whole number of runs"),
+    "runs as float": (lambda m: m.simulate_many(1.0, count=1e9), "count, of runs, must be a whole number"),
+    "runs negative": (lambda m: m.simulate_many(1.0, count=-1), "count, of runs, must be a whole number"),
+    "runs as text": (lambda m: m.simulate_many(1.0, count="a"), "count, of runs, must be a whole number"),
     "samples": (lambda m: m.simulate_many(1.0, count=10**6, t_eval=np.linspace(0, 1, 1000)), "would keep"),
     "time as text": (lambda m: m.rhs("a", [0.0, 0.0]), "t of rhs must be a real number, or .k,., not 'a'"),
     "time complex": (lambda m: m.rhs(1j, [0.0, 0.0]), "t of rhs must be a real number, or .k,., not 1j"),
@@ -64,6 +65,50 @@ RUNS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "no names": (lambda m: m.sensitivities(3, 1.0), "names must be a name or a list of names, not 3"),
     "slopes": (lambda m: m.sensitivities(["g"], 1.0, max_step=1e-300), "would not end"),
 }  # fmt: skip
+
+
+class Odd:
+    """Its whole number is an error."""
+
+    def __index__(self) -> int:
+        raise ZeroDivisionError
+
+
+def swinging(terminal: Any) -> dict[str, Any]:
+    return {"expression": "theta", "terminal": terminal}
+
+
+#: Door of a whole number -> the call with it, the least it takes, and the words before the rule's.
+COUNTS: dict[str, tuple[Any, int, str]] = {
+    "states": (lambda m, n: m.verify(states=n), 1, "verify: states, the number of random states,"),
+    "seed": (lambda m, n: m.verify(seed=n), 0, "verify: seed, of the random states,"),
+    "runs": (lambda m, n: m.simulate_many(0.01, count=n), 0, "count, of runs,"),
+    "threads": (lambda m, n: m.simulate_many(0.01, count=1, threads=n), 1, "threads"),
+    "block": (lambda m, n: m.simulate_many(0.01, count=1, block=n), 1, "block"),
+    "max_steps": (lambda m, n: m.simulate_many(0.01, count=1, max_steps=n), 1, "max_steps"),
+    "keep_events": (lambda m, n: m.simulate_many(0.01, count=1, keep_events=n), 1, "keep_events"),
+    "points": (lambda m, n: m.workspace({"theta": (0.0, 1.0, 3)}, "theta", points=n), 0, "points"),
+    "impacts": (lambda m, n: m.simulate_impacts(0.01, {"theta": 1.0}, most=n), 1, "most, the number of impacts,"),
+    "terminal": (lambda m, n: m.simulate(0.01, events=[swinging(n)]), 0, "event theta: terminal"),
+    "jobs": (lambda m, n: eg.load(EXAMPLES / "pendulum.yaml").compile(jobs=n), 1, "jobs, files compiled at a time,"),
+    "optimize": (lambda m, n: eg.load(EXAMPLES / "pendulum.yaml").compile(optimize=n), 0, "optimize"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("door", COUNTS)
+def test_a_whole_number_is_the_same_everywhere(swings: dict[str, Any], door: str) -> None:
+    call, least, words = COUNTS[door]
+    for given in (1.0, 1.5, "1", [1], least - 1, np.nan, 1j, np.array([1, 2]), Odd()):
+        if door == "terminal" and isinstance(given, float) and given == 1.0:
+            continue  # SciPy's users write it so
+        with pytest.raises(eg.UsageError, match=f"^{words} must be .*, not "):
+            call(swings["numpy"], given)
+    if door not in ("terminal", "optimize"):
+        with pytest.raises(eg.UsageError, match=f"{words} must be a whole number .*, not True"):
+            call(swings["numpy"], True)
+    if door in ("runs", "threads", "block", "max_steps", "keep_events", "terminal"):
+        for given in (1, np.int8(1), np.array(1), sympy.Integer(1)):
+            call(swings["numpy"], given)
 
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])

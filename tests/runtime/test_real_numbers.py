@@ -13,6 +13,8 @@ import pytest
 import sympy
 
 import eomgen as eg
+from eomgen.runtime.room import as_real
+from eomgen.texts import shown
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TARGETS = ("cython", "numpy")
@@ -123,6 +125,108 @@ def test_what_is_no_real_number_is_named(modules: dict[str, Any], name: str, doo
             told.append(str(caught.value))
         assert told[0] == told[1], kind  # the same words, whatever the target
         assert "\n" not in told[0]
+
+
+def failing(method: str, error: BaseException) -> Any:
+    """An object whose method raises."""
+
+    def fail(*_: Any, **__: Any) -> Any:
+        raise error
+
+    return type("Failing", (), {method: fail})()
+
+
+#: States of two numbers, or what is none.
+STATES: dict[str, tuple[Any, list[float] | None]] = {
+    "list": ([0.5, 1.0], [0.5, 1.0]),
+    "integers": ((1, True), [1.0, 1.0]),
+    "NumPy's": ([np.float64(0.5), np.int32(1)], [0.5, 1.0]),
+    "half": (np.array([0.5, 1.0], dtype=np.float16), [0.5, 1.0]),
+    "single": (np.array([0.5, 1.0], dtype=np.float32), [0.5, 1.0]),
+    "other order": (np.array([1, 2], dtype=">i4"), [1.0, 2.0]),
+    "long": (np.array([0.5, 1.0], dtype=np.longdouble), [0.5, 1.0]),
+    "strided": (np.arange(4, dtype=np.int64)[::2], [0.0, 2.0]),
+    "fractions": ([Fraction(1, 2), Decimal(1)], [0.5, 1.0]),
+    "nothing masked, in a list": ([np.ma.masked_array(0.5, mask=False), 1.0], [0.5, 1.0]),
+    "too large an integer": ([10**400, 1.0], None),
+    "too many digits": ([10**5000, "a"], None),
+    "None": ([None, 1.0], None),
+    "masked": ([np.ma.masked, 1.0], None),
+    "masked in a list of arrays": ([np.ma.masked_array([0.5], mask=[True]), [1.0]], None),
+    "masked as an object": (np.array([np.ma.masked, 1.0], dtype=object), None),
+    "array that fails": (failing("__array__", RuntimeError("no")), None),
+    "float that fails": ([failing("__float__", ZeroDivisionError("no")), 1.0], None),
+    "length that fails": (failing("__len__", KeyError("no")), None),
+    "repr that fails": ([failing("__repr__", RecursionError("no")), 1.0], None),
+    "lists without end": ((endless := [], endless.append(endless))[0], None),
+}
+
+
+@pytest.mark.parametrize("kind", STATES)
+def test_both_rules_of_a_real_number_are_one(modules: dict[str, Any], kind: str) -> None:
+    given, expected = STATES[kind]
+    found, told = as_real(given), []
+    for target in TARGETS:
+        mod = modules[f"pendulum {target}"]
+        if expected is None:
+            with pytest.raises(eg.UsageError) as caught:
+                mod.rhs(0.0, given)
+            told.append(str(caught.value))
+        else:
+            np.testing.assert_array_equal(mod.rhs(0.0, given), mod.rhs(0.0, np.array(expected)))
+    if expected is None:
+        assert found is None
+        assert told == [f"x of rhs must hold real numbers, (2,) or (2, k), not {shown(given)}"] * 2
+    else:
+        assert found is not None
+        assert found.dtype == np.float64
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_what_pandas_calls_missing_is_no_number_and_its_series_are_arrays(modules: dict[str, Any]) -> None:
+    pd = pytest.importorskip("pandas")
+    times = pd.Series([0.5, 1.0])
+    for target in TARGETS:
+        mod = modules[f"pendulum {target}"]
+        for missing in (pd.NA, pd.NaT):
+            for given in ([missing, 1.0], np.array([missing, 1.0], dtype=object), missing):
+                with pytest.raises(eg.UsageError, match="x of rhs must hold real numbers"):
+                    mod.rhs(0.0, given)
+                with pytest.raises(eg.UsageError, match="t of rhs must be a real number"):
+                    mod.rhs(given, np.zeros((2, 2)))
+        np.testing.assert_array_equal(mod.rhs(times, np.ones((2, 2))), mod.rhs(times.to_numpy(), np.ones((2, 2))))
+        np.testing.assert_array_equal(mod.rhs(0.0, times), mod.rhs(0.0, times.to_numpy()))
+        with pytest.raises(eg.UsageError, match=r"t of rhs must be a number or have shape \(k,\), not \(2,\)"):
+            mod.rhs(times, [0.5, 1.0])
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("method", ["__array__", "__float__", "__repr__"])
+def test_an_interrupt_within_a_conversion_is_one(modules: dict[str, Any], target: str, method: str) -> None:
+    given = failing(method, KeyboardInterrupt())
+    for state in (given, [given, 1.0]):
+        with pytest.raises(KeyboardInterrupt):
+            modules[f"pendulum {target}"].rhs(0.0, state)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("size", [np.nan, np.inf, -np.inf])
+def test_a_step_of_no_finite_size_is_refused_by_its_name(modules: dict[str, Any], target: str, size: float) -> None:
+    mod = modules[f"pendulum {target}"]
+    for call in (mod.step, mod.integrator()):
+        with pytest.raises(eg.UsageError, match=rf"h must be finite, not {size}$"):
+            call(0.0, mod.x0(), size)
+        with pytest.raises(eg.UsageError, match=rf"t must be finite, not {size}$"):
+            call(size, mod.x0(), 0.1)
+        with pytest.raises(eg.UsageError, match="h must be a number, not None$"):
+            call(0.0, mod.x0(), None)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_step_too_long_says_where_it_failed(modules: dict[str, Any], target: str) -> None:
+    mod = modules[f"pendulum {target}"]
+    with pytest.raises(eg.NonFiniteError, match=r"^rhs at t = 5e\+299, theta = inf"):
+        mod.step(0.0, mod.x0(), 1e300)
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -1,0 +1,33 @@
+"""Stage numeric: what a user gives as a whole number -> int, or an error that says what is allowed."""
+
+from __future__ import annotations
+
+from operator import index
+from typing import Any
+
+from ..errors import UsageError
+from ..texts import shown
+
+
+def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -> int:
+    """A whole number within limits.
+
+    Raises
+    ------
+    UsageError
+    """
+    found = as_count(given)
+    if found is None or found < least or (most is not None and found > most):
+        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise UsageError(f"{what} must be a whole number {limits}, not {shown(given)}")
+    return found
+
+
+def as_count(given: Any) -> int | None:
+    """A whole number of Python, NumPy or SymPy; None if it is none, as True and 2.0 are."""
+    if isinstance(given, (bool, float)):
+        return None
+    try:
+        return index(given)
+    except Exception:  # of an object's own __index__ too
+        return None
