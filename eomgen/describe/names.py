@@ -7,22 +7,13 @@ import re
 import sys
 from collections.abc import Iterable
 
+from ..graph.elementary import ELEMENTARY
 from ..graph.shown import quoted
 
 #: Functions an expression may call, with the least and the greatest number of arguments.
 FUNCTIONS: dict[str, tuple[int, int]] = {
-    "sin": (1, 1),
-    "cos": (1, 1),
-    "tan": (1, 1),
-    "asin": (1, 1),
-    "acos": (1, 1),
-    "atan": (1, 1),
+    **dict.fromkeys(ELEMENTARY, (1, 1)),
     "atan2": (2, 2),
-    "sinh": (1, 1),
-    "cosh": (1, 1),
-    "tanh": (1, 1),
-    "exp": (1, 1),
-    "log": (1, 1),
     "sqrt": (1, 1),
     "abs": (1, 1),
     "sign": (1, 1),

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..graph.core import Expr
+from ..graph.elementary import ELEMENTARY
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
 from ..program import Block, Program
@@ -30,7 +31,7 @@ PATTERNS: dict[str, str] = {
     "sin": "sine_of({})",
     "cos": "cosine_of({})",
     **dict.fromkeys(("pow", "atan2"), "each_{}({{}}, {{}})"),
-    **dict.fromkeys(("sqrt", "exp", "log", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"), "each_{}({{}})"),
+    **{name: "each_{}({{}})" for name in ("sqrt", *ELEMENTARY) if name not in ("sin", "cos")},
 }
 PATTERNS.update({name: text.format(name) for name, text in PATTERNS.items() if text.startswith("each_")})
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..graph.elementary import ELEMENTARY
 from ..graph.substitute import symbols_of
 from ..program import Block, Program
 from .straight import CONDITIONS, Piece, Pieces, cut, references
@@ -18,15 +19,12 @@ PATTERNS: dict[str, str] = {
     "div": "{} / {}",
     "neg": "-{}",
     "pow": "np.power({}, {})",
-    "asin": "np.arcsin({})",
-    "acos": "np.arccos({})",
-    "atan": "np.arctan({})",
     "atan2": "np.arctan2({}, {})",
     "min": "np.minimum({}, {})",
     "max": "np.maximum({}, {})",
-    **{name: f"np.{name}({{}})" for name in
-       ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "abs", "sign")},
-}  # fmt: skip
+    **{name: f"np.{name}({{}})" for name in ("sqrt", "abs", "sign")},
+    **{name: f"np.{function.array}({{}})" for name, function in ELEMENTARY.items()},
+}
 
 CONDITION_PATTERNS: dict[str, str] = {
     "lt": "np.less({}, {})",

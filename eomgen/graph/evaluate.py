@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .core import Expr
+from .elementary import ELEMENTARY
 from .substitute import symbols_of
 from .traverse import common_graph, reachable
 
@@ -47,17 +48,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], Callable[..., Any]]] = {
     "neg": (operator.neg, np.negative),
     "pow": (math.pow, np.power),
     "sqrt": (math.sqrt, np.sqrt),
-    "exp": (math.exp, np.exp),
-    "log": (math.log, np.log),
-    "sin": (math.sin, np.sin),
-    "cos": (math.cos, np.cos),
-    "tan": (math.tan, np.tan),
-    "asin": (math.asin, np.arcsin),
-    "acos": (math.acos, np.arccos),
-    "atan": (math.atan, np.arctan),
-    "sinh": (math.sinh, np.sinh),
-    "cosh": (math.cosh, np.cosh),
-    "tanh": (math.tanh, np.tanh),
+    **{name: (f.value, getattr(np, f.array)) for name, f in ELEMENTARY.items()},
     "atan2": (math.atan2, np.arctan2),
     "abs": (abs, np.abs),
     "sign": (_sign, np.sign),

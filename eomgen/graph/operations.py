@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from . import elementary
+from .elementary import ELEMENTARY
+
 COMMUTATIVE = frozenset({"add", "mul", "min", "max", "eq", "and", "or"})
-ODD = frozenset({"sin", "tan", "asin", "atan", "sinh", "tanh"})
-EVEN = frozenset({"cos", "cosh", "abs"})
+ODD = frozenset(name for name, f in ELEMENTARY.items() if f.parity == elementary.ODD)
+EVEN = frozenset({"abs", *(name for name, f in ELEMENTARY.items() if f.parity == elementary.EVEN)})
 
 
 def _sign(x: float) -> float:
@@ -23,17 +26,7 @@ FOLD: dict[str, Callable[..., float]] = {
     "neg": lambda a: -a,
     "pow": lambda a, b: a**b,
     "sqrt": math.sqrt,
-    "exp": math.exp,
-    "log": math.log,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "asin": math.asin,
-    "acos": math.acos,
-    "atan": math.atan,
-    "sinh": math.sinh,
-    "cosh": math.cosh,
-    "tanh": math.tanh,
+    **{name: f.value for name, f in ELEMENTARY.items()},
     "atan2": math.atan2,
     "abs": abs,
     "sign": _sign,

@@ -15,6 +15,7 @@ import numpy as np
 from ..limits.rounding import ROUNDED
 from .core import Expr, Graph
 from .differentiate import gradient
+from .elementary import ELEMENTARY, Elementary
 from .evaluate import Evaluator
 from .substitute import symbols_of
 from .traverse import LEAVES, common_graph, reachable
@@ -23,11 +24,20 @@ from .vectors import Mat3, Vec3
 TRIES = 3  #: random points at which an identity is tried
 
 #: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.
-ANALYTIC = LEAVES | {"add", "sub", "mul", "div", "neg", "exp", "sin", "cos", "tan", "sinh", "cosh", "tanh"}
+ANALYTIC = LEAVES | {"add", "sub", "mul", "div", "neg"} | {n for n, f in ELEMENTARY.items() if f.entire}
 
 EXACT = frozenset({"neg", "abs", "min", "max", "select"})  #: operations that do not round
 
 Numbers = Sequence[float]
+
+
+def _by_rate(function: Elementary) -> Callable[[float, Numbers, Numbers], float]:
+    def spread(y: float, x: Numbers, e: Numbers) -> float:
+        with np.errstate(all="ignore"):
+            return float(function.rate(x[0], y)) * e[0]
+
+    return spread
+
 
 #: How bounds (e, f) of operands (a, b) reach y = operation(a, b), rounding of y itself apart.
 SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
@@ -38,23 +48,16 @@ SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
     "neg": lambda y, x, e: e[0],
     "pow": lambda y, x, e: abs(x[1] * y / x[0]) * e[0] + (abs(y * math.log(x[0])) * e[1] if e[1] else 0.0),
     "sqrt": lambda y, x, e: 0.5 * e[0] / y if e[0] else 0.0,
-    "exp": lambda y, x, e: y * e[0],
-    "log": lambda y, x, e: e[0] / abs(x[0]),
-    "sin": lambda y, x, e: abs(math.cos(x[0])) * e[0],
-    "cos": lambda y, x, e: abs(math.sin(x[0])) * e[0],
-    "tan": lambda y, x, e: (1.0 + y * y) * e[0],
-    "asin": lambda y, x, e: e[0] / math.sqrt(1.0 - x[0] * x[0]),
-    "acos": lambda y, x, e: e[0] / math.sqrt(1.0 - x[0] * x[0]),
-    "atan": lambda y, x, e: e[0] / (1.0 + x[0] * x[0]),
-    "sinh": lambda y, x, e: math.cosh(x[0]) * e[0],
-    "cosh": lambda y, x, e: abs(math.sinh(x[0])) * e[0],
-    "tanh": lambda y, x, e: (1.0 - y * y) * e[0],
     "atan2": lambda y, x, e: (abs(x[1]) * e[0] + abs(x[0]) * e[1]) / (x[0] * x[0] + x[1] * x[1]),
     "abs": lambda y, x, e: e[0],
     "min": lambda y, x, e: e[0] if y == x[0] else e[1],
     "max": lambda y, x, e: e[0] if y == x[0] else e[1],
     "select": lambda y, x, e: e[1] if x[0] else e[2],
 }
+
+
+for _name, _function in ELEMENTARY.items():
+    SPREAD[_name] = _by_rate(_function)
 
 
 def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:

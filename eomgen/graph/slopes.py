@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .core import Graph
+from .elementary import ELEMENTARY, over
 from .functions import raised
 
 #: Operations that take one of several branches; what a branch not taken does must not leak into the derivative.
@@ -18,28 +19,10 @@ def _square(g: Graph, a: int) -> int:
     return g.mul(a, a)
 
 
-def _over(g: Graph, a: int) -> int:
-    return g.div(g.one.id, a)
-
-
-def _asin_slope(g: Graph, a: int) -> int:  # 1 / sqrt(1 - a^2)
-    return _over(g, g.make("sqrt", g.sub(g.one.id, _square(g, a))))
-
-
 #: Slope of y = f(a) of each function of one operand, from (graph, id of y, id of a).
 SLOPES: dict[str, Callable[[Graph, int, int], int]] = {
-    "sin": lambda g, y, a: g.make("cos", a),
-    "cos": lambda g, y, a: g.neg(g.make("sin", a)),
+    **{name: f.slope for name, f in ELEMENTARY.items()},
     "sqrt": lambda g, y, a: g.div(g.constant(0.5).id, y),
-    "exp": lambda g, y, a: y,
-    "log": lambda g, y, a: _over(g, a),
-    "tan": lambda g, y, a: g.add(g.one.id, _square(g, y)),
-    "asin": lambda g, y, a: _asin_slope(g, a),
-    "acos": lambda g, y, a: g.neg(_asin_slope(g, a)),
-    "atan": lambda g, y, a: _over(g, g.add(g.one.id, _square(g, a))),
-    "sinh": lambda g, y, a: g.make("cosh", a),
-    "cosh": lambda g, y, a: g.make("sinh", a),
-    "tanh": lambda g, y, a: g.sub(g.one.id, _square(g, y)),
     "abs": lambda g, y, a: g.make("sign", a),
 }
 
@@ -86,14 +69,14 @@ def partials(g: Graph, i: int, active: Sequence[bool]) -> list[int]:
         return [b, a]
     if operation == "div":
         if not active[1]:
-            return [_over(g, b), zero]
-        r = _over(g, b)
+            return [over(g, b), zero]
+        r = over(g, b)
         return [r, g.neg(g.mul(i, r))]
     if operation == "pow":  # b a^(b-1), y log a
         base = g.mul(b, g.make("pow", a, g.sub(b, g.one.id))) if active[0] else zero
         return [base, g.mul(i, g.make("log", a)) if active[1] else zero]
     if operation == "atan2":  # a = opposite, b = adjacent
-        r = _over(g, g.add(_square(g, a), _square(g, b)))
+        r = over(g, g.add(_square(g, a), _square(g, b)))
         return [g.mul(b, r), g.neg(g.mul(a, r))]
     raise ValueError(f"operation {operation!r} has no derivative")
 

@@ -21,14 +21,14 @@ from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
 from .core import Expr, Graph
+from .elementary import ELEMENTARY
 from .shown import is_tower, parts_of, shortened
 
 Resolve = Callable[[sympy.Basic], Expr | None]
 Build = Callable[[Graph, Sequence[int]], int]
 
-SMOOTH = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
 KNOWN = (
-    "numbers, + - * / **, sqrt exp log, sin cos tan sec csc cot asin acos atan atan2, sinh cosh tanh sech csch coth, "
+    f"numbers, + - * / **, sqrt, {' '.join(ELEMENTARY)}, sec csc cot sech csch coth atan2, "
     "Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
 )
 
@@ -340,7 +340,7 @@ BUILD: dict[Any, Build] = {
     sympy.Add: lambda g, ids: reduce(g.add, ids),
     sympy.Mul: _product,
     sympy.Pow: _function("pow"),
-    **{getattr(sympy, name): _function(name) for name in (*SMOOTH, "atan2", "sign")},
+    **{getattr(sympy, name): _function(name) for name in (*ELEMENTARY, "atan2", "sign")},
     sympy.Abs: _function("abs"),
     sympy.sec: _over("cos"),
     sympy.csc: _over("sin"),

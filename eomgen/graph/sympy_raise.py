@@ -10,26 +10,11 @@ from typing import Any
 import sympy
 
 from .core import Expr, Graph
+from .elementary import ELEMENTARY
 from .traverse import LEAVES, common_graph, reachable
 
 LOGIC = frozenset({"lt", "le", "eq", "not", "and", "or"})
 
-_SAME_NAME = (
-    "sqrt",
-    "exp",
-    "log",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "atan2",
-    "sign",
-)
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -40,7 +25,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": sympy.Abs,
     "min": sympy.Min,
     "max": sympy.Max,
-    **{name: getattr(sympy, name) for name in _SAME_NAME},
+    **{name: getattr(sympy, name) for name in (*ELEMENTARY, "sqrt", "atan2", "sign")},
 }
 
 

@@ -7,6 +7,7 @@ parser and refuses texts.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -238,6 +239,11 @@ def _two(function: Callable[[float, float], float]) -> Callable[[float, float, f
     return lambda a, b, c: function(a, b)
 
 
+#: Functions of one argument, by the names of math.h.
+FUNCTIONS = (
+    *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+    *("asinh", "acosh", "atanh"),
+)
 #: What each operation of a tape does, as tape.c does it.
 OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
     "add": lambda a, b, c: a + b,
@@ -259,18 +265,12 @@ OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
     "or": lambda a, b, c: bool(a) or bool(b),
     "select": lambda a, b, c: b if a else c,
 }
-OPERATIONS |= {
-    name: _one(getattr(math, name))
-    for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
-}
+OPERATIONS |= {name: _one(getattr(math, name)) for name in FUNCTIONS}
 #: The same where Python raises what C has a value for: log(0), 1/0, exp(1000).
 BEYOND: dict[str, Callable[[float, float, float], float]] = {
     "div": lambda a, b, c: float(np.divide(a, b)),
     "pow": lambda a, b, c: float(np.power(a, b)),
-} | {
-    name: _one(getattr(np, name.replace("asin", "arcsin").replace("acos", "arccos")))
-    for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "sinh", "cosh")
-}
+} | {name: _one(getattr(np, re.sub("^a", "arc", name))) for name in FUNCTIONS}
 
 
 #: Operations at which an expression may jump or bend.

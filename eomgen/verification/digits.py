@@ -12,6 +12,7 @@ from typing import Any
 
 from ..errors import MissingDependencyError
 from ..graph.core import Expr
+from ..graph.elementary import ELEMENTARY
 from ..graph.traverse import common_graph, reachable
 
 DIGITS = 60
@@ -45,7 +46,7 @@ def _operations(mp: Any) -> dict[str, Callable[..., Any]]:
     def truth(test: Callable[..., bool]) -> Callable[..., Any]:
         return lambda *x: one if test(*x) else zero
 
-    plain = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "atan2")
+    plain = (*ELEMENTARY, "sqrt", "atan2")
     return {
         **{name: getattr(mp, name) for name in plain},
         "add": lambda a, b: a + b,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..graph.core import Expr
+from ..graph.elementary import ELEMENTARY, Elementary
 from ..graph.evaluate import FUNCTIONS
 from ..graph.traverse import common_graph, reachable
 from ..limits.rounding import EPS
@@ -59,12 +60,12 @@ def _arc(a: Pair, b: Pair) -> tuple[Any, Any]:
     return v, (abs(b[0]) * a[1] + abs(a[0]) * b[1]) / square + UNIT * abs(v)
 
 
-def _smooth(value: Callable[[Any], Any], slope: Callable[[Any, Any], Any], floor: float = 0.0) -> Rule:
+def _smooth(function: Elementary, floor: float) -> Rule:
     """A function of one argument by its slope; ``floor`` is an absolute error of its own."""
 
     def rule(a: Pair) -> tuple[Any, Any]:
-        v = value(a[0])
-        return v, abs(slope(a[0], v)) * a[1] + UNIT * abs(v) + floor
+        v = getattr(np, function.array)(a[0])
+        return v, abs(function.rate(a[0], v)) * a[1] + UNIT * abs(v) + floor
 
     return rule
 
@@ -77,17 +78,7 @@ RULES: dict[str, Rule] = {
     "neg": lambda a: (-a[0], a[1]),
     "pow": _power,
     "sqrt": _root,
-    "exp": _smooth(np.exp, lambda x, v: v),
-    "log": _smooth(np.log, lambda x, v: 1.0 / x),
-    "sin": _smooth(np.sin, lambda x, v: np.cos(x), TURN),
-    "cos": _smooth(np.cos, lambda x, v: np.sin(x), TURN),
-    "tan": _smooth(np.tan, lambda x, v: 1.0 + v * v),
-    "asin": _smooth(np.arcsin, lambda x, v: 1.0 / np.sqrt(1.0 - x * x)),
-    "acos": _smooth(np.arccos, lambda x, v: 1.0 / np.sqrt(1.0 - x * x)),
-    "atan": _smooth(np.arctan, lambda x, v: 1.0 / (1.0 + x * x)),
-    "sinh": _smooth(np.sinh, lambda x, v: np.cosh(x)),
-    "cosh": _smooth(np.cosh, lambda x, v: np.sinh(x)),
-    "tanh": _smooth(np.tanh, lambda x, v: 1.0 - v * v),
+    **{name: _smooth(f, TURN if name in ("sin", "cos") else 0.0) for name, f in ELEMENTARY.items()},
     "atan2": _arc,
     "abs": lambda a: (abs(a[0]), a[1]),
     "min": lambda a, b: (np.minimum(a[0], b[0]), np.maximum(a[1], b[1])),

@@ -101,7 +101,10 @@ COMPARE: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 }
 CALLS: dict[str, Callable[[float], float]] = {
     f.__name__: f
-    for f in (math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.sinh, math.cosh, math.tanh)
+    for f in (
+        *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.sinh, math.cosh, math.tanh),
+        *(math.asinh, math.acosh, math.atanh),
+    )
 } | {"exp": math.exp, "log": math.log, "sqrt": math.sqrt, "abs": abs}
 
 

@@ -20,6 +20,7 @@ EXPRESSIONS = {
     "exp(a) - log(3 + b)": lambda a, b: math.exp(a) - math.log(3 + b),
     "asin(a/3) + acos(b/3) + atan(a)": lambda a, b: math.asin(a / 3) + math.acos(b / 3) + math.atan(a),
     "sinh(a) - cosh(b) + tanh(a)": lambda a, b: math.sinh(a) - math.cosh(b) + math.tanh(a),
+    "asinh(a) - acosh(3 + b) + atanh(a/3)": lambda a, b: math.asinh(a) - math.acosh(3 + b) + math.atanh(a / 3),
     "sqrt(4 + a*b)/(5 - b)": lambda a, b: math.sqrt(4 + a * b) / (5 - b),
 }
 STATES = np.array([[0.7, -1.2, 1.1, -0.4], [1.3, 0.4, -0.8, -0.9]])

@@ -18,6 +18,7 @@ SMOOTH = {
     "sqrt": (sympy.sqrt, 0.7), "exp": (sympy.exp, 0.7), "log": (sympy.log, 0.7), "sin": (sympy.sin, 0.7),
     "cos": (sympy.cos, 0.7), "tan": (sympy.tan, 0.7), "asin": (sympy.asin, 0.7), "acos": (sympy.acos, 0.7),
     "atan": (sympy.atan, -2.7), "sinh": (sympy.sinh, 0.7), "cosh": (sympy.cosh, -0.7), "tanh": (sympy.tanh, 0.7),
+    "asinh": (sympy.asinh, -1.3), "acosh": (sympy.acosh, 1.4), "atanh": (sympy.atanh, 0.6),
     "abs": (sympy.Abs, -0.7), "neg": (lambda a: -a, 0.7),
 }  # fmt: skip
 BINARY = {

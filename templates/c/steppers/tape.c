@@ -5,13 +5,13 @@
 
 /* The names in the order of the codes: leaves first. */
 const char *const eomgen_operations[] = {"const", "t", "x", "u", "p", "add", "sub", "mul", "div", "neg", "pow", "sqrt",
-    "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "atan2", "abs", "sign", "min",
-    "max", "lt", "le", "eq", "not", "and", "or", "select", NULL};
+    "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "atan2", "abs",
+    "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select", NULL};
 
 enum { TAPE_CONST, TAPE_T, TAPE_X, TAPE_U, TAPE_P, TAPE_ADD, TAPE_SUB, TAPE_MUL, TAPE_DIV, TAPE_NEG, TAPE_POW, TAPE_SQRT,
     TAPE_EXP, TAPE_LOG, TAPE_SIN, TAPE_COS, TAPE_TAN, TAPE_ASIN, TAPE_ACOS, TAPE_ATAN, TAPE_SINH, TAPE_COSH, TAPE_TANH,
-    TAPE_ATAN2, TAPE_ABS, TAPE_SIGN, TAPE_MIN, TAPE_MAX, TAPE_LT, TAPE_LE, TAPE_EQ, TAPE_NOT, TAPE_AND, TAPE_OR,
-    TAPE_SELECT };
+    TAPE_ASINH, TAPE_ACOSH, TAPE_ATANH, TAPE_ATAN2, TAPE_ABS, TAPE_SIGN, TAPE_MIN, TAPE_MAX, TAPE_LT, TAPE_LE, TAPE_EQ,
+    TAPE_NOT, TAPE_AND, TAPE_OR, TAPE_SELECT };
 
 void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out)
 {
@@ -44,6 +44,9 @@ void eomgen_play(const eomgen_tape *tape, double t, const double *y, const doubl
         case TAPE_SINH: r[k] = sinh(a); break;
         case TAPE_COSH: r[k] = cosh(a); break;
         case TAPE_TANH: r[k] = tanh(a); break;
+        case TAPE_ASINH: r[k] = asinh(a); break;
+        case TAPE_ACOSH: r[k] = acosh(a); break;
+        case TAPE_ATANH: r[k] = atanh(a); break;
         case TAPE_ATAN2: r[k] = atan2(a, b); break;
         case TAPE_ABS: r[k] = fabs(a); break;
         case TAPE_SIGN: r[k] = isnan(a) ? a : (a > 0.0) - (a < 0.0); break;
