@@ -152,6 +152,8 @@ def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
     for key, field in fields.items():
         if field.required and key not in entry.values and key != "type":
             reader.faults.add(f"{entry.path}.{key}", "is missing", f"give {KINDS[field.kind]}")
+    if {"coordinate", "coordinates"} <= entry.values.keys():
+        reader.faults.add(f"{entry.path}.coordinates", "coordinate is given too", "leave one of them out")
     kind = JOINTS[type_name]
     options: dict[str, Any] = {}
     for option in kind.options:

@@ -62,14 +62,17 @@ class ElementEntry:
         check_keys(self.path, self.values, self.fields, self.reader.faults)
         present = [key for key in found.one_of if key in self.values]
         if found.one_of and len(present) != 1:
-            words = " and ".join(present) if present else " or ".join(found.one_of)
-            message = f"both {words} are given" if present else f"{words} is missing"
+            message = f"{' or '.join(found.one_of)} is missing"
+            if present:
+                message = f"{'both ' * (len(present) == 2)}{', '.join(present[:-1])} and {present[-1]} are given"
             self.fault("", message, f"give one of {', '.join(found.one_of)}")
             return None
         return found
 
     def _misunderstood(self, found: ElementType) -> bool:
         """Note a joint where a marker is asked for, with what people who give one want."""
+        if not found.remedies:
+            return False
         names = {name for joint in self.around.joints for name in (joint.entry.name, *joint.coordinates)}
         for key, remedy in found.remedies.items():
             given = "joint" if "joint" in self.values and "joint" not in found.keys else key

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from types import MethodType
 from typing import Any
 
 from ..constraints import CONSTRAINTS
@@ -53,7 +53,7 @@ class ElementMethods(Described):
         """The method of a type that was added to the tables later; None if there is none."""
         for section, types in tables().items():
             if name in types:
-                return partial(method_of(section, types[name]), self)
+                return MethodType(method_of(section, types[name]), self)
         return None
 
 

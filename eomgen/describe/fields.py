@@ -24,6 +24,7 @@ KINDS = {
     "text": "a text",
     "name": "a name",
     "names": "a list of names",
+    "body": "the name of a body",
     "number": "a number",
     "positive": "a number greater than 0",
     "expression": "a number or an expression",
@@ -194,7 +195,9 @@ GROUND: Fields = {key: BODY[key] for key in ("markers", "display")}
 JOINT: Fields = {
     "type": Field("choice", "type of the joint", required=True, choices=tuple(JOINTS)),
     "between": Field(
-        "pair", "bodies or markers; coordinates are the motion of the second relative to the first", required=True
+        "pair",
+        "predecessor P and successor S, bodies or markers; coordinates are the motion of S relative to P",
+        required=True,
     ),
 }
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
@@ -278,9 +281,10 @@ def joint_fields(type_name: str) -> Fields:
         fields["axis"] = AXIS
     if len(joint.coordinates) == 1:
         fields["coordinate"] = COORDINATE
-    fields |= joint.options
+    fields |= {key: field for key, field in joint.options.items() if key != "rotation"}
     if joint.coordinates:
         fields["coordinates"] = COORDINATES
+        fields |= joint.options  # in the order of the arguments
         fields["limits"] = JOINT_DATA["limits"]
     if len(joint.coordinates) == 1:
         fields |= JOINT_DATA

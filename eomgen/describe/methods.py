@@ -25,7 +25,8 @@ ARGUMENTS = {
     "pair": ("handles or str", "Sequence[Any]"),
     "joint": ("handle or str", "Any"),
     "joints": ("handles or str", "Sequence[Any]"),
-    "name": ("str, symbol or handle", "Any"),
+    "name": ("str or symbol", "Any"),
+    "body": ("handle or str", "Any"),
     "names": ("sequence of str", "Sequence[Any]"),
     "vector": ("sequence of three", "Sequence[Value]"),
     "value": ("scalar or sequence of three", "Value | Sequence[Value]"),
@@ -71,8 +72,13 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
     if field.kind == "choice":
         kind = "{" + ", ".join(f'"{word}"' for word in field.choices) + "}"
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
-    plain = field.default if isinstance(field.default, (int, float, str)) else None
-    given: Any = Parameter.empty if field.required and not later else plain
+    number = isinstance(field.default, (int, float)) and not isinstance(field.default, bool)
+    plain = field.default if number else None  # a word or flag that is given may contradict what else is
+    if field.default not in (None, ()) and not number and not isinstance(field.default, tuple):
+        word = str(field.default).lower() if isinstance(field.default, bool) else field.default
+        doc = f"{doc.removesuffix('.')}; {word} unless given."
+    keyword = {"joint", "between"} <= {*found.one_of}  # after *between
+    given: Any = Parameter.empty if field.required and (keyword or not later) else plain
     if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
         on = "A joint or coordinate for one value, a body or marker for three."
         return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
@@ -87,23 +93,37 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
 
 
 def signature_of(found: ElementType) -> Signature:
-    """The signature of the method."""
-    made = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
+    """The signature of the method.
+
+    Raises
+    ------
+    UsageError
+        Two keys would have arguments of one name.
+    """
+    every = arguments_of(found)
+    names = ["self", "name", *(one.name.lstrip("*") for one in every)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise UsageError(
+            f"type {found.name!r}: two of its keys would be the argument {twice!r}; rename one, or set ends"
+        )
+    made = [Parameter("self", Parameter.POSITIONAL_ONLY), Parameter("name", Parameter.POSITIONAL_OR_KEYWORD)]
     way: Any = Parameter.POSITIONAL_OR_KEYWORD
-    for one in arguments_of(found):
+    for one in every:
         if one.name.startswith("*"):
-            made.append(Parameter(one.name[1:], Parameter.VAR_POSITIONAL))
+            made.append(Parameter(one.name[1:], Parameter.VAR_POSITIONAL, annotation=one.annotation))
             way = Parameter.KEYWORD_ONLY
         else:
-            default = None if way == Parameter.KEYWORD_ONLY and one.default is Parameter.empty else one.default
-            made.append(Parameter(one.name, way, default=default))
+            made.append(Parameter(one.name, way, default=one.default, annotation=one.annotation))
     return Signature(made)
 
 
-def documentation_of(found: ElementType) -> str:
+def documentation_of(section: str, found: ElementType) -> str:
     """The documentation of the method, in the manner of NumPy."""
     summary, _, more = found.doc.partition(".  ")
     lines = textwrap.wrap(f"Add {summary.removesuffix('.')}.", _WIDTH)
+    if found.one_of and not any(one.name in ("on", "*between") for one in arguments_of(found)):
+        more = f"{more}  Exactly one of {', '.join(found.one_of)} is given.".strip()
     lines += ["", *textwrap.wrap(more, _WIDTH)] if more else []
     lines += ["", "Parameters", "----------", "name : str", "    Identifier."]
     every, skip = arguments_of(found), False
@@ -114,41 +134,52 @@ def documentation_of(found: ElementType) -> str:
         names = one.name
         if k + 1 < len(every) and every[k + 1].key == one.key:
             names, skip = f"{one.name}, {every[k + 1].name}", True
-        optional = "" if found.keys[one.key].required or one.key in found.one_of else ", optional"
-        lines.append(f"{names} : {one.kind}{optional}")
+        needed = found.keys[one.key].required or one.name in ("on", "*between")
+        lines.append(f"{names} : {one.kind}{'' if needed else ', optional'}")
         lines += textwrap.wrap(one.doc, _WIDTH, initial_indent="    ", subsequent_indent="    ")
-    return "\n".join(lines)
+    return "\n".join(lines + (["", "Returns", "-------", "JointHandle"] if section == "joints" else []))
 
 
 def method_of(section: str, found: ElementType) -> Callable[..., Any]:
     """The method that adds an element of a type to its section of a description; of a joint, it returns the handle."""
     signature, every = signature_of(found), arguments_of(found)
     allowed = [p.name for p in signature.parameters.values() if p.kind is not Parameter.VAR_POSITIONAL][1:]
+    required = [one.name for one in every if one.default is Parameter.empty]
+    anywhere = any(one.name == "*between" for one in every)
 
-    def add(self: Described, *args: Any, **keys: Any) -> Any:
+    def add(self: Described, /, *args: Any, **keys: Any) -> Any:
         check_keywords(found.name, keys, allowed)
+        if anywhere:
+            args = _take_value(required, args, keys)
         try:
             bound = signature.bind(self, *args, **keys).arguments
         except TypeError as error:
             raise TypeError(f"{found.name}() {error}") from None
-        given = {key: value for key, value in bound.items() if key not in ("self", "name") and value is not None}
-        if "between" in given and any(one.name == "*between" for one in every):
-            _take_value(found, given)
+        kept = {key: value for key, value in bound.items() if value is not None or key in found.ends}
+        given = {key: value for key, value in kept.items() if key not in ("self", "name")}
         values = {"type": found.name, **_entry(self, found, bound["name"], given)}
         entry = self._description.add(section, bound["name"], values)
         return JointHandle(self, entry) if section == "joints" else None
 
-    add.__name__, add.__qualname__ = found.name, f"Model.{found.name}"
-    add.__doc__ = documentation_of(found)
+    add.__name__, add.__qualname__, add.__module__ = found.name, f"Model.{found.name}", "eomgen.api.model"
+    add.__doc__ = documentation_of(section, found)
     add.__signature__ = signature  # type: ignore[attr-defined]
+    add.__annotations__ = {}
     return add
 
 
-def _take_value(found: ElementType, given: dict[str, Any]) -> None:
-    """The first required value may follow what the element acts on without its keyword."""
-    missing = [key for key, field in found.keys.items() if field.required and key not in given]
-    if missing and len(given["between"]) > 1:
-        *given["between"], given[missing[0]] = given["between"]
+def _take_value(required: Sequence[str], args: tuple[Any, ...], keys: dict[str, Any]) -> tuple[Any, ...]:
+    """The required value may follow what the element acts on without its keyword, which is given here."""
+    missing = [name for name in required if name not in keys]
+    places = args if "name" in keys else args[1:]
+    if (
+        len(missing) == 1
+        and len(places) > ("joint" not in keys)
+        and not isinstance(places[-1], (JointHandle, MarkerHandle))
+    ):
+        keys[missing[0]] = places[-1]
+        return args[:-1]
+    return args
 
 
 def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any]) -> dict[str, Any]:
@@ -165,8 +196,15 @@ def _entry(model: Described, found: ElementType, name: Any, given: dict[str, Any
     elif {"joint", "between"} <= {*found.one_of}:
         entry |= _where(model, given.pop("between", ()), given.pop("joint", None))
     for key in [key for key in kinds if key in given]:
-        entry[key] = _converted(model, found, name, key, given[key])
+        if not _is_default(given[key], found.keys[key]):
+            entry[key] = _converted(model, found, name, key, given[key])
     return {key: value for key, value in entry.items() if value is not None}
+
+
+def _is_default(value: Any, field: Field) -> bool:
+    """Whether a number that is given says no more than what holds anyway."""
+    numbers = type(value) in (int, float) and type(field.default) in (int, float)
+    return numbers and bool(value == field.default)
 
 
 def _where(model: Described, between: Sequence[Any], joint: Any) -> dict[str, Any]:
@@ -187,7 +225,7 @@ def _converted(model: Described, found: ElementType, name: Any, key: str, value:
     kind = found.keys[key].kind
     if kind == "marker" and isinstance(value, JointHandle) and key in found.remedies:
         raise UsageError(f"{found.name} {name!r} acts at a marker, which {value!r} is not; {found.remedies[key]}")
-    if kind in ("marker", "joint") or (kind == "name" and isinstance(value, MarkerHandle)):
+    if kind in ("marker", "joint", "body"):
         return _reference(model, kind, value)
     if kind in ("pair", "joints"):
         return [_reference(model, kind, part) for part in value]

@@ -89,6 +89,7 @@ def _definitions() -> Schema:
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
     "name": _ref("name"),
+    "body": _ref("name"),
     "joint": _ref("name"),
     "names": _ref("names"),
     "number": {"type": ["number", "string"]},

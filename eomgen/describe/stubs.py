@@ -52,7 +52,7 @@ def _method(section: str, found: ElementType) -> str:
             keywords = True
             continue
         annotation, default = one.annotation, ""
-        if keywords or one.default is not Parameter.empty:
+        if keywords or one.default is not Parameter.empty:  # what follows *between may also be its last
             plain = None if one.default is Parameter.empty else one.default
             default = f" = {plain!r}"
             annotation += " | None" if plain is None and annotation not in ("Any", "Value") else ""
@@ -62,7 +62,7 @@ def _method(section: str, found: ElementType) -> str:
     parts[-1] = parts[-1].removesuffix(",") + f")\0->\0{result}:"
     text = f"def\0{found.name}({' '.join(parts)}"
     head = [line.replace("\0", " ") for line in textwrap.wrap(text, 116, subsequent_indent="    ")]
-    doc = textwrap.wrap(f'"""{_summary(documentation_of(found))}"""', 112)
+    doc = textwrap.wrap(f'"""{_summary(documentation_of(section, found))}"""', 112)
     return textwrap.indent("\n".join([*head, *(f"    {line}" for line in doc), ""]), "    ")
 
 

@@ -89,7 +89,7 @@ TYPES = table(
         "the gravity of a point on a body, whose reaction acts at the point.",
         {
             "center": Field("marker", "what attracts", required=True),
-            "body": Field("name", "the body that is attracted, at its centre of mass", required=True),
+            "body": Field("body", "the body that is attracted, at its centre of mass", required=True),
             "mu": Field("expression", "gravitational parameter G M of the centre (m^3/s^2)", required=True),
             "extent": Field(
                 "choice",

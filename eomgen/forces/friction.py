@@ -94,17 +94,22 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
     if onset is not None:
         e.judge(static, onset, lambda x: x >= 0, "must be 0 or greater")
     stribeck = e.positive("stribeck") if "stribeck" in e.values else None
-    return Friction(level, e.positive("smoothing"), e.law(viscous), onset, stribeck)
+    along = e.given(viscous)
+    return Friction(level, e.positive("smoothing"), e.graph.zero if along is None else along, onset, stribeck)
 
 
 def _joint_friction(e: Entry) -> Force | None:
-    path, viscous = read_coordinate(e), e.law("viscous")
+    path, viscous = read_coordinate(e), e.given("viscous")
     dry = read_friction(e, "coulomb", "static", "viscous", alone=True)
     if dry is None and "viscous" not in e.values and not e.at_fault():
         e.fault("", "has no law", "give viscous, or coulomb and smoothing, or both")
     if path is None:
         return None
-    return Damper(e.name, path, viscous) if dry is None else JointFriction(e.name, path, dry)
+    return (
+        JointFriction(e.name, path, dry)
+        if dry is not None
+        else Damper(e.name, path, e.graph.zero if viscous is None else viscous)
+    )
 
 
 TYPES = table(
@@ -113,7 +118,7 @@ TYPES = table(
         "friction of a joint's coordinate: viscous, Coulomb's with Stribeck's effect, or both.",
         {
             "joint": ON_JOINT._replace(required=True),
-            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", default=0, level=MOTION),
+            "viscous": Field("expression", "viscous coefficient (N m s/rad or N s/m)", level=MOTION),
             "coulomb": Field("expression", "Coulomb friction (N m or N)", level=MOTION),
             "static": Field("expression", "friction at the onset of sliding; needs stribeck", level=MOTION),
             "stribeck": Field("expression", "velocity over which static friction falls to Coulomb's (rad/s or m/s)"),

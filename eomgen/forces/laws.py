@@ -59,7 +59,8 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
         on = e.coordinate("joint") if "joint" in e.values and where is not None else None
         word = "angle" if angle or (on is not None and on.kind == "angle") else "length"
         value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
-        law, energy = e.law("law", {word: value, "rate": rate}), e.law("potential", {word: value})
+        law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
+        energy = e.law("potential", {word: value}) if "potential" in e.values else e.graph.zero
         return None if where is None else Element(e.name, where, value, rate, law, energy)
 
     return read
@@ -69,12 +70,13 @@ def _law(of: str, unit: str) -> Fields:
     return {
         "law": Field(
             "expression",
-            f"{unit} that drives the coordinate up or pushes the markers apart, of {of}, rate and all that forces know",
-            default=0,
+            f"{unit} that drives the coordinate up or pushes the markers apart; an expression of {of}, ``rate`` "
+            "and all that forces know",
             level=MOTION,
         ),
         "potential": Field(
-            "expression", f"potential energy V of {of} (J); the force -dV/d{of} comes with it", default=0
+            "expression",
+            f"potential energy (J), of {of} and parameters; its force, minus its derivative, comes with it",
         ),
     }
 
@@ -86,7 +88,7 @@ TYPES = table(
         {
             "joint": ON_JOINT,
             "between": BETWEEN,
-            **_law("length", "force (N; of angle, N m, where the coordinate is one)"),
+            **_law("``length`` (``angle``, where the coordinate is one)", "force (N, or N m)"),
             "via": VIA,
         },
         _element(read_joint_or_path, False),
@@ -95,7 +97,7 @@ TYPES = table(
     ElementType(
         "torsional_element",
         "a torque of any law on an angle: of a joint, or of the second marker about the z axis of the first.",
-        {"joint": ON_JOINT, "between": BETWEEN, **_law("angle", "torque (N m)")},
+        {"joint": ON_JOINT, "between": BETWEEN, **_law("``angle``", "torque (N m)")},
         _element(read_angle, True),
         one_of=("joint", "between"),
     ),

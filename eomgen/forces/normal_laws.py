@@ -69,7 +69,12 @@ NORMAL: Fields = {
     "dissipation": Field("expression", "dissipation (s/m); or give restitution and velocity"),
     "restitution": Field("expression", "coefficient of restitution, from which the dissipation follows"),
     "velocity": Field("expression", "velocity of impact (m/s) to which the restitution belongs"),
-    "formula": Field("choice", "how it follows", default=RESTITUTIONS[0], choices=RESTITUTIONS),
+    "formula": Field(
+        "choice",
+        "formula by which the dissipation follows from the restitution",
+        default=RESTITUTIONS[0],
+        choices=RESTITUTIONS,
+    ),
 }
 
 

@@ -132,7 +132,12 @@ def _wrap(view: View, start: Marker, end: Marker, around: Cylinder) -> Piece:
     )
 
 
-VIA = Field("via", "markers that the path slides through and cylinders that it runs over, in order", default=())
+VIA = Field(
+    "via",
+    "what the path runs over, in order: markers that it slides through, and cylinders {around: marker, radius: r, "
+    "sense: positive or negative} about the z axis of a marker",
+    default=(),
+)
 
 
 def read_path(e: Entry) -> Path | None:

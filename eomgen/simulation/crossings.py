@@ -8,7 +8,7 @@ and leave again within it, and zeros after a reset, once the value has been seen
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from math import isnan
+from math import isnan, nan
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -96,7 +96,8 @@ class Crossings:
         self.slope_new = self._slopes(step.t, step.x, f, new, step.length)
         brackets = self._brackets(step, new)
         zeros = self._searched(step, [(z.event, self._zero(z)) for z in brackets])
-        found = [(zero, z.event, z.fb - z.fa) for zero, z in zip(zeros, brackets, strict=True)]
+        pairs = zip(zeros, brackets, strict=True)
+        found = [(zero, z.event, z.fb - z.fa) for zero, z in pairs if not isnan(zero)]
         found.sort(key=lambda triple: self.forward * triple[0])
         self.fired, self.ways = [], []
         stop: tuple[float, bool] | None = None
@@ -206,12 +207,13 @@ class Crossings:
         for k in range(1, SAMPLED + 1):
             later = step.t_old + k * (step.t - step.t_old) / SAMPLED if k < SAMPLED else step.t
             value = (yield later) if k < SAMPLED else b
+            entered = k == 1 or isnan(g)  # a zero at its beginning belongs to no interval before
             last, end = later, value
             if isnan(value) and not isnan(g):
                 last, end = yield from self._domain_edge(t, g, later)
             elif isnan(g) and not isnan(value):
                 t, g = yield from self._domain_edge(later, value, t)
-            if g < 0.0 <= end or g > 0.0 >= end or (k == 1 and g == 0.0 and not isnan(end)):
+            if g < 0.0 <= end or g > 0.0 >= end or (entered and g == 0.0 and not isnan(end)):
                 found.append(Bracket(i, t, last, g, end))
             t, g = later, value
         way = self.events[i].direction
@@ -225,7 +227,7 @@ class Crossings:
         """
         first = g
         for _ in range(HALVED):
-            if g * first <= 0.0:
+            if g == 0.0 or (g > 0.0) != (first > 0.0):
                 break
             t = 0.5 * (inside + outside)
             value = yield t
@@ -307,8 +309,21 @@ class Crossings:
             a, fa = b, fb
             b += d if abs(d) > tolerance else tolerance if m > 0.0 else -tolerance
             fb = yield b
+            if isnan(fb):
+                return (yield from self._zero_beside(bracket, b))
         jumps = fb * bracket.fa > 0.0 > fb * fc and abs(fb) > TOUCHING * float(self.size[i])
         return float(c if jumps else b)
+
+    def _zero_beside(self, bracket: Bracket, gap: float) -> Search[float]:
+        """The zero in a bracket within which, at a time, the value is no number: on either side; NaN if on none."""
+        i, a, b, fa, fb = bracket
+        t, g = yield from self._domain_edge(a, fa, gap)
+        if g == 0.0 or (g > 0.0) != (fa > 0.0):
+            return (yield from self._zero(Bracket(i, a, t, fa, g)))
+        t, g = yield from self._domain_edge(b, fb, gap)
+        if g == 0.0 or (g > 0.0) != (fb > 0.0):
+            return (yield from self._zero(Bracket(i, t, b, g, fb)))
+        return nan
 
     # -- resets ---------------------------------------------------------------------------------------------------
     def arrive(self, t: float, x: Array, length: float) -> None:

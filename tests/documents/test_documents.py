@@ -131,7 +131,7 @@ def test_the_pages_know_kernels_sequences_rotations_and_methods() -> None:
             for key, p in inspect.signature(getattr(eomgen.Model, name)).parameters.items()
             if key not in ("self", "name")
         ]
-        assert shown == ", ".join(p.name if p.default is p.empty else f"{p.name}={p.default}" for p in taken), name
+        assert shown == ", ".join(p.name if p.default is p.empty else f"{p.name}={p.default!r}" for p in taken), name
     assert set(CONSTRAINTS) == set(re.findall(r"^\| `m\.(\w+)` ", text["constraints"], re.MULTILINE))
 
 

@@ -167,6 +167,26 @@ def test_an_event_that_is_no_number_leaves_the_others_alone(modules: dict[str, A
     np.testing.assert_allclose(many.events("floor")[0][: len(floors()), 0], floors(), atol=1e-8)
 
 
+GAPS = {  # of t: expression -> its zeros; none may be found where the expression is no number
+    "sqrt((t - 0.3)*(t - 0.6)) - 0.05": [0.45 - np.sqrt(0.025), 0.45 + np.sqrt(0.025)],
+    "(t - 0.45)/sqrt((t - 0.4)*(t - 0.46))": [],
+    "log((t - 0.3)*(t - 0.6)) + 4": [0.45 - np.sqrt(0.0225 + np.exp(-4)), 0.45 + np.sqrt(0.0225 + np.exp(-4))],
+    "sqrt(0.5 - t)": [0.5],
+    "sqrt(t - 0.5)": [0.5],
+    "sqrt(t - 0.4375)": [0.4375],
+    "-sqrt(t - 0.5)": [0.5],
+}
+
+
+@pytest.mark.parametrize("text", GAPS)
+def test_no_zero_is_found_in_a_gap_and_those_beside_it_are(modules: dict[str, Any], text: str) -> None:
+    for target, methods in {"cython": COMPILED, "numpy": STEPPED}.items():
+        for method in methods:
+            options = {"step": 1 / 16} if method == "RK4" else {"max_step": 0.1}
+            found = modules[target].simulate(0.9, {"h": 9.0}, method=method, events={"own": text}, **options)
+            np.testing.assert_allclose(found.t_events["own"], GAPS[text], atol=1e-9, err_msg=f"{target} {method}")
+
+
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_ensembles_meet_them_as_well(modules: dict[str, Any], target: str) -> None:
     options = {"method": "RK45", "events": levels(12), "keep_events": 200, **TIGHT}

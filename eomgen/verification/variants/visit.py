@@ -147,7 +147,7 @@ def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
         return {name: visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("inertia", "forces"):
         return visitor.vector(value, slot)
-    if kind == "name" and slot.key == "body":
+    if kind == "body":
         return visitor.body(value)
     if kind == "via":
         return [_via(part, slot, visitor) for part in value]

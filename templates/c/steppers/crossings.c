@@ -112,21 +112,6 @@ static int brackets_of_touch(const eomgen_method *method, eomgen_run *run, eomge
     return n;
 }
 
-/* The edge of the domain of a value, between a time where it is a number and one where it is none: the last time found
-   where it is one, and its value there; no further than to where its sign is another. */
-static void domain_edge(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *in, double *g, double out)
-{
-    const double first = *g;
-    for (int k = 0; k < RUNS_HALVED && *g * first > 0.0; k++) {
-        const double t = 0.5 * (*in + out), value = value_at(method, run, ev, i, t);
-        if (isnan(value)) {
-            out = t;
-        } else {
-            *in = t, *g = value;
-        }
-    }
-}
-
 /* A value that is no number at one end of the step: changes of sign in the part where it is one. */
 static int brackets_within_domain(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n, int i)
 {
@@ -135,6 +120,7 @@ static int brackets_within_domain(const eomgen_method *method, eomgen_run *run, 
     for (int k = 1; k <= RUNS_SAMPLED && n < most; k++) {
         const double next = k < RUNS_SAMPLED ? run->t_old + k * (run->t - run->t_old) / (double)RUNS_SAMPLED : run->t;
         const double value = k < RUNS_SAMPLED ? value_at(method, run, ev, i, next) : ev->g_new[i];
+        const int entered = k == 1 || isnan(g); /* a zero at its beginning belongs to no interval before */
         double last = next, end = value;
         if (isnan(value) && !isnan(g)) {
             last = t, end = g;
@@ -145,7 +131,7 @@ static int brackets_within_domain(const eomgen_method *method, eomgen_run *run, 
             domain_edge(method, run, ev, i, &start, &g, t);
             t = start;
         }
-        if ((g < 0.0 && end >= 0.0) || (g > 0.0 && end <= 0.0) || (k == 1 && g == 0.0 && !isnan(end))) {
+        if ((g < 0.0 && end >= 0.0) || (g > 0.0 && end <= 0.0) || (entered && g == 0.0 && !isnan(end))) {
             n = add(ev, n, i, t, last, g, end);
         }
         t = next, g = value;
@@ -181,18 +167,23 @@ static int find_brackets(const eomgen_method *method, eomgen_run *run, eomgen_ev
 }
 
 /* Zeros of the brackets in place of their first ends, in order, and in place of the second the way the value goes there. */
-static void sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n)
+static int sort_zeros(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int n)
 {
+    int found = 0;
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
         const double *const row = ev->bracket + 4 * k, way = row[3] - row[2], t = zero_between(method, run, ev, i, row);
-        int at = k;
+        if (isnan(t)) {
+            continue;
+        }
+        int at = found++;
         for (; at > 0 && run->direction * (ev->bracket[4 * (at - 1)] - t) > 0.0; at--) {
             memcpy(ev->bracket + 4 * at, ev->bracket + 4 * (at - 1), 2 * sizeof(double));
             ev->whose[at] = ev->whose[at - 1];
         }
         ev->bracket[4 * at] = t, ev->bracket[4 * at + 1] = way, ev->whose[at] = i;
     }
+    return found;
 }
 
 int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_journey *j, double *t)
@@ -200,8 +191,7 @@ int eomgen_find_events(const eomgen_method *method, eomgen_run *run, eomgen_jour
     eomgen_events *const ev = j->events;
     int stop = 0;
     event_values(run, ev, run->t, run->y, ev->g_new);
-    const int n = find_brackets(method, run, ev);
-    sort_zeros(method, run, ev, n);
+    const int n = sort_zeros(method, run, ev, find_brackets(method, run, ev));
     for (int k = 0; k < n; k++) {
         const int i = ev->whose[k];
         const double zero = ev->bracket[4 * k], way = ev->bracket[4 * k + 1];

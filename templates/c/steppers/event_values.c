@@ -17,7 +17,8 @@ static int event_values(eomgen_run *run, eomgen_events *ev, double t, const doub
     for (int i = 0; i < ev->n_model; i++) {
         g[i] = (double)NAN; /* if nothing is written */
     }
-    if (ev->values != NULL && ev->values(t, y, run->u, run->c, g, run->w) > EOMGEN_NON_FINITE) {
+    const int status = ev->values != NULL ? ev->values(t, y, run->u, run->c, g, run->w) : 0;
+    if (status != 0 && status != EOMGEN_NON_FINITE) {
         for (int i = 0; i < ev->n_model; i++) {
             g[i] = (double)NAN;
         }

@@ -3,6 +3,39 @@
 
 #include "eomgen_loop.h"
 
+/* The edge of the domain of a value, between a time where it is a number and one where it is none: the last time found
+   where it is one, and its value there; no further than to where its sign is another. */
+static void domain_edge(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, double *in, double *g, double out)
+{
+    const double first = *g;
+    for (int k = 0; k < RUNS_HALVED && *g != 0.0 && (*g > 0.0) == (first > 0.0); k++) {
+        const double t = 0.5 * (*in + out), value = value_at(method, run, ev, i, t);
+        if (isnan(value)) {
+            out = t;
+        } else {
+            *in = t, *g = value;
+        }
+    }
+}
+
+static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket);
+
+/* The zero in a bracket within which, at a time, the value is no number: on either side of that gap; NaN if on none. */
+static double zero_beside(const eomgen_method *method, eomgen_run *run, eomgen_events *ev, int i, const double *bracket, double gap)
+{
+    double first[4] = {bracket[0], bracket[0], bracket[2], bracket[2]};
+    domain_edge(method, run, ev, i, &first[1], &first[3], gap);
+    if (first[3] == 0.0 || (first[3] > 0.0) != (first[2] > 0.0)) {
+        return zero_between(method, run, ev, i, first);
+    }
+    double last[4] = {bracket[1], bracket[1], bracket[3], bracket[3]};
+    domain_edge(method, run, ev, i, &last[0], &last[2], gap);
+    if (last[2] == 0.0 || (last[2] > 0.0) != (last[3] > 0.0)) {
+        return zero_between(method, run, ev, i, last);
+    }
+    return (double)NAN;
+}
+
 /* The zero between a and b, where the values fa and fb differ in sign: R. P. Brent, Algorithms for Minimization without
    Derivatives, 1973, chapter 4; to four roundings, like SciPy's. Where the value jumps,
    the far side of the jump: a run that goes on from the near one would meet it again. */
@@ -39,6 +72,9 @@ static double zero_between(const eomgen_method *method, eomgen_run *run, eomgen_
         a = b, fa = fb;
         b += fabs(d) > tolerance ? d : m > 0.0 ? tolerance : -tolerance;
         fb = value_at(method, run, ev, i, b);
+        if (isnan(fb)) {
+            return zero_beside(method, run, ev, i, bracket, b);
+        }
     }
     const int jumps = fb * bracket[2] > 0.0 && fb * fc < 0.0 && fabs(fb) > RUNS_TOUCHING * ev->size[i];
     return jumps ? c : b;

@@ -83,7 +83,8 @@ static int apply_resets(const eomgen_method *method, eomgen_run *run, eomgen_jou
         for (int k = 0; k < ev->n_resets; k++) {
             ev->values_reset[k] = (double)NAN;
         }
-        if (ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w) > EOMGEN_NON_FINITE) {
+        const int status = ev->resets(run->t, run->y, run->u, run->c, ev->values_reset, run->w);
+        if (status != 0 && status != EOMGEN_NON_FINITE) {
             return EOMGEN_RESET_FAILED;
         }
         for (int k = 0; k < ev->n_resets; k++) {
