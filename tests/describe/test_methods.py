@@ -71,11 +71,8 @@ def test_what_a_force_acts_on_and_its_value() -> None:
     assert last(m) == {"type": "actuator", "between": ["a", "b"], "value": "2*t"}
     m.torsional_spring("s1", a, b, 7)
     assert last(m) == {"type": "torsional_spring", "between": ["a", "b"], "stiffness": 7}
-    for wrong in (
-        lambda: m.torsional_spring("s2", a, b),
-        lambda: m.torsional_spring("s3", J),
-        lambda: m.actuator("u6", S),
-    ):
+    wrong = (lambda: m.torsional_spring("s2", a, b), lambda: m.torsional_spring("s3", J), lambda: m.actuator("u6", S))
+    for call in wrong:
         with pytest.raises(TypeError, match="missing a required argument: '(stiffness|value)'"):
             call()
     m.torque("t1", a, (0, 0, 1))
