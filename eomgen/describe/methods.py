@@ -72,24 +72,23 @@ def _arguments(found: ElementType, key: str, field: Field, later: bool) -> list[
     if field.kind == "choice":
         kind = "{" + ", ".join(f'"{word}"' for word in field.choices) + "}"
     doc = f"{field.doc[:1].upper()}{field.doc[1:]}."
-    number = isinstance(field.default, (int, float)) and not isinstance(field.default, bool)
-    plain = field.default if number else None  # a word or flag that is given may contradict what else is
-    if field.default not in (None, ()) and not number and not isinstance(field.default, tuple):
-        word = str(field.default).lower() if isinstance(field.default, bool) else field.default
-        doc = f"{doc.removesuffix('.')}; {word} unless given."
-    keyword = {"joint", "between"} <= {*found.one_of}  # after *between
-    given: Any = Parameter.empty if field.required and (keyword or not later) else plain
+    default: Any = field.default if type(field.default) in (int, float) else None
+    if isinstance(field.default, (str, bool)):  # which is no default of the method: given, it may contradict the rest
+        doc = f"{doc.removesuffix('.')}; {str(field.default).lower()} unless given."
+    anywhere = {"joint", "between"} <= {*found.one_of}
+    if field.required and (anywhere or not later):  # what follows *between is given by its keyword
+        default = Parameter.empty
     if {"joint", "body"} <= {*found.one_of} and key in ("joint", "body"):
         on = "A joint or coordinate for one value, a body or marker for three."
         return [Argument("on", key, kind, annotation, Parameter.empty, on)] if key == "joint" else []
-    if {"joint", "between"} <= {*found.one_of} and key in ("joint", "between"):
+    if anywhere and key in ("joint", "between"):
         if key == "joint":
             return [Argument("joint", key, kind, annotation, None, "The joint, instead of ``between``.")]
         return [Argument("*between", key, kind, "Any", None, "One joint or coordinate, or two markers.")]
     if field.required and field.kind in ("pair", "joints"):
         single = ARGUMENTS["marker"]
         return [Argument(name, key, single[0], single[1], Parameter.empty, doc) for name in found.ends]
-    return [Argument(key, key, kind, annotation, given, doc)]
+    return [Argument(key, key, kind, annotation, default, doc)]
 
 
 def signature_of(found: ElementType) -> Signature:
