@@ -134,7 +134,7 @@ def try_one(number: int, folder: Path, verified: bool) -> None:
     many = module.simulate_many(
         SECONDS, run.x[:, :1].repeat(2, axis=1), method="RK45", rtol=1e-6, events=[], store=folder / "store"
     )
-    agree("a run and a run of an ensemble", run.x[:, -1], many.x[:, 1], 1e-9)
+    agree("a run and a run of an ensemble", run.x[:, -1], many.x[:, 1], 1e-6)  # rtol: first steps may differ
     refused = eg.Model.from_description(described.description)
     refused.body("body0", mass="nothing")
     try:
