@@ -108,6 +108,8 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
         text = str(Printer().doprint(expression))
     except RecursionError:
         raise UsageError(f"{shortened(expression)} is nested too deeply to be written as a text") from None
+    except ValueError:  # Python writes whole numbers of some thousand digits and no longer ones
+        raise UsageError(f"{shortened(expression)} holds a number of too many digits to be written as a text") from None
     graph = Graph()
     for call in expression.atoms(AppliedUndef) if isinstance(expression, sympy.Basic) else ():
         if call.func.__name__ in functions:
