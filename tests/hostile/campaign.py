@@ -230,7 +230,7 @@ class Process:
                 last = time.monotonic()
                 continue
             beat, now = BEAT.unpack_from(self.beat, 0), time.monotonic()
-            over = beat[0] != IDLE and now - beat[1] > 3.0 * SECONDS + GRACE
+            over = beat[0] != IDLE and now - beat[1] > SECONDS + GRACE
             seen_twice, late = over and beat == late, beat if over else None  # a beat may be read half written
             if seen_twice or now - last > SILENCE:
                 self.process.kill()

@@ -22,7 +22,7 @@ from eomgen.errors import EomgenError
 from .guard import PACKAGE, TEMPLATES, Escape, Guard
 from .kind import Kind, Wrong
 
-SECONDS = 20.0  #: processor time of one case; three times as much on the clock, where it waits or others work
+SECONDS = 20.0  #: wall time of one case
 BUILDING = 1.0  #: wall time for making the object that is given
 MEMORY = 2 << 30  #: bytes that a process may hold
 #: Outcomes that are findings; fine, named error and refused are not.
@@ -62,7 +62,6 @@ class Runner:
         sys.unraisablehook = self.ignored
         os.chdir(self.folder)
         signal.signal(signal.SIGALRM, _alarm)
-        signal.signal(signal.SIGPROF, _alarm)
 
     def ignored(self, args: Any) -> None:
         """Note an error that a destructor lost; the alarm rings again."""
@@ -105,7 +104,6 @@ class Runner:
             found = judge(error)
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0)
-            signal.setitimer(signal.ITIMER_PROF, 0)
         seconds = time.perf_counter() - start
         if guard.escapes:  # also where a handler swallowed it
             found = Outcome("escape", guard.escapes[0], f"escape {_plain(guard.escapes[0])}", found.text)
@@ -121,8 +119,7 @@ class Runner:
         except (Exception, Hang):
             return Outcome("refused", "not built")
         self.warned.clear()
-        signal.setitimer(signal.ITIMER_REAL, 3.0 * SECONDS, 1.0)  # again each second, in case a handler swallows it
-        signal.setitimer(signal.ITIMER_PROF, SECONDS, 1.0)
+        signal.setitimer(signal.ITIMER_REAL, SECONDS, 1.0)  # again each second, in case a handler swallows it
         try:
             self.guard.armed = True
             return Outcome("fine", kind.run(given, self.folder))
