@@ -1,4 +1,4 @@
-"""Analysis: a range of one coordinate, to and fro -> the part of each way that was walked before."""
+"""Analysis: a range of one coordinate, or of time alone, to and fro -> the part of each way that was walked before."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..numeric.scales import Array
 
 
 class Ground:
-    """What of a range to and fro on one line, at one time, was walked already.
+    """What of a range to and fro on one line was walked already.
 
     Parameters
     ----------
@@ -18,9 +18,9 @@ class Ground:
     """
 
     def __init__(self, t: Array, y: Array) -> None:
-        moving = np.flatnonzero(np.ptp(y, axis=1)) if len(y) else np.empty(0, dtype=np.intp)
-        #: values of the one coordinate that moves, or None
-        self.values = y[moving[0]] if len(moving) == 1 and not np.ptp(t) else None
+        moving = [row for row in (t, *y) if np.ptp(row)]
+        #: values of the only coordinate that moves, or of the time, or None
+        self.values = moving[0] if len(moving) == 1 else None
         self.low = self.high = 0.0 if self.values is None else float(self.values[0])
 
     def known(self, first: int, last: int) -> float:

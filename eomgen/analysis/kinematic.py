@@ -313,6 +313,7 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
     found: list[Singular] = []
     stop: Singular | None = None
     ground = Ground(asked.t, asked.y)
+    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / follower.led_scales)
     count = 0
     for first, last in pieces:
         t, y = float(asked.t[first]), asked.y[:, first]
@@ -320,7 +321,8 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
         length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
         path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0, initial=0.0)
-        track = Track(follower, path, q, length, ground.known(first, last) * length)
+        extent = extents[0] if dt[-1] else extents[1]
+        track = Track(follower, path, q, length, ground.known(first, last) * length, extent)
         ground.walked(first, last, track.smooth)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([track.holds(s) for s in along])

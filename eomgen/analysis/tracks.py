@@ -18,6 +18,8 @@ ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean anoth
 class Track:
     """A walk from s = 0 to ``end``, or as far as it goes; the way to ``known`` is smooth and was walked before.
 
+    ``extent`` is that of :class:`.Walk`.
+
     Attributes
     ----------
     reached : float
@@ -28,9 +30,11 @@ class Track:
         Change points on the way.
     """
 
-    def __init__(self, follower: Follower, path: Path, start: Array, end: float, known: float = 0.0) -> None:
+    def __init__(
+        self, follower: Follower, path: Path, start: Array, end: float, known: float = 0.0, extent: float = 0.0
+    ) -> None:
         self.follower, self.path, self.end = follower, path, end
-        self.walk = walk = Walk(follower, path, start)
+        self.walk = walk = Walk(follower, path, start, extent)
         whole = walk.to(end, known)
         self.bridges, self.singular = judge_walk(walk)
         self.stop: Singular | None = None

@@ -56,10 +56,13 @@ class Walk:
     path : Path
     start : (n_q,) array
         Closed position at s = 0.
+    extent : float, optional
+        Length in s of the whole range that the path is a piece of: the pieces of a range to and fro need no shorter
+        steps than one way over all of it.
     """
 
-    def __init__(self, follower: Follower, path: Path, start: Array) -> None:
-        self.follower, self.path = follower, path
+    def __init__(self, follower: Follower, path: Path, start: Array, extent: float = 0.0) -> None:
+        self.follower, self.path, self.extent = follower, path, extent
         self.points = [Point(0.0, start, self.tangent(0.0, start))]
         self.leaps: list[tuple[Point, Point]] = []
         rate = largest(self.points[0].tangent.rate / follower.scales.q)
@@ -84,7 +87,7 @@ class Walk:
             left = end - here.s
             if left <= 0.0:
                 return True
-            longest = max(end / FEWEST, known - here.s)  # however still it stands: a pulse must not be stepped over
+            longest = max(end / FEWEST, self.extent / FEWEST, known - here.s)  # however still it stands: a pulse must not be stepped over
             rate = largest(here.tangent.rate / self.follower.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)

@@ -7,6 +7,7 @@ The embedding technique (Shabana, Computational Dynamics, "embedding technique")
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +30,17 @@ class Terms(NamedTuple):
     indefinite: bool = False  #: whether M may have negative eigenvalues, where bodies with such inertias were asked for
 
 
+@lru_cache(maxsize=8)
+def lower_triangle(n: int) -> tuple[Indices, ...]:
+    """Rows and columns of the entries on and below the diagonal, read only."""
+    return tuple(np.tril_indices(n))
+
+
 def unpack_terms(flat: Array, n: int, m: int, indefinite: bool = False) -> Terms:
     """The block ``terms`` [M lower triangle row by row | h | C_q | gamma] as arrays."""
     lower = n * (n + 1) // 2
     M = np.empty((n, n))
-    rows, columns = np.tril_indices(n)
+    rows, columns = lower_triangle(n)
     M[rows, columns] = flat[:lower]
     M[columns, rows] = flat[:lower]
     h, C_q, gamma = np.split(flat[lower:], [n, n + m * n])

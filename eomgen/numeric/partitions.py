@@ -1,6 +1,6 @@
 """Stage numeric: scaled constraint Jacobian -> dependent and independent coordinates, and what the first follow from.
 
-Gauss-Jordan elimination with complete pivoting: the columns of the pivots are the dependent coordinates, rows without
+Gaussian elimination with complete pivoting: the columns of the pivots are the dependent coordinates, rows without
 a pivot are redundant here.
 """
 
@@ -68,19 +68,16 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
     preferred = np.ones(n, dtype=bool)
     preferred[np.asarray(independent, dtype=np.intp)] = False
     columns = np.flatnonzero(preferred)
-    work = np.array(J)
+    work = J.take(columns, axis=1) if strict else np.array(J)
     size = float(np.abs(J).max()) if J.size else 0.0
     rows = np.empty(rank, dtype=np.intp)
     dependent = np.empty(rank, dtype=np.intp)
     smallest = weakest = size
     for step in range(rank):
-        magnitude = np.abs(work)
-        magnitude[rows[:step]] = 0.0
-        magnitude[:, dependent[:step]] = 0.0
-        row, column, best = _best(magnitude.take(columns, axis=1))
-        if best > 0.0:
-            column = int(columns[column])
+        magnitude = np.abs(work)  # zero in the rows and columns of the pivots before
+        row, column, best = _best(magnitude if strict else magnitude.take(columns, axis=1))
         if not strict:
+            column = int(columns[column]) if best > 0.0 else column
             row_any, column_any, best_any = _best(magnitude)
             weakest = min(weakest, best_any)
             if not best >= PREFERENCE * best_any or best == 0.0:
@@ -93,13 +90,12 @@ def partition(J: Array, rank: int, independent: Sequence[int] | Indices, strict:
                 else f"the constraints have rank {step} here and {rank} elsewhere"
             )
         smallest = min(smallest, best)
-        rows[step], dependent[step] = row, column
-        pivot_row = work[row] / work[row, column]
-        work -= work[:, column, None] * pivot_row
-        work[row] = pivot_row
+        rows[step], dependent[step] = row, columns[column] if strict else column
+        work -= work[:, column, None] * (work[row] / work[row, column])
+        work[row] = 0.0
     chosen = set(dependent.tolist())
-    order = [int(i) for i in independent if int(i) not in chosen]
-    kept = np.array(order + [i for i in range(n) if i not in chosen and i not in set(order)], dtype=np.intp)
+    order = [i for i in map(int, independent) if i not in chosen]
+    kept = np.array(order + sorted(set(range(n)) - chosen - set(order)), dtype=np.intp)
     inverse: Array = np.asarray(algebra.inv(J[rows[:, None], dependent]), dtype=np.float64)
     B = np.zeros((n, n - rank))
     B[kept, np.arange(n - rank)] = 1.0

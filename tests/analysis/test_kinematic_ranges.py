@@ -338,6 +338,30 @@ def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, mon
     swept = module.kinematic_analysis(theta=values[order])
     np.testing.assert_allclose(found.x[:, order], swept.x, atol=1e-12)
     np.testing.assert_allclose(found.a[:, order], swept.a, atol=1e-10)
+    count[0] = 0
+    standing = module.kinematic_analysis(t=np.abs(values))  # no driver: nothing moves
+    assert count[0] < 10 * len(values)
+    np.testing.assert_allclose(standing.q, standing.q[:, :1].repeat(len(values), axis=1), atol=1e-14)
+
+
+def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    from eomgen.analysis.walking import Walk
+
+    count, real = [0], Walk.forward
+
+    def counted(self: Walk, *given: Any) -> Any:
+        count[0] += 1
+        return real(self, *given)
+
+    monkeypatch.setattr(Walk, "forward", counted)
+    module = eg.load(models.EXAMPLES / "driven_slider_crank.yaml").compile(target="numpy")
+    times = np.random.default_rng(1).random(100)
+    found = module.kinematic_analysis(t=times)
+    assert count[0] < 30 * len(times)  # 50 for each way before
+    order = np.argsort(times)
+    swept = module.kinematic_analysis(t=times[order])
+    np.testing.assert_allclose(found.x[:, order], swept.x, atol=1e-11)
+    np.testing.assert_allclose(found.a[:, order], swept.a, atol=1e-9)
 
 
 def test_what_of_a_way_was_walked() -> None:
@@ -352,6 +376,9 @@ def test_what_of_a_way_was_walked() -> None:
     ground.walked(3, 4, False)  # a change point: from here on every way is walked as if it were the first
     assert ground.known(1, 2) == 0.0
     assert Ground(np.arange(5.0), y).known(0, 0) == 0.0
+    time = Ground(np.array([0.0, 2.0, 1.0]), y[:, :1].repeat(3, axis=1))
+    time.walked(0, 1, True)
+    assert time.known(1, 2) == 1.0
     both = Ground(np.zeros(5), np.concatenate([y, y]))
     both.walked(0, 1, True)
     assert both.known(1, 2) == 0.0
