@@ -87,7 +87,8 @@ class Walk:
             left = end - here.s
             if left <= 0.0:
                 return True
-            longest = max(end / FEWEST, self.extent / FEWEST, known - here.s)  # however still it stands: a pulse must not be stepped over
+            # however still it stands: a pulse must not be stepped over
+            longest = max(end / FEWEST, self.extent / FEWEST, known - here.s)
             rate = largest(here.tangent.rate / self.follower.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)

@@ -59,11 +59,24 @@ class Bushing(Force):
         return vec.transpose_times(view.rotation(self.first), reach)
 
     def _turn(self, view: View) -> tuple[Expr, Vec3]:
-        """Scalar and vector part of the Euler parameters of the relative rotation, the scalar part positive."""
+        """Scalar and vector part of the Euler parameters of the relative rotation, the scalar part positive.
+
+        R gives Q = 4 e e^T.  Its first column z = 4 e0 e alone would do, but keeps eps / e0^2 only, and e0 = 0 for
+        phi = pi; e = Q z / (2 sqrt(z^T Q z)) keeps all digits, as errors of z across e do not count.
+        """
         R = vec.product(vec.transpose(view.rotation(self.first)), view.rotation(self.second))
-        e0 = 0.5 * sqrt(1.0 + R[0][0] + R[1][1] + R[2][2])
-        k = 4.0 * e0
-        return e0, ((R[2][1] - R[1][2]) / k, (R[0][2] - R[2][0]) / k, (R[1][0] - R[0][1]) / k)
+        x, y, z = R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]
+        xy, yz, zx = R[0][1] + R[1][0], R[1][2] + R[2][1], R[2][0] + R[0][2]
+        a, b, c = R[0][0], R[1][1], R[2][2]
+        Q = (
+            (1.0 + a + b + c, x, y, z),
+            (x, 1.0 + a - b - c, xy, zx),
+            (y, xy, 1.0 - a + b - c, yz),
+            (z, zx, yz, 1.0 - a - b + c),
+        )
+        along = [_dot(row, Q[0]) for row in Q]
+        size = 2.0 * sqrt(_dot(along, Q[0]))
+        return along[0] / size, (along[1] / size, along[2] / size, along[3] / size)
 
     def _displacements(self, view: View) -> list[Expr]:
         _, e = self._turn(view)
@@ -93,13 +106,14 @@ class Bushing(Force):
 
 
 def _times(m: Mat6, y: Sequence[Expr]) -> list[Expr]:
-    result = []
-    for row in m:
-        total = row[0] * y[0]
-        for entry, x in zip(row[1:], y[1:], strict=True):
-            total = total + entry * x
-        result.append(total)
-    return result
+    return [_dot(row, y) for row in m]
+
+
+def _dot(a: Sequence[Expr], b: Sequence[Expr]) -> Expr:
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
 
 
 def _bushing(e: Entry) -> Bushing | None:

@@ -10,6 +10,7 @@ import models
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 import eomgen as eg
 
@@ -246,6 +247,26 @@ def test_a_bushing_sets_the_frequencies() -> None:
     found = np.sort(np.sqrt(np.linalg.eigvals(-slopes).real))
     expected = np.sort(np.sqrt(np.array(k) / [4, 4, 4, 0.5, 0.8, 1.1]))
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["embedding", "lagrange", "newton_euler"])
+def test_a_bushing_keeps_its_digits_near_half_a_turn(method: str) -> None:
+    """A body turned about a fixed axis n by phi: V = 2 sin(phi / 2)^2 n K n, so the torque is -n K n sin(phi)."""
+    axis, K, inertia = np.array([1.0, -2.0, 3.0]) / np.sqrt(14), np.array([2.0, 3.0, 5.0]), 0.7
+    m = eg.Model("mount")
+    m.body("block", mass=0, inertia=[inertia] * 3)
+    m.revolute("pin", m.ground, "block", axis=axis.tolist(), coordinate="phi")
+    turned = [{"body": body, "rpy": [0.3, 0.2, 0.1]} for body in ("ground", "block")]
+    m.bushing("mount", *turned, stiffness=[1.0, 1.0, 1.0, *K])
+    mod = m.compile(target="numpy", method=method)
+    along = Rotation.from_euler("ZYX", [0.1, 0.2, 0.3]).as_matrix().T @ axis
+    k = float(along @ (K * along))
+    for left in (1.0, 1e-1, 1e-2, 1e-3, 1e-5):
+        for sign in (1.0, -1.0):
+            phi = sign * (np.pi - left)
+            error = mod.rhs(0.0, np.array([phi, 0.0]))[1] * inertia / k + np.sin(phi)
+            # what is differentiated by the angle loses as 1 / e0
+            assert abs(error) < (1e-14 / left if method == "lagrange" else 1e-15)
 
 
 def test_a_nonlinear_pendulum_drive_on_an_angle() -> None:

@@ -8,6 +8,7 @@ children.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import gc
 import os
 import shutil
@@ -36,8 +37,8 @@ CACHE_SIZE = 40 * 2**20  #: bytes that the cache is cut back to after each child
 SECONDS = 0.05  #: of motion
 #: What a minute may add at most, by the slope over all of the run but its warm start.
 LIMITS = {
-    "memory": 0.25e6, "objects": 60.0, "modules": 0.2, "descriptors": 0.2, "threads": 0.2, "cache_files": 30.0,
-    "cache_bytes": 2e6, "temporary": 0.2,
+    "memory": 0.25e6, "heap": 0.05e6, "blocks": 500.0, "objects": 60.0, "modules": 0.2, "descriptors": 0.2,
+    "threads": 0.2, "cache_files": 30.0, "cache_bytes": 2e6, "temporary": 0.2,
 }  # fmt: skip
 WARM, LEAST = 0.4, 8  #: part of the run that is not judged; samples that a slope needs
 
@@ -55,7 +56,11 @@ class Sample:
     minutes : float
         Since the start.
     memory : float
-        Resident bytes.
+        Resident bytes, once malloc gave back the pages that it keeps free.
+    heap : float
+        Bytes in use of malloc; a leak in C shows here at once, where resident memory has the gaps between blocks too.
+    blocks : int
+        In use of Python's own allocator.
     objects, modules : int
         That the garbage collector follows; in ``sys.modules``.
     descriptors, threads : int
@@ -66,6 +71,8 @@ class Sample:
 
     minutes: float
     memory: float
+    heap: float
+    blocks: int
     objects: int
     modules: int
     descriptors: int
@@ -78,13 +85,36 @@ class Sample:
 def sample(minutes: float, cache: Path, temporary: Path) -> Sample:
     """Look at this process and its folders."""
     gc.collect()
+    heap = give_back()
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     kept = [path.stat().st_size for path in cache.rglob("*") if path.is_file()]
     return Sample(
-        minutes, float(pages * os.sysconf("SC_PAGE_SIZE")), len(gc.get_objects()), len(sys.modules),
-        len(os.listdir("/proc/self/fd")), threading.active_count(), len(kept), sum(kept),
+        minutes, float(pages * os.sysconf("SC_PAGE_SIZE")), heap, sys.getallocatedblocks(), len(gc.get_objects()),
+        len(sys.modules), len(os.listdir("/proc/self/fd")), threading.active_count(), len(kept), sum(kept),
         sum(path.is_file() for path in temporary.rglob("*")),
     )  # fmt: skip
+
+
+class MallInfo(ctypes.Structure):
+    """glibc's ``struct mallinfo2`` (malloc.h)."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"
+        )
+    )  # fmt: skip
+
+
+def give_back() -> float:
+    """Let malloc return free pages to the system; the bytes that are in use, 0 where the C library cannot say."""
+    library = ctypes.CDLL(None)
+    if not hasattr(library, "mallinfo2"):  # glibc before 2.33, or another library
+        return 0.0
+    library.malloc_trim(ctypes.c_size_t(0))
+    library.mallinfo2.restype = MallInfo
+    found = library.mallinfo2()
+    return float(found.uordblks + found.hblkhd)
 
 
 def slope(minutes: np.ndarray, values: np.ndarray) -> float:
@@ -242,7 +272,8 @@ def soak(
 def spell(s: Sample, kinds: Counter[str]) -> str:
     """A line for a sample."""
     return (
-        f"{s.minutes:6.1f} min  {s.memory / 1e6:7.1f} MB  {s.objects:7d} objects  {s.modules} modules  "
+        f"{s.minutes:6.1f} min  {s.memory / 1e6:7.1f} MB  {s.heap / 1e6:6.2f} MB of malloc  {s.blocks} blocks  "
+        f"{s.objects:7d} objects  {s.modules} modules  "
         f"{s.descriptors} descriptors  {s.threads} threads  cache {s.cache_files} files {s.cache_bytes / 1e6:.1f} MB  "
         f"{s.temporary} temporary files  {', '.join(f'{n} {kind}' for kind, n in sorted(kinds.items()))}"
     )

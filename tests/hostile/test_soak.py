@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hostile.soak import LEAST, LIMITS, Sample, judge, leaks, soak
 
-FLAT = Sample(0.0, 2e8, 100_000, 1500, 6, 1, 300, 3 * 10**7, 0)
+FLAT = Sample(0.0, 2e8, 4e7, 580_000, 100_000, 1500, 6, 1, 300, 3 * 10**7, 0)
 
 
 def rows(**growth: float) -> list[Sample]:
