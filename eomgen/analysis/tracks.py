@@ -18,7 +18,7 @@ ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean anoth
 class Track:
     """A walk from s = 0 to ``end``, or as far as it goes; the way to ``known`` is smooth and was walked before.
 
-    ``extent`` is that of :class:`.Walk`.
+    ``extent`` is that of :class:`~.walking.Walk`.
 
     Attributes
     ----------

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
-from .placement import Placement, from_quaternion, moved
+from .placement import Placement, moved
 from .robot import Loop
 from .ties import Sum, Tie
 

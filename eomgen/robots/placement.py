@@ -1,16 +1,13 @@
-"""Robots, placements in numbers: rotations, roll-pitch-yaw and quaternions; sums of rigid inertias."""
+"""Robots, placements in numbers; sums of rigid inertias."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from ..limits.rounding import QUARTER
+from ..numeric.rotation_matrices import Numbers, from_roll_pitch_yaw, roll_pitch_yaw
 from ..records import dataclass
-
-Numbers = Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -66,59 +63,7 @@ def placed(position: Numbers, rpy: Numbers, snap: float) -> Placement:
 
     Angles within ``snap`` (rad) of a multiple of pi/2 are taken as that multiple, whose cosine and sine are exact.
     """
-    (cr, sr), (cp, sp), (cy, sy) = (cosine_and_sine(angle, snap) for angle in rpy)
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return Placement(about_z @ about_y @ about_x, np.array(position, dtype=float))
-
-
-def cosine_and_sine(angle: float, snap: float) -> tuple[float, float]:
-    """cos and sin, exact 0 and +-1 within ``snap`` of a multiple of pi/2."""
-    quarter = round(angle / (math.pi / 2))
-    if abs(angle - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return math.cos(angle), math.sin(angle)
-
-
-def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
-    """Fixed-axis angles of a rotation matrix, good to rounding at any pitch.
-
-    The yaw is read first and the roll from what it leaves, so that an uncertain yaw near pitch = +-pi/2 does no harm
-    (the order of Eigen's Euler angles).
-    """
-    across = math.hypot(R[0, 0], R[1, 0])
-    pitch = math.atan2(-R[2, 0], across)
-    yaw = math.atan2(R[1, 0], R[0, 0]) if across > 0 else 0.0
-    c, s = cosine_and_sine(yaw, 0.0)
-    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return np.array([roll, pitch, yaw])
-
-
-def from_quaternion(w: float, x: float, y: float, z: float) -> np.ndarray:
-    """Rotation matrix of a quaternion of any length, scalar part first."""
-    size = w * w + x * x + y * y + z * z
-    s = 2.0 / size
-    matrix = np.array(
-        [
-            [1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
-            [s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)],
-            [s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)],
-        ]
-    )
-    nearest = np.round(matrix)
-    return nearest if np.abs(matrix - nearest).max() < QUARTER else matrix
-
-
-def about(axis: Numbers, angle: float) -> np.ndarray:
-    """Rotation by an angle about a unit axis (Rodrigues' formula)."""
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    c, s = cosine_and_sine(angle, 0.0)
-    turned: np.ndarray = np.eye(3) + s * K + (1 - c) * (K @ K)
-    return turned
+    return Placement(from_roll_pitch_yaw(rpy, snap), np.array(position, dtype=float))
 
 
 @dataclass(frozen=True)

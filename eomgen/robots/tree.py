@@ -12,7 +12,8 @@ import numpy as np
 from ..describe.names import nearest
 from ..errors import ModelError
 from ..numeric.inertia import fault_of_inertia, inertia_scales, longest_within
-from .placement import IDENTITY, Inertia, Placement, about, moved, sum_inertias
+from ..numeric.rotation_matrices import about
+from .placement import IDENTITY, Inertia, Placement, moved, sum_inertias
 from .robot import Joint, Link, Options, Robot
 
 GROUND = ""  #: the body that stands still

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import NoDerivativeError, SimulationError
 from ..limits.motions import SINGULAR
+from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
@@ -53,8 +54,8 @@ def sensitivities(
     *,
     hold: Sequence[str] | None = None,
     method: Any = "DOP853",
-    rtol: float = 1e-9,
-    atol: float = 1e-11,
+    rtol: float = SENSITIVITY_RTOL,
+    atol: float = SENSITIVITY_ATOL,
     t_eval: ArrayLike | None = None,
     events: Any = None,
     **options: Any,

@@ -18,6 +18,7 @@ from ..graph.elementary import ELEMENTARY, Elementary
 from ..graph.evaluate import FUNCTIONS
 from ..graph.traverse import common_graph, reachable
 from ..limits.rounding import EPS
+from ..limits.verification import NUDGE
 from ..numeric.scales import Array
 
 #: Relative rounding of one node: at most three roundings to nearest (a reciprocal, a product, a sum), and one unit in
@@ -27,7 +28,6 @@ TURN = 2.0 * UNIT  #: absolute error of a sine or cosine formed from those of th
 #: Relative error of constants that are formed in doubles while the graph is made and count as exact in it: turns by
 #: given angles, products of them along fixed parts, inertias in link axes.
 FOLDED = 16.0 * EPS
-NUDGE = 1e-6  #: relative shift by which the slope of a declared function is estimated
 
 Pair = tuple[Array, Array]  # value, bound of its error
 Rule = Callable[..., tuple[Any, Any]]

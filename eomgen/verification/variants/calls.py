@@ -17,6 +17,7 @@ from ...emit import emit_package
 from ...emit.write import write_package
 from ...equations import METHODS
 from ...errors import EomgenError, ToolchainError, UsageError
+from ...limits.verification import REGULAR
 from ...numeric import algebra
 from ...runtime.minimal import Minimal
 from ..finding import Finding
@@ -76,7 +77,7 @@ def _independent(check: str, model: Builder, original: Original, random: Any) ->
         least = float(algebra.singular_values(basis[list(picked)]).min())
         if least > best:
             best, chosen = least, picked
-    if best < 1e-3:
+    if best < REGULAR:
         return Finding.skipped(check, "no other coordinates are independent here")
     names = [own.q_names[k] for k in chosen]
     module = compiled(original.description, independent=names)

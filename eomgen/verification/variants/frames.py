@@ -13,8 +13,8 @@ import numpy as np
 
 from ...describe.description import GROUND_NAME, Description, Entry, items
 from ...describe.fields import INERTIA
+from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
 from .texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
-from .turns import random_turn, rpy_of, turn_of
 from .variant import NotApplicable, Variant
 from .visit import Slot, Visitor, bodies_of, copied, visit
 
@@ -25,6 +25,11 @@ _KINDS = (
     *(("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot")),
     ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z"),
 )
+
+
+def random_turn(random: Any) -> Any:
+    """A turn (3, 3) of any angle about any axis."""
+    return from_quaternion(*random.normal(size=4))
 
 
 def values_of(description: Description) -> dict[str, float]:
@@ -56,7 +61,8 @@ class Placement:
 
     def angles(self, rpy: Sequence[Any]) -> list[float]:
         """Roll, pitch, yaw; parameters in them are taken at their declared values."""
-        return rpy_of(self.turn @ turn_of([number_of(x, self.parameters) for x in rpy]))
+        turn = from_roll_pitch_yaw([number_of(x, self.parameters) for x in rpy])
+        return [float(x) for x in roll_pitch_yaw(self.turn @ turn)]
 
     def tensor(self, rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
         """A symmetric tensor, R I R^T; the lower triangle is the mirror image of the upper."""

@@ -9,11 +9,12 @@ import numpy as np
 
 from ...describe.description import Description
 from ...errors import EomgenError
+from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import FREE_CONSTANT, refused
 from .cuts import cut_another
-from .inputs import ATOL, RTOL, RUNS, duration
+from .inputs import duration
 from .states import Original, compiled
 from .texts import names_of
 from .variant import NotApplicable, Variant

@@ -20,6 +20,7 @@ from ...describe.builder import Builder
 from ...describe.description import Description
 from ...errors import EomgenError
 from ...limits.rounding import EPS
+from ...limits.verification import DEPENDENT
 from ...numeric import algebra
 from ...numeric.scales import Array
 from ...records import dataclass
@@ -190,7 +191,7 @@ def relative_limit(module: Any, x: Array, description: Description, length: floa
         rows = np.atleast_2d(module.constraint_jacobian(q, rows="all")) * s_v
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
         singular = algebra.singular_values(rows / np.where(lengths > 0, lengths, 1.0))
-        kept = singular[singular > 1e-9 * singular.max(initial=0.0)]
+        kept = singular[singular > DEPENDENT * singular.max(initial=0.0)]
         condition *= float(kept.max() / kept.min()) if kept.size else 1.0
     slopes = np.abs(J[module.n_q : module.n_q + module.n_v])
     v = np.abs(x[module.n_q : module.n_q + module.n_v]) / s_v
