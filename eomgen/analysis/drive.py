@@ -24,7 +24,7 @@ from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import read_names
+from ..runtime.near_names import read_names
 from ..runtime.room import read_numbers
 from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text

@@ -12,10 +12,10 @@ from ..limits.statics import DIFFERENCES, LEAST_UNKNOWN
 from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
+from .eigenvalue_rounding import own_accelerations
 from .linear_step import RANK, Linear
-from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:

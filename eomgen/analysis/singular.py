@@ -15,10 +15,10 @@ import numpy as np
 from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .bridging import Bridge, build_bridge
-from .following import Follower, Tangent
+from .change_point_interpolant import Bridge, build_bridge
+from .driven_coordinates import Follower, Tangent
+from .path_following import Point, Walk
 from .roots import find_root
-from .walking import Point, Walk
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named

@@ -22,8 +22,8 @@ from .mjcf_equalities import read_equalities
 from .mjcf_fields import NOTED
 from .mjcf_files import Scan
 from .mjcf_text import Text
-from .placement import IDENTITY, Inertia, Placement, moved, numbers
 from .robot import Joint, Link, Options, Robot
+from .robot_frames import IDENTITY, Inertia, Placement, moved, numbers
 from .xml_text import Element
 
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint

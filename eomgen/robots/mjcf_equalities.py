@@ -11,8 +11,8 @@ import numpy as np
 
 from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
-from .placement import Placement, moved
 from .robot import Loop
+from .robot_frames import Placement, moved
 from .ties import Sum, Tie
 
 if TYPE_CHECKING:

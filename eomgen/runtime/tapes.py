@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ExpressionError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
 from .layout import Layout
-from .names import unknown
+from .near_names import unknown
 
 if TYPE_CHECKING:
     from ..graph.core import Expr

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution

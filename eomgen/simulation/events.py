@@ -21,7 +21,7 @@ from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import check_names, require_time_and_state
+from ..runtime.near_names import check_names, require_time_and_state
 from ..runtime.tapes import Formula, is_formula, record_tape, values_together
 from ..texts import shown
 

@@ -18,7 +18,7 @@ from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
-from ..runtime.names import check_names, read_names, unknown
+from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing

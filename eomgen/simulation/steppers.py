@@ -13,7 +13,7 @@ from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.kernels import fitting
 from ..runtime.late import eager
-from ..runtime.names import require
+from ..runtime.near_names import require
 from ..runtime.room import read_number, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events

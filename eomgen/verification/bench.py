@@ -17,7 +17,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from .cases import Case
-from .rounding import FOLDED, UNIT, bounded
+from .rounding_sizes import FOLDED, UNIT, bounded
 from .truth import System, Truth
 
 if TYPE_CHECKING:

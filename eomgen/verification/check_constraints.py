@@ -11,7 +11,7 @@ from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import FOLDED, UNIT
+from .rounding_sizes import FOLDED, UNIT
 from .truth import Truth, Values
 
 

@@ -21,7 +21,7 @@ from .comparison import Comparison, pairs, size_of
 from .differences import FIRST_STEP, SHORTER, extrapolate
 from .digits import Numbers, solve
 from .finding import Finding
-from .rounding import UNIT
+from .rounding_sizes import UNIT
 from .truth import Truth, Values
 
 DIRECTIONS = 2  #: random ones for each state

@@ -19,7 +19,7 @@ from ..limits.constraints import ACCEPTED
 from ..limits.verification import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.names import require
+from ..runtime.near_names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
 from ..simulation.simulate import simulate

@@ -15,7 +15,7 @@ BELOW = 5e-4  #: numbers in formulas, such as 1/720, are larger
 #: What is no limit: a default of a user's option, switches between two formulas for one thing, a step in 60 digits.
 OTHERS = {
     "numeric/closure.py": {1e-8},
-    "program/loops.py": {1e-100},
+    "program/loop_blocks.py": {1e-100},
     "robots/robot.py": {1e-11},
     "rotations/quaternions.py": {1e-4},
     "verification/digits.py": {1e-6},

@@ -16,7 +16,7 @@ import eomgen as eg
 from eomgen.describe import model_schema
 from eomgen.describe.yaml_nodes import Document
 from eomgen.numeric.rotation_matrices import about, roll_pitch_yaw
-from eomgen.robots.placement import placed
+from eomgen.robots.robot_frames import placed
 
 ARM = Path(__file__).parents[2] / "examples" / "arm.urdf"
 

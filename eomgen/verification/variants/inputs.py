@@ -13,8 +13,8 @@ from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
-from .states import Original, compiled
-from .texts import number_of
+from .probe_states import Original, compiled
+from .rewritten_texts import number_of
 from .variant import Variant
 from .visit import copied
 

@@ -10,8 +10,8 @@ import numpy as np
 from ...describe.description import Description, Entry
 from ...describe.placement import TURNS, axis_columns
 from ...numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
-from .frames import values_of
-from .texts import number_of
+from .body_frames import values_of
+from .rewritten_texts import number_of
 
 Frame = dict[str, Any]
 
