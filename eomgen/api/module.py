@@ -5,6 +5,7 @@ Analyses and runs call each other's functions: a subclass that overrides a metho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from importlib import import_module
 from types import MethodType
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
     from ..simulation.steppers import step as _step
     from ..verification.verify import verify as _verify
 
-#: Method -> where the function is, whose first argument is the model; method and function are of one name.
-CALLS = {
+#: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
+CALLS: dict[str, str | Callable[..., Any]] = {
     "simulate": "simulation.simulate",
     "simulate_many": "ensembles.simulate_many",
     "integrator": "simulation.integrator",
@@ -75,7 +76,8 @@ class Call:
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
         if self.function is None:
-            self.function = getattr(import_module(f"..{CALLS[self.name]}", __package__), self.name)
+            found = CALLS[self.name]
+            self.function = found if callable(found) else getattr(import_module(f"..{found}", __package__), self.name)
         return self.function if model is None else MethodType(self.function, model)
 
 
@@ -182,7 +184,12 @@ class Module(BoundModel):
             from ..simulation.steppers import find_solver
 
             return find_solver(self, name)
+        if name in CALLS:  # an analysis of a user's own
+            return Call(name).__get__(self, type(self))
         return find_lacking(self, "a Module", name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *CALLS})
 
     def __repr__(self) -> str:
         from ..runtime.summary import line
