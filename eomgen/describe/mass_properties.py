@@ -12,7 +12,7 @@ from ..graph import vectors as vec
 from ..graph.vectors import Mat3, Vec3
 from ..solids import MassProperties, combine, shift_tensor, turn_tensor
 from ..solids.properties import add_tensors
-from .description import Entry, items
+from .description import DescribedEntry, items
 from .fields import KINDS
 from .mechanism import Body
 from .names import nearest
@@ -27,7 +27,7 @@ OWN = ("mass", "com", "first_moment", "inertia", "principal")
 POINTS = ("com", "origin")  #: words for the point an inertia is about
 
 
-def read_body(reader: Reader, entry: Entry, check: str) -> Body:
+def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
     """One body; ``check`` says what becomes of an impossible inertia unless the body says otherwise."""
     path, values = entry.path, {k: v for k, v in entry.values.items() if v is not None}
     graph, faults = reader.graph, reader.faults

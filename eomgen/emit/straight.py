@@ -17,7 +17,7 @@ CONDITIONS = frozenset({"lt", "le", "eq", "not", "and", "or"})
 
 
 @dataclass(frozen=True)
-class Piece:
+class PrintedFunction:
     """A run of statements, printed as one function.
 
     Attributes
@@ -46,7 +46,7 @@ class Piece:
 class Pieces:
     """All of a block: its pieces, results that need no statement, and the work slots used."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PrintedFunction, ...]
     direct: tuple[tuple[int, int], ...]  #: (place in the result, id of a leaf or a hoisted value)
     checks: tuple[int, ...]  #: checks that are leaves or hoisted values
     work: int
@@ -84,7 +84,7 @@ def cut(
                 work += 1
             slots[i] = free.pop()
         pieces.append(
-            Piece(
+            PrintedFunction(
                 statements=c.statements,
                 loads={i: slots[i] for i in c.imports},
                 stores={i: slots[i] for i in c.exports},

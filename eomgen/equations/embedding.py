@@ -21,7 +21,7 @@ from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.joint_rates import joint_rates, slide_accelerations
-from ..kinematics.link_axes import Block, Rows, Turned, falling, turn_forces, turn_links
+from ..kinematics.link_axes import Rows, SlidingTriple, Turned, falling, turn_forces, turn_links
 from ..kinematics.link_inertia import SpatialInertia, Wrench
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.parallel import Resolved, resolve_parallel
@@ -68,7 +68,7 @@ def _turned_system(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     rest: tuple[Expr, ...],
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
 ) -> tuple[Rows, tuple[Expr, ...]]:
     """M and h in turned velocities."""
     matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
@@ -125,7 +125,7 @@ def _sweep(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     a: tuple[Expr, ...],
-    blocks: Sequence[Block] = (),
+    blocks: Sequence[SlidingTriple] = (),
 ) -> tuple[Expr, ...]:
     """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
     graph, links, twists = kinematics.graph, resolved.links, resolved.twists

@@ -15,7 +15,7 @@ from ..graph.substitute import substitute
 from ..kinematics import Kinematics, Twist
 from ..kinematics.link_inertia import Wrench
 from ..kinematics.typical_sizes import Units
-from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
+from .free_bodies import FreeBodies, FreeBodyCut, add, dot, lift, scaled
 from .tree_equations import LinearSystem, TreeEquations, linear_system
 
 
@@ -93,7 +93,7 @@ class Unknowns:
 class Forces:
     """Multipliers of cut joints and couplings, their equations, and what they do to bodies and joints."""
 
-    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns, units: Units) -> None:
+    def __init__(self, bodies: FreeBodies, cuts: Sequence[FreeBodyCut], unknowns: Unknowns, units: Units) -> None:
         self.bodies, self.cuts, self.unknowns = bodies, cuts, unknowns
         self.first = len(unknowns.symbols)
         self.rows = bodies.couplings

@@ -19,7 +19,7 @@ from ..graph.vectors import Mat3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
 from ..kinematics.joint_rates import JointRates, joint_rates
-from ..kinematics.link_axes import Block, falling, turn_back, turn_forces, turn_links
+from ..kinematics.link_axes import SlidingTriple, falling, turn_back, turn_forces, turn_links
 from ..kinematics.link_inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.regroup import regroup
@@ -212,7 +212,7 @@ def _newton_euler(
 
 def _articulated(
     kinematics: Kinematics,
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
     inertias: list[SpatialInertia],
     products: list[Twist],
     loads: list[Wrench],

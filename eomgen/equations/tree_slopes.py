@@ -36,7 +36,7 @@ from .embedding import _add, _lift, _moment, _project, _turning
 Entries = dict[tuple[int, int], Expr]
 
 
-class Field(NamedTuple):
+class MotionField(NamedTuple):
     """A column of the motion subspace, link axes: the field s x r + l, and its rates as seen from ground."""
 
     s: Vec3
@@ -163,15 +163,15 @@ class ForceSlopes:
         link = self._kinematics.links[k]
         return vec.zero(self._kinematics.graph) if link.parent == GROUND else link.down(self._omegas[link.parent])
 
-    def _field(self, k: int, s: Vec3, l: Vec3, index: int) -> Field:
+    def _field(self, k: int, s: Vec3, l: Vec3, index: int) -> MotionField:
         kinematics = self._kinematics
         if self._places[index] < 0:
             above, still = self._above(k), vec.zero(kinematics.graph)
-            return Field(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
+            return MotionField(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
         x = jvp([*s, *l], kinematics.flow)
         own, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
         two = kinematics.graph.constant(2.0)
-        return Field(
+        return MotionField(
             s,
             l,
             vec.add(vec.cross(self._omegas[k], s), own),
@@ -334,7 +334,7 @@ class ForceSlopes:
         return slopes
 
     @staticmethod
-    def _inner(swept: Twist, field: Field, exerted: Lifted) -> Expr:
+    def _inner(swept: Twist, field: MotionField, exerted: Lifted) -> Expr:
         """How the force along a column changes as all that carries it moves along another one."""
         along = vec.dot(swept[0], exerted.wrench[0]) + vec.dot(field.s_rate, exerted.whirl)
         return along + vec.dot(swept[1], exerted.wrench[1])

@@ -13,13 +13,13 @@ from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
 from .angle_sums import sum_of_turns
 from .momentum import Momentum
-from .state import State
+from .state import MotionSymbols
 from .tree import Poses, Twist
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 
 
-class Motion:
+class MarkerMotion:
     """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
 
     Parameters
@@ -34,7 +34,7 @@ class Motion:
         self,
         poses: Poses,
         twists: Sequence[Twist],
-        state: State,
+        state: MotionSymbols,
         coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
         turning: Mapping[str, tuple[Marker, Marker, int]] | None = None,
     ) -> None:
