@@ -10,11 +10,12 @@ from collections.abc import Container
 from math import inf
 from typing import NamedTuple
 
+from ..operations import CONDITION, OPERATIONS
 from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, behind, make_series
 from .angles import print_angles
 from .c_lanes import WIDTHS
-from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
+from .c_text import helper, literal
 from .sources import read_template, render
 from .straight import references
 
@@ -35,6 +36,7 @@ def series_files(program: Program) -> dict[str, str]:
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")
     printer = _Printer(series, references(program, block.inputs))
+    used = sorted({t.kind for t in series.terms} & OPERATIONS.keys())
     context = {
         "name": program.name,
         "n": len(series.rates),
@@ -47,7 +49,7 @@ def series_files(program: Program) -> dict[str, str]:
         "n_work": printer.rows * ROW,
         "kept": printer.kept,
         "widths": [(width, tests) for width, (tests, _) in sorted(WIDTHS.items(), reverse=True) if tests],
-        "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
+        "helpers": [text for k in used if (text := helper(OPERATIONS[k]))],
     }
     files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
     return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
@@ -264,16 +266,11 @@ class _Printer:
         if kind in ("sin", "cos") and operands[0] in angles:
             return f"const real a{i} = {'sines' if kind == 'sin' else 'cosines'}[{angles[operands[0]]}];"
         numbers = all(self._terms[k].kind == "number" for k in operands)
-        show = self._zero if kind in ARITHMETIC and not numbers else self._real
-        texts = list(map(show, operands))
-        if kind in CONDITION_PATTERNS:
-            value = f"choose({CONDITION_PATTERNS[kind].format(*texts)}, same(1.0), same(0.0))"
-        else:
-            value = (
-                f"choose({texts[0]} != 0.0, {texts[1]}, {texts[2]})"
-                if kind == "select"
-                else PATTERNS[kind].format(*texts)
-            )
+        row = OPERATIONS[kind]
+        show = self._zero if row.takes_numbers and not numbers else self._real
+        first, *rest = map(show, operands)
+        value = row.c.format(f"{first} != 0.0" if row.chooses else first, *rest)
+        value = f"choose({value}, same(1.0), same(0.0))" if row.kind == CONDITION else value
         return f"const real a{i} = {value};"
 
     def states(self) -> list[str]:

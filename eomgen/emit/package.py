@@ -113,7 +113,7 @@ def _runtime_files() -> dict[str, str]:
     """Files of eomgen as they are: of its root, of limits/ to ensembles/ but ELSEWHERE, and of verification/."""
     root = files("eomgen")
     found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "kernel_table.py", "texts.py")}
-    for folder in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):
+    for folder in ("limits", "operations", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")

@@ -10,10 +10,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
 from ..graph.traverse import LEAVES
+from ..operations import CONDITION, kind_of
 from ..program import Program
 from ..records import dataclass
-
-CONDITIONS = frozenset({"lt", "le", "eq", "not", "and", "or"})
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def _conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks:
     found = set()
     for i in statements:
         node = nodes[i]
-        if node[0] in CONDITIONS and i not in kept and (i not in checks or node[0] == "lt"):
+        if kind_of(node[0]) == CONDITION and i not in kept and (i not in checks or node[0] == "lt"):
             found.add(i)
         found.difference_update(node[2:] if node[0] == "select" else node[1:])
     return frozenset(found)

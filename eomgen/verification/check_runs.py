@@ -17,6 +17,7 @@ from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
 from ..numeric import algebra
 from ..numeric.scales import Array
+from ..operations import OPERATIONS
 from ..runtime.names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
@@ -34,7 +35,6 @@ JUDGED = 3  #: states that single steps are taken from
 LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
 LOOSE = 1e6  #: tolerance that accepts every step
 TIGHT = {"rtol": 1e-13, "atol": 1e-16}
-KINKED = frozenset({"abs", "sign", "min", "max", "lt", "le", "select"})  #: operations with kinks
 LONG = 2.0  #: length of a run, in times in which the state changes by its own size
 FIRST = 4.0  #: the first step tried, in the same times
 MOST = 3000  #: evaluations of a run that is smooth
@@ -76,7 +76,8 @@ def _kinked(bench: Bench) -> bool:
     """Whether right-hand sides may have kinks, where methods need not keep their order."""
     terms = bench.terms
     nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
-    return any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes)
+    kinked = {name for name, row in OPERATIONS.items() if row.bends} | set(terms.graph.calls)
+    return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
 def _methods(bench: Bench) -> tuple[str, ...]:

@@ -1,0 +1,30 @@
+"""Operations of expressions: one row each says all that eomgen knows of it.
+
+Values, derivatives, rounding, simplification, SymPy's form, words of model files, text in C and NumPy, Taylor series
+and counts are looked up here, also where a generated package runs without the graph.
+"""
+
+from __future__ import annotations
+
+from .row import ARITHMETIC, CHOICE, CONDITION, FUNCTION, Operation, function
+from .table import ROWS
+
+__all__ = [
+    *("ARITHMETIC", "CHOICE", "CONDITION", "FUNCTION", "OPERATIONS"),
+    *("Operation", "function", "kind_of", "tape_rows"),
+]
+
+OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
+
+
+def kind_of(operation: str) -> str:
+    """The kind of an operation; empty for leaves and calls of declared functions."""
+    row = OPERATIONS.get(operation)
+    return "" if row is None else row.kind
+
+
+def tape_rows() -> str:
+    """``#define EOMGEN_TAPE(X)`` with X(name, value of a, b, c) for every operation, for steppers/tape.c."""
+    return (
+        " \\\n    ".join(["#define EOMGEN_TAPE(X)", *(f"X({r.name}, {r.plain_c})" for r in OPERATIONS.values())]) + "\n"
+    )
