@@ -10,8 +10,15 @@ from .row import ARITHMETIC, CHOICE, CONDITION, FUNCTION, Operation, function
 from .table import ROWS
 
 __all__ = [
-    *("ARITHMETIC", "CHOICE", "CONDITION", "FUNCTION", "OPERATIONS"),
-    *("Operation", "function", "kind_of", "tape_rows"),
+    "ARITHMETIC",
+    "CHOICE",
+    "CONDITION",
+    "FUNCTION",
+    "OPERATIONS",
+    "Operation",
+    "function",
+    "kind_of",
+    "tape_rows",
 ]
 
 OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
@@ -25,6 +32,5 @@ def kind_of(operation: str) -> str:
 
 def tape_rows() -> str:
     """``#define EOMGEN_TAPE(X)`` with X(name, value of a, b, c) for every operation, for steppers/tape.c."""
-    return (
-        " \\\n    ".join(["#define EOMGEN_TAPE(X)", *(f"X({r.name}, {r.plain_c})" for r in OPERATIONS.values())]) + "\n"
-    )
+    rows = (f"X({row.name}, {row.plain_c})" for row in OPERATIONS.values())
+    return " \\\n    ".join(["#define EOMGEN_TAPE(X)", *rows]) + "\n"

@@ -39,8 +39,8 @@ class Operation(NamedTuple):
     rounding : callable
         (y, operands...) -> size of its own rounding, in units in the last place of 1.
     recurrence : callable
-        (graph, y, operands...) -> numerators, one an operand, and denominator of y' = sum (numerator operand') /
-        denominator; None stands for 1.  Taylor series follow from it, by default from the slopes.
+        (graph, y, operands...) -> numerators, one an operand, and divisor of y' = sum (numerator operand') / divisor,
+        None for 1.  Taylor series follow from it.  None where emit/c_series.py has a formula of its own.
     sympy : str or callable
         Name of SymPy's function, or (sympy, operands...) -> expression.
     sympy_class : str
@@ -126,6 +126,7 @@ def function(
     given: dict[str, Any] = {
         "c": f"each_{name}({places})",
         "numpy": f"np.{getattr(array, '__name__', name)}({places})",
+        "recurrence": lambda g, y, *x: (tuple(slope(g, y, *x) for slope in slopes), None),
         "sympy": sympy,
         "sympy_class": sympy if isinstance(sympy, str) else "",
         "word": name,

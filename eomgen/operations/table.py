@@ -111,7 +111,7 @@ ROWS = (
          lambda g, y, a, b: g.mul(y, g.make("log", a))),
         (lambda y, a, b: abs(b * np.power(a, b - 1.0)), lambda y, a, b: abs(y * np.log(abs(a)))),
         rounding=lambda y, a, b: (2.0 + abs(b)) * abs(y),  # repeated products where b is whole
-        rule=lambda g, a, b: g.power(a, b),
+        rule=lambda g, a, b: g.power(a, b), recurrence=None,
         sympy=lambda s, a, b: a**b, word="", digits="power", fragile=True,
     ),
     function(
@@ -129,10 +129,13 @@ ROWS = (
     function(
         "sqrt", math.sqrt, np.sqrt, (lambda g, y, a: g.div(g.constant(0.5).id, y),), (lambda y, a: 0.5 / y,),
         error=lambda y, x, e: np.fmin(0.5 * e[0] / y, np.sqrt(e[0])),
-        rule=_root_of_square, fragile=True,
+        rule=_root_of_square, recurrence=None, fragile=True,
     ),
     function("exp", math.exp, np.exp, (lambda g, y, a: y,), (lambda y, a: y,), analytic=True, fragile=True),
-    function("log", math.log, np.log, (lambda g, y, a: over(g, a),), (lambda y, a: 1.0 / abs(a),), fragile=True),
+    function(
+        "log", math.log, np.log, (lambda g, y, a: over(g, a),), (lambda y, a: 1.0 / abs(a),),
+        recurrence=lambda g, y, a: ((g.one.id,), a), fragile=True,
+    ),
     function(
         "sin", math.sin, np.sin, (lambda g, y, a: g.make("cos", a),), (lambda y, a: abs(np.cos(a)),),
         c="sine_of({})", rounding=_turned, parity=ODD, analytic=True,
@@ -148,16 +151,17 @@ ROWS = (
     function(
         "asin", math.asin, np.arcsin, (lambda g, y, a: over(g, _root(g, _one_and(g, "sub", a))),),
         (lambda y, a: 1.0 / np.sqrt(1.0 - a * a),), parity=ODD, fragile=True,
-        recurrence=lambda g, y, a: ((None,), _root(g, _one_and(g, "sub", a))),
+        recurrence=lambda g, y, a: ((g.one.id,), _root(g, _one_and(g, "sub", a))),
     ),
     function(
         "acos", math.acos, np.arccos, (lambda g, y, a: g.neg(over(g, _root(g, _one_and(g, "sub", a)))),),
         (lambda y, a: 1.0 / np.sqrt(1.0 - a * a),), fragile=True,
-        recurrence=lambda g, y, a: ((g.neg(None),), _root(g, _one_and(g, "sub", a))),
+        recurrence=lambda g, y, a: ((g.neg(g.one.id),), _root(g, _one_and(g, "sub", a))),
     ),
     function(
         "atan", math.atan, np.arctan, (lambda g, y, a: over(g, _one_and(g, "add", a)),),
-        (lambda y, a: 1.0 / (1.0 + a * a),), parity=ODD, recurrence=lambda g, y, a: ((None,), _one_and(g, "add", a)),
+        (lambda y, a: 1.0 / (1.0 + a * a),), parity=ODD,
+        recurrence=lambda g, y, a: ((g.one.id,), _one_and(g, "add", a)),
     ),
     function(
         "sinh", math.sinh, np.sinh, (lambda g, y, a: g.make("cosh", a),), (lambda y, a: np.cosh(a),),
