@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -60,11 +59,10 @@ CALLS = {"expm1": "expm1(x)", "fma": "fma(x, y, z)", "hypot": "hypot(x, y)"}
 
 
 @pytest.fixture(autouse=True)
-def rows(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def rows(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, (row, _) in ROWS.items():
         assert name not in OPERATIONS
         monkeypatch.setitem(OPERATIONS, name, row)
-    yield
 
 
 def known(name: str, order: int = 0) -> list[float]:
