@@ -14,7 +14,7 @@ from ..graph.differentiate import gradient
 from ..graph.rounding import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
-from ..operations import CONDITION, OPERATIONS
+from ..operations import CONDITION, operations_with
 
 TRIES = 5  #: random places at which a change is looked at
 
@@ -28,7 +28,7 @@ def jumps_in_time(expressions: Sequence[Expr]) -> bool:
         return False
     graph = expressions[0].graph
     t = graph.symbol("t")
-    compared = {name for name, row in OPERATIONS.items() if row.kind == CONDITION and row.jumps}
+    compared = operations_with(lambda row: row.kind == CONDITION and row.jumps)
     for i in reachable(graph, [x.id for x in expressions]):
         operation, *operands = graph.nodes[i]
         if operation not in compared:

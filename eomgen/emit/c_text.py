@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ..graph.core import Expr
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
-from ..operations import CONDITION, OPERATIONS, Operation
+from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
@@ -40,6 +40,7 @@ class _Printer:
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
         self._fixed = references
+        self._beside_numbers = operations_with(lambda row: row.takes_numbers)
         self._variables: dict[int, str] = {}
         self.used: set[str] = set()  #: arguments read or written since last emptied
 
@@ -63,7 +64,7 @@ class _Printer:
 
     def operands(self, node: Node) -> list[str]:
         """The operands of an operation; beside a value, arithmetic takes a number as it is."""
-        if OPERATIONS[node[0]].takes_numbers and not all(self._nodes[k][0] == "const" for k in node[1:]):
+        if node[0] in self._beside_numbers and not all(self._nodes[k][0] == "const" for k in node[1:]):
             return [self.operand(k) for k in node[1:]]
         return [self.real(k) for k in node[1:]]
 
@@ -89,7 +90,7 @@ class _Printer:
         if kind in CIRCULAR and node[1] in self._angles:
             return f"{'sines' if kind == 'sin' else 'cosines'}[{self._angles[node[1]]}]"
         row = OPERATIONS[kind]
-        if row.chooses:
+        if row.kind != ARITHMETIC and row.chooses:
             return row.c.format(self.condition(node[1], piece), *map(self.real, node[2:]))
         text = row.c.format(*self.operands(node))
         return f"choose({text}, same(1.0), same(0.0))" if row.kind == CONDITION else text

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
-from ..operations import ARITHMETIC, OPERATIONS, kind_of
+from ..operations import ARITHMETIC, operations_with
 from ..records import dataclass
 from .core import Expr
 from .traverse import LEAVES, common_graph, reachable
@@ -72,14 +72,14 @@ def count(outputs: Sequence[Expr]) -> Operations:
         return Operations()
     nodes = graph.nodes
     found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
-    bends = {k for k in found if k in OPERATIONS and OPERATIONS[k].bends}
+    bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
         multiplications=found["mul"],
         additions=found["add"] + found["sub"],
         divisions=found["div"],
         negations=found["neg"],
-        functions={k: found[k] for k in sorted(found.keys() - bends - LEAVES) if kind_of(k) != ARITHMETIC},
-        choices={k: found[k] for k in sorted(bends)},
+        functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
+        choices={k: found[k] for k in sorted(found.keys() & bends)},
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..operations import OPERATIONS
+from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .slopes import half_power_slope, partials
 from .traverse import LEAVES, common_graph, reachable
@@ -162,11 +162,11 @@ def _active(g: Graph, order: Iterable[int], sources: Mapping[int, int]) -> dict[
     """Nodes of ``order`` that depend differentiably on the sources, each with the union of their bit masks."""
     nodes = g.nodes
     masks = dict(sources)
+    flat = operations_with(lambda row: not (row.slopes or row.choice)) | LEAVES
     for i in order:
         node = nodes[i]
         operation = node[0]
-        row = OPERATIONS.get(operation)
-        if operation in LEAVES or (row is not None and not (row.slopes or row.choice)):
+        if operation in flat:
             continue
         mask = 0
         for k in node[2:] if operation == "select" else node[1:]:
@@ -296,6 +296,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
     for row, i in enumerate(roots):
         if i in columns:
             rows[i] = rows.get(i, 0) | 1 << row
+    branching = operations_with(lambda row: row.choice is not None)
     forward = reverse = 0
     for i in reversed(order):
         if i not in rows:  # constant, or only behind something flat
@@ -303,8 +304,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
         mask, node = rows[i], nodes[i]
         if node[0] in LEAVES:
             continue
-        operation = OPERATIONS.get(node[0])
-        if operation is not None and operation.choice is not None:
+        if node[0] in branching:
             return False
         cost = 1 if node[0] in ("add", "sub", "neg") else 2
         for k in node[1:]:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..limits.rounding import ROUNDED
-from ..operations import OPERATIONS
+from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .differentiate import gradient
 from .evaluate import Evaluator
@@ -55,22 +55,24 @@ def _spread(
     names = list(values)
     found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
     bounds: dict[int, float] = {}
+    nodes = graph.nodes
     with np.errstate(all="ignore"):
         for i in order:
-            operation, *operands = graph.nodes[i]
-            y, row = found[i], OPERATIONS.get(operation)
+            operation, *operands = nodes[i]
             if operation == "sym":
                 bounds[i] = given.get(operands[0], 0.0)
                 continue
-            bounds[i] = 0.0 if given or (row is not None and row.exact) else abs(y)
-            if row is None or not row.rates:  # a table or a function in C knows its value
-                continue
-            x = [found[k] for k in operands]
-            try:
-                for rate, k in zip(row.rates, operands, strict=True):
-                    bounds[i] += float(rate(y, *x)) * bounds[k] if bounds[k] else 0.0
-            except (ValueError, ArithmeticError):
-                bounds[i] = math.inf
+            y, row = found[i], OPERATIONS.get(operation)
+            bound = 0.0 if given or (row is not None and row.exact) else abs(y)
+            if row is not None and row.rates:  # a table or a function in C knows its value
+                try:
+                    x = [found[k] for k in operands]
+                    for rate, k in zip(row.rates, operands, strict=True):
+                        if bounds[k]:
+                            bound += rate(y, *x) * bounds[k]
+                except (ValueError, ArithmeticError):
+                    bound = math.inf
+            bounds[i] = float(bound)
     return np.array([found[y.id] for y in outputs]), np.array([bounds[y.id] for y in outputs])
 
 
@@ -133,10 +135,10 @@ def terms_of(x: Expr) -> Expr:
 
 def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
     found: dict[int, bool] = {}
+    analytic = operations_with(lambda row: row.analytic)
     for i in reachable(graph, (y.id for y in outputs)):
         operation, *operands = graph.nodes[i]
-        analytic = operation in OPERATIONS and OPERATIONS[operation].analytic
-        found[i] = operation in LEAVES or (analytic and all(found[k] for k in operands))
+        found[i] = operation in LEAVES or (operation in analytic and all(found[k] for k in operands))
     return [found[y.id] for y in outputs]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy
 
-from ..operations import CONDITION, OPERATIONS, kind_of
+from ..operations import CONDITION, OPERATIONS, operations_with
 from .core import Expr, Graph
 from .traverse import LEAVES, common_graph, reachable
 
@@ -87,6 +87,7 @@ def raise_named(
                 uses[k] += 1
     for i in roots:
         uses[i] += 1
+    conditions = operations_with(lambda row: row.kind == CONDITION)
     taken = {nodes[i][1] for i in order if nodes[i][0] == "sym"}
     made: dict[int, Any] = {}
     size: dict[int, int] = {}
@@ -97,7 +98,7 @@ def raise_named(
         made[i] = _raised(graph, i, made, symbols)
         size[i] = 0 if kind in LEAVES else 1 + sum(size[k] for k in args)
         # conditions and signs are read best where they stand
-        if size[i] > (0 if uses[i] > 1 else limit) and kind_of(kind) != CONDITION and kind != "neg":
+        if size[i] > (0 if uses[i] > 1 else limit) and kind not in conditions and kind != "neg":
             while f"{prefix}{number}" in taken:
                 number += 1
             name = sympy.Symbol(f"{prefix}{number}", real=True)

@@ -6,6 +6,8 @@ and counts are looked up here, also where a generated package runs without the g
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from .row import ARITHMETIC, CHOICE, CONDITION, FUNCTION, Operation, function
 from .table import ROWS
 
@@ -17,17 +19,16 @@ __all__ = [
     "OPERATIONS",
     "Operation",
     "function",
-    "kind_of",
+    "operations_with",
     "tape_rows",
 ]
 
 OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
 
 
-def kind_of(operation: str) -> str:
-    """The kind of an operation; empty for leaves and calls of declared functions."""
-    row = OPERATIONS.get(operation)
-    return "" if row is None else row.kind
+def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
+    """Names of the operations that pass a test."""
+    return frozenset(name for name, row in OPERATIONS.items() if test(row))
 
 
 def tape_rows() -> str:

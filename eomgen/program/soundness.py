@@ -6,7 +6,7 @@ from ..graph.core import Expr
 from ..graph.traverse import reachable
 from ..kinematics import Kinematics
 from ..kinematics.kinematics import ForceTerms
-from ..operations import OPERATIONS
+from ..operations import operations_with
 
 LARGEST = 1e300
 
@@ -31,7 +31,7 @@ def _size(terms: ForceTerms) -> Expr | None:
     if not entries:
         return None
     graph = entries[0].graph
-    fragile = {name for name, row in OPERATIONS.items() if row.fragile}
+    fragile = operations_with(lambda row: row.fragile)
     if not any(graph.nodes[i][0] in fragile for i in reachable(graph, [e.id for e in entries])):
         return None
     total = graph.zero

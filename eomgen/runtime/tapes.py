@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import ExpressionError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
-from ..operations import OPERATIONS
+from ..operations import OPERATIONS, operations_with
 from .layout import Layout
 from .names import unknown
 
@@ -200,7 +200,7 @@ class DeclaredSignal:
 
 def _bends(operations: Iterable[str]) -> bool:
     """Whether one of them may jump or bend."""
-    return any(op in OPERATIONS and OPERATIONS[op].bends for op in operations)
+    return not operations_with(lambda row: row.bends).isdisjoint(operations)
 
 
 def _jumps(operation: str) -> bool:

@@ -17,7 +17,7 @@ from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..operations import OPERATIONS
+from ..operations import operations_with
 from ..runtime.names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
@@ -76,7 +76,7 @@ def _kinked(bench: Bench) -> bool:
     """Whether right-hand sides may have kinks, where methods need not keep their order."""
     terms = bench.terms
     nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
-    kinked = {name for name, row in OPERATIONS.items() if row.bends} | set(terms.graph.calls)
+    kinked = operations_with(lambda row: row.bends).union(terms.graph.calls)
     return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
