@@ -11,12 +11,12 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist, Wrench, add, dot, scaled
 from ..graph.substitute import substitute
-from ..kinematics import Kinematics, Twist
-from ..kinematics.inertia import Wrench
+from ..kinematics import Kinematics
 from ..kinematics.units import Units
 from .equations import LinearSystem, TreeEquations, linear_system
-from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
+from .free_bodies import CutJoint, FreeBodies
 
 
 def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
@@ -65,7 +65,7 @@ def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
         for c, column in enumerate(link.columns):
             result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
         if link.parent != GROUND:
-            wrenches[link.parent] = add(wrenches[link.parent], lift(link, wrenches[k]))
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
     return result
 
 

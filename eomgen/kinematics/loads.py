@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from .inertia import Wrench
+from ..graph.spatial import Wrench
 from .kinematics import Kinematics
 
 

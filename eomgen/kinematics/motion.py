@@ -10,10 +10,11 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
+from ..graph.spatial import Twist
 from ..graph.vectors import Mat3, Vec3
 from .momentum import Momentum
 from .state import State
-from .tree import Poses, Twist
+from .tree import Poses
 from .turns import sum_of_turns
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")

@@ -16,13 +16,14 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .couplings import couple
 from .kinematics import Kinematics
 from .motion import Motion
-from .tree import Poses, Twist
+from .tree import Poses
 from .turns import sum_of_turns
 
 Row6 = tuple[Expr, ...]  # force, moment

@@ -2,7 +2,7 @@
 
 from .base import Solid
 from .bounded import Box, Ellipsoid, Sphere
-from .properties import MassProperties, combine, point, shift_tensor, turn_tensor
+from .properties import MassProperties, combine, point
 from .round import Cone, Cylinder, Rod, Tube
 
 SOLIDS: dict[str, type[Solid]] = {
@@ -22,6 +22,4 @@ __all__ = [
     "Tube",
     "combine",
     "point",
-    "shift_tensor",
-    "turn_tensor",
 ]
