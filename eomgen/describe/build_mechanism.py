@@ -12,10 +12,10 @@ from ..forces import FORCES
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.operations import FOLD
 from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
+from ..operations import OPERATIONS
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
 from .build_equations import build_equations, check_energies, declare_equations
@@ -170,7 +170,7 @@ def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
             reader.faults.add(
                 path, f"the input {name!r} cannot stand here", "t, coordinates, velocities, parameters can"
             )
-    if any(reader.graph.nodes[i][0] not in (*FOLD, *LEAVES) for i in reachable(reader.graph, [expression.id])):
+    if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
         reader.faults.add(path, "a function that the model declares cannot stand here", "write the expression out")
     return replace(given, signal=expression)
 

@@ -7,33 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..graph.elementary import ELEMENTARY
 from ..graph.substitute import symbols_of
+from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
-from .straight import CONDITIONS, Pieces, PrintedFunction, cut, references
-
-PATTERNS: dict[str, str] = {
-    "add": "{} + {}",
-    "sub": "{} - {}",
-    "mul": "{} * {}",
-    "div": "{} / {}",
-    "neg": "-{}",
-    "pow": "np.power({}, {})",
-    "atan2": "np.arctan2({}, {})",
-    "min": "np.minimum({}, {})",
-    "max": "np.maximum({}, {})",
-    **{name: f"np.{name}({{}})" for name in ("sqrt", "abs", "sign")},
-    **{name: f"np.{function.array}({{}})" for name, function in ELEMENTARY.items()},
-}
-
-CONDITION_PATTERNS: dict[str, str] = {
-    "lt": "np.less({}, {})",
-    "le": "np.less_equal({}, {})",
-    "eq": "np.equal({}, {})",
-    "not": "np.logical_not({})",
-    "and": "np.logical_and({}, {})",
-    "or": "np.logical_or({}, {})",
-}
+from .straight import Pieces, PrintedFunction, cut, references
 
 
 class _NumpyPrinter:
@@ -55,19 +32,18 @@ class _NumpyPrinter:
     def condition(self, i: int, piece: PrintedFunction) -> str:
         if i in piece.inlined:
             node = self._nodes[i]
-            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+            return OPERATIONS[node[0]].numpy.format(*map(self.operand, node[1:]))
         return f"np.not_equal({self.operand(i)}, 0.0)"
 
     def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
-        if node[0] == "select":
-            return f"np.where({self.condition(node[1], piece)}, {self.operand(node[2])}, {self.operand(node[3])})"
-        if node[0] in CONDITIONS:
-            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:])) + " * 1.0"
         if node[0] in self._calls:
             function, orders = self._calls[node[0]]
             return f"call_{function.name}({', '.join([*map(self.operand, node[1:]), *map(str, orders)])})"
-        return PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+        row = OPERATIONS[node[0]]
+        if row.chooses:
+            return row.numpy.format(self.condition(node[1], piece), *map(self.operand, node[2:]))
+        return row.numpy.format(*map(self.operand, node[1:])) + " * 1.0" * (row.kind == CONDITION)
 
     def lines(self, piece: PrintedFunction) -> list[str]:
         result = [f"{self._name(i)} = w[{slot}]" for i, slot in sorted(piece.loads.items(), key=lambda pair: pair[1])]

@@ -35,6 +35,8 @@ FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces"
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
+#: Folders of eomgen that a Python package carries, but for ELSEWHERE; of api/ and verification/ it has some files.
+FOLDERS = ("limits", "operations", "files", "numeric", "runtime", "analysis", "simulation", "ensembles")
 #: Files of verification/ that need no equations.
 VERIFICATION = (
     *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
@@ -110,10 +112,10 @@ def _python_files(context: dict[str, Any]) -> dict[str, str]:
 
 
 def _runtime_files() -> dict[str, str]:
-    """Files of eomgen as they are: of its root, of limits/ to ensembles/ but ELSEWHERE, and of verification/."""
+    """Files of eomgen as they are: of its root, of FOLDERS but ELSEWHERE, of api/ and of verification/."""
     root = files("eomgen")
     found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "kernel_table.py", "texts.py")}
-    for folder in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):
+    for folder in FOLDERS:
         for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
             if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:
                 found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
@@ -138,6 +140,7 @@ def _context(program: Program) -> dict[str, Any]:
         "metadata": metadata,
         "layouts": describe_layouts(program),
         "calls": describe_calls(program),
+        "folders": [*FOLDERS, "api", "verification"],
         "attributes": [*(name for name, _ in ANNOTATED), *METHODS],
         "annotations": ANNOTATED,
         "methods": METHODS,

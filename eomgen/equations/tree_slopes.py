@@ -24,14 +24,16 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
+from ..graph.spatial import Twist, Wrench, add, dot
 from ..graph.substitute import symbols_of
+from ..graph.tensors import add_matrices, rotate
 from ..graph.vectors import Mat3, Vec3
-from ..kinematics import Kinematics, Link, Twist
+from ..kinematics import Kinematics, Link
 from ..kinematics.joint_rates import joint_rates, slide_accelerations
-from ..kinematics.link_inertia import SpatialInertia, Wrench, add_matrices, rotate
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.regroup import regroup
-from .embedding import _add, _lift, _moment, _project, _turning
+from .embedding import _moment, _turning
 
 Entries = dict[tuple[int, int], Expr]
 
@@ -238,14 +240,14 @@ class ForceSlopes:
                     self._lifted[i, at] = Lifted(force, whirl)
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
-                        mass[i, j] = _project((other.s, other.l), force)
-                        slopes[j, i] = _project((other.s, other.l), rate)
+                        mass[i, j] = dot((other.s, other.l), force)
+                        slopes[j, i] = dot((other.s, other.l), rate)
                         if j != i:
                             along = vec.dot(other.twice_s_rate, force[0]) + vec.dot(other.s, whirl)
                             slopes[i, j] = along + vec.dot(other.twice_l_rate, force[1])
                     if links[at].parent != GROUND:
                         whirl = vec.add(links[at].up(whirl), vec.cross(self._step(at), links[at].up(force[1])))
-                        force, rate = _lift(links[at], force), _lift(links[at], rate)
+                        force, rate = links[at].lift(force), links[at].lift(rate)
             if (p := links[k].parent) != GROUND:
                 part = self._carried(k, body)
                 own = bodies[p]
@@ -320,15 +322,15 @@ class ForceSlopes:
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
                         if j == i or at != k or self._places[j] >= 0:
-                            slopes[j, i] = _project((other.s, other.l), wrench)
+                            slopes[j, i] = dot((other.s, other.l), wrench)
                         else:  # columns of one ball turn with each other
                             slopes[j, i] = self._inner(swept[k][c], field, self._lifted[j, k])
                         if j != i:
                             slopes[i, j] = self._inner(swept[at][d], other, own)
                     if links[at].parent != GROUND:
-                        wrench = _lift(links[at], wrench)
+                        wrench = links[at].lift(wrench)
             if (p := links[k].parent) != GROUND:
-                wrenches[p] = _add(wrenches[p], _lift(links[k], wrenches[k]))
+                wrenches[p] = add(wrenches[p], links[k].lift(wrenches[k]))
         slopes = self._by_coordinates(slopes)
         _subtract(slopes, self._forces_by_position)
         return slopes
@@ -365,9 +367,9 @@ def applied_forces(kinematics: Kinematics) -> list[Expr]:
     result = coordinate_forces(kinematics)
     for k in reversed(range(len(links))):
         for c, column in enumerate(links[k].columns):
-            result[links[k].first + c] = result[links[k].first + c] + _project(column, wrenches[k])
+            result[links[k].first + c] = result[links[k].first + c] + dot(column, wrenches[k])
         if links[k].parent != GROUND:
-            wrenches[links[k].parent] = _add(wrenches[links[k].parent], _lift(links[k], wrenches[k]))
+            wrenches[links[k].parent] = add(wrenches[links[k].parent], links[k].lift(wrenches[k]))
     return result
 
 

@@ -13,6 +13,7 @@ from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, T
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
+from ..graph.spatial import Twist
 from ..graph.substitute import substitute, symbols_of
 from ..joints import QuaternionSlot
 from ..records import dataclass
@@ -22,7 +23,7 @@ from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import MarkerMotion
 from .state import MotionSymbols, acceleration_name, lay_out
 from .topology import Topology, find_topology
-from .tree import Link, Poses, Twist, build_links, link_twists
+from .tree import Link, Poses, build_links, link_twists
 from .undefined_rows import find_flaws, refuse_rows_of_time
 
 

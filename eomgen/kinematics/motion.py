@@ -10,11 +10,12 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
+from ..graph.spatial import Twist
 from ..graph.vectors import Mat3, Vec3
 from .angle_sums import sum_of_turns
 from .momentum import Momentum
 from .state import MotionSymbols
-from .tree import Poses, Twist
+from .tree import Poses
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 

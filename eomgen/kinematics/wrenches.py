@@ -16,6 +16,7 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
@@ -23,7 +24,7 @@ from .angle_sums import sum_of_turns
 from .constraint_equations import couple
 from .kinematics import Kinematics
 from .motion import MarkerMotion
-from .tree import Poses, Twist
+from .tree import Poses
 
 Row6 = tuple[Expr, ...]  # force, moment
 

@@ -6,9 +6,7 @@ parser and refuses texts.
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +14,7 @@ import numpy as np
 
 from ..errors import ExpressionError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
+from ..operations import OPERATIONS, operations_with
 from .layout import Layout
 from .near_names import unknown
 
@@ -72,7 +71,7 @@ class Formula:
         from ..graph.traverse import reachable
 
         graph = self.expression.graph
-        return any(graph.nodes[i][0] in BRANCHING for i in reachable(graph, [self.expression.id]))
+        return _bends(graph.nodes[i][0] for i in reachable(graph, [self.expression.id]))
 
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
@@ -83,8 +82,8 @@ class Formula:
         graph, found = self.expression.graph, []
         for i in reachable(graph, [self.expression.id]):
             node = graph.nodes[i]
-            if node[0] in SWITCHING:
-                found.append(Expr(graph, graph.sub(*node[1:3]) if node[0] != "sign" else node[1]))
+            if _jumps(node[0]):
+                found.append(Expr(graph, graph.sub(*node[1:]) if len(node) == 3 else node[1]))
         evaluate, values = compile_evaluator(found, ("t", *self.layout.x, *self.layout.p)), p.tolist()
         return lambda t, x: [float(value) for value in evaluate([t, *np.asarray(x).tolist(), *values])]
 
@@ -172,7 +171,7 @@ class DeclaredSignal:
         self.tape = _tape(tape)
         self.places, self.derived = [int(k) for k in slopes[0]], _tape(slopes[1])
         self.depends_on_state = any(op == "x" for op, *_ in self.tape[0])
-        self.branches = not {op for op, *_ in self.tape[0]}.isdisjoint(BRANCHING)
+        self.branches = _bends(op for op, *_ in self.tape[0])
 
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
@@ -182,9 +181,9 @@ class DeclaredSignal:
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
         code, numbers, _ = self.tape
-        own = [(op, a, b) for op, a, b, _ in code if op in SWITCHING]
-        added = [("sub", a, b, 0) for op, a, b in own if op != "sign"]
-        out = [*range(len(code), len(code) + len(added)), *(a for op, a, _ in own if op == "sign")]
+        own = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if _jumps(op)]
+        added = [("sub", a, b, 0) for arity, a, b in own if arity == 2]
+        out = [*range(len(code), len(code) + len(added)), *(a for arity, a, _ in own if arity == 1)]
         return _player(([*code, *added], numbers, out), p)
 
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:
@@ -197,6 +196,16 @@ class DeclaredSignal:
             return result
 
         return slopes
+
+
+def _bends(operations: Iterable[str]) -> bool:
+    """Whether one of them may jump or bend."""
+    return not operations_with(lambda row: row.bends).isdisjoint(operations)
+
+
+def _jumps(operation: str) -> bool:
+    """Whether it jumps where what it compares is equal."""
+    return operation in OPERATIONS and OPERATIONS[operation].jumps
 
 
 def _tape(given: Sequence[Any]) -> Tape:
@@ -219,64 +228,17 @@ def _player(tape: Tape, p: Array) -> Callable[[float, Array], list[float]]:
             elif op in leaves:
                 value = leaves[op][a]
             else:
-                operands = (results[a], results[b], results[c])
+                row = OPERATIONS[op]
+                operands = (results[a], results[b], results[c])[: row.arity]
                 try:
-                    value = OPERATIONS[op](*operands)
+                    value = row.value(*operands)
                 except (ArithmeticError, ValueError):  # outside of its domain, or infinite: as C has it
                     with np.errstate(all="ignore"):
-                        value = BEYOND[op](*operands)
+                        value = row.array(*operands)
             results.append(float(value))
         return [results[k] for k in out]
 
     return play
-
-
-def _one(function: Callable[[float], float]) -> Callable[[float, float, float], float]:
-    return lambda a, b, c: function(a)
-
-
-def _two(function: Callable[[float, float], float]) -> Callable[[float, float, float], float]:
-    return lambda a, b, c: function(a, b)
-
-
-#: Functions of one argument, by the names of math.h.
-FUNCTIONS = (
-    *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("asinh", "acosh", "atanh"),
-)
-#: What each operation of a tape does, as tape.c does it.
-OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
-    "add": lambda a, b, c: a + b,
-    "sub": lambda a, b, c: a - b,
-    "mul": lambda a, b, c: a * b,
-    "div": lambda a, b, c: a / b,
-    "neg": lambda a, b, c: -a,
-    "pow": _two(math.pow),
-    "atan2": _two(math.atan2),
-    "abs": _one(abs),
-    "sign": lambda a, b, c: a if a != a else (a > 0) - (a < 0),
-    "min": lambda a, b, c: a if a <= b or a != a else b,
-    "max": lambda a, b, c: a if a >= b or a != a else b,
-    "lt": lambda a, b, c: a < b,
-    "le": lambda a, b, c: a <= b,
-    "eq": lambda a, b, c: a == b,
-    "not": lambda a, b, c: not a,
-    "and": lambda a, b, c: bool(a) and bool(b),
-    "or": lambda a, b, c: bool(a) or bool(b),
-    "select": lambda a, b, c: b if a else c,
-}
-OPERATIONS |= {name: _one(getattr(math, name)) for name in FUNCTIONS}
-#: The same where Python raises what C has a value for: log(0), 1/0, exp(1000).
-BEYOND: dict[str, Callable[[float, float, float], float]] = {
-    "div": lambda a, b, c: float(np.divide(a, b)),
-    "pow": lambda a, b, c: float(np.power(a, b)),
-} | {name: _one(getattr(np, re.sub("^a", "arc", name))) for name in FUNCTIONS}
-
-
-#: Operations at which an expression may jump or bend.
-BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
-#: Those that jump where what they compare is equal.
-SWITCHING = ("sign", "lt", "le", "eq")
 
 
 def is_formula(value: Any) -> bool:

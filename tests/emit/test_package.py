@@ -86,7 +86,7 @@ def test_the_files_of_each_target(packages):
     assert files["c"] == c_files | {"model.json", "README.md", "Makefile"}
     copied = {"errors.py", "kernel_table.py", "texts.py"} | {
         str(p.relative_to(ROOT))
-        for d in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles")
+        for d in ("limits", "operations", "files", "numeric", "runtime", "analysis", "simulation", "ensembles")
         for p in (ROOT / d).glob("*.py")
     }
     copied -= {"files/kept.py", "files/locks.py", "limits/files.py"}  # of eomgen's own cache, and of files of robots
