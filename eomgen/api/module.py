@@ -10,6 +10,7 @@ from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
+from ..errors import left_out
 from ..runtime.bound_model import BoundModel
 from ..runtime.names import find_lacking
 from ..runtime.refusals import require_velocities
@@ -75,7 +76,13 @@ class Call:
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
         if self.function is None:
-            self.function = getattr(import_module(f"..{CALLS[self.name]}", __package__), self.name)
+            try:
+                part = import_module(f"..{CALLS[self.name]}", __package__)
+            except ModuleNotFoundError as error:
+                if str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
+                    raise left_out(self.name) from None
+                raise
+            self.function = getattr(part, self.name)
         return self.function if model is None else MethodType(self.function, model)
 
 
