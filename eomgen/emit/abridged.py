@@ -25,7 +25,7 @@ class _Text:
         self.selection, self.source = selection, source
         self.lines: list[str | None] = list(source.text.splitlines())
         self._shorten(source.tree)
-        for node in sorted(source.tree.body, key=is_typing):  # what classes say to type checkers comes before
+        for node in sorted(source.tree.body, key=_order):
             self._visit(node)
 
     def written(self) -> str:
@@ -46,9 +46,9 @@ class _Text:
                         self._cut(part)
                     elif is_typing(part):
                         self._attributes(part)
-            for part in ast.walk(node):
-                if isinstance(part, ast.FunctionDef | ast.ClassDef):
-                    self._shorten(part)
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.FunctionDef | ast.ClassDef):
+                    self._shorten(inner)
         elif names := list(assigned(node)):
             if not any((source.name, name) in selection.kept for name in names):
                 self._cut(node)
@@ -72,9 +72,9 @@ class _Text:
             node.names = names
             self.lines[node.lineno - 1] = " " * node.col_offset + ast.unparse(node)
 
-    def _attributes(self, block: ast.stmt) -> None:
+    def _attributes(self, block: ast.If) -> None:
         """What a class says to type checkers: an attribute whose type is not there goes."""
-        for node in block.body if isinstance(block, ast.If) else ():
+        for node in block.body:
             if isinstance(node, ast.Assign) and isinstance(node.value, ast.Name):
                 one = self.source.types.get(node.value.id)
                 if one is not None and not self.selection.defined(one):
@@ -82,13 +82,14 @@ class _Text:
                 else:
                     self.selection.annotated.add((self.source.name, node.value.id))
 
-    def _types(self, block: ast.stmt) -> None:
+    def _types(self, block: ast.If) -> None:
         """What only type checkers read: a name that is not there is Any to them."""
-        assert isinstance(block, ast.If)
         lacking: list[str] = []
         for node in block.body:
             if isinstance(node, ast.Import | ast.ImportFrom):
-                used = [one for one in self.source.read(node) if (self.source.name, one.alias) in self.selection.annotated]
+                used = [
+                    one for one in self.source.read(node) if (self.source.name, one.alias) in self.selection.annotated
+                ]
                 there = [one for one in used if self.selection.defined(one)]
                 lacking += [one.alias for one in used if one not in there]
                 self._imports(node, there)
@@ -97,6 +98,8 @@ class _Text:
             self.lines[block.lineno - 1] = f"{self.lines[block.lineno - 1]}\n{line}"
         elif all(line is None or not line.strip() for line in self.lines[block.lineno : block.end_lineno]):
             self._cut(block)
+            return
+        self.selection.kept.add((self.source.name, "TYPE_CHECKING"))
 
     def _cut(self, node: ast.stmt) -> None:
         """Take out a statement, with its decorators and the comments right above it."""
@@ -116,3 +119,8 @@ class _Text:
             self.lines[empty[0] - 1] = f'{self.lines[empty[0] - 1]}"""'
             for k in range(empty[0], last):
                 self.lines[k] = None
+
+
+def _order(node: ast.stmt) -> int:
+    """Classes first, which use what is imported for type checkers, then that, then other imports."""
+    return 2 if isinstance(node, ast.Import | ast.ImportFrom) else int(is_typing(node))

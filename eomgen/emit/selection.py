@@ -36,11 +36,14 @@ class Selection:
     """
 
     def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
-        self.sources = {name.removesuffix(".py"): Source(name.removesuffix(".py"), text) for name, text in texts.items()}
+        self.sources = {
+            name.removesuffix(".py"): Source(name.removesuffix(".py"), text) for name, text in texts.items()
+        }
         self.left_out = left_out
         self.files: set[str] = set()
         self.kept: set[tuple[str, str]] = set()
         self.members: set[tuple[str, str, int]] = set()
+        self.whole: set[tuple[str, str]] = set()  #: classes that look up their own methods by name
         self.attributes: set[str] = set()
         self.annotated: set[tuple[str, str]] = set()
         self.refused: set[str] = set()
@@ -70,11 +73,11 @@ class Selection:
             methods = (part.name for part in node.body if isinstance(part, ast.FunctionDef))
             self.attributes |= {method for method in methods if not method.startswith("_")}
         before = None
-        while before != (before := (len(self.kept), len(self.members), len(self.attributes))):
+        while before != (before := (len(self.kept), len(self.members), len(self.attributes), len(self.whole))):
             for file, name in list(self.kept):
-                node = self.sources[file].definitions.get(name)
-                if isinstance(node, ast.ClassDef):
-                    self._look_into(self.sources[file], node)
+                kept = self.sources[file].definitions.get(name)
+                if isinstance(kept, ast.ClassDef):
+                    self._look_into(self.sources[file], kept)
 
     def _load(self, file: str) -> None:
         if file in self.files:
@@ -119,11 +122,12 @@ class Selection:
             if member in self.members:
                 continue
             name = part.name if isinstance(part, ast.FunctionDef) else "__"
-            if name.startswith("__") or name in self.attributes:
+            if name.startswith("__") or name in self.attributes or (source.name, node.name) in self.whole:
                 self.members.add(member)
-                self._use(source, part)
+                if self._use(source, part).any_own:
+                    self.whole.add((source.name, node.name))
 
-    def _use(self, source: Source, *nodes: ast.AST) -> None:
+    def _use(self, source: Source, *nodes: ast.AST) -> Uses:
         used = Uses(*nodes)
         self.attributes |= used.attributes
         self.annotated |= {(source.name, name) for name in used.annotated}
@@ -135,15 +139,16 @@ class Selection:
         for base, attribute in used.of_names:
             if (found := local.get(base) or source.imports.get(base)) is not None:
                 self._reach(found, attribute)
+        return used
 
     def _is_class(self, source: Source, name: str) -> bool:
-        """Whether a name of an annotation is that of a class of eomgen, which is kept for other reasons only."""
+        """Whether a name of an annotation is that of a class of another file, which is kept for other reasons only."""
         one = source.imports.get(name) or source.types.get(name)
-        if one is not None:
-            if one.home is None or one.home not in self.sources:
-                return one.home is not None
-            source, name = self.sources[one.home], one.name
-        return isinstance(source.definitions.get(name), ast.ClassDef)
+        if one is None or one.home is None:
+            return False
+        return one.home not in self.sources or isinstance(
+            self.sources[one.home].definitions.get(one.name), ast.ClassDef
+        )
 
     def defined(self, one: Import) -> bool:
         """Whether what is imported is there."""

@@ -1,4 +1,4 @@
-"""Stage emit: generated files of a package -> the little of eomgen that calls and runs need; the rest refuses by name."""
+"""Stage emit: generated files of a package -> what of eomgen calls and runs need; the rest refuses by name."""
 
 from __future__ import annotations
 
@@ -11,6 +11,15 @@ from .selection import Selection
 #: Files that a slim package has not -> what asks for them.
 LEFT_OUT = {
     "analysis/impact": "events with impacts",
+    "numeric/assembly_failure": "what keeps loops from closing",
+    "numeric/splines": "cubic tables",
+    "runtime/culprit": "what a failure is due to",
+    "runtime/origin": "where a result comes from",
+    "runtime/rate_checks": "inputs whose rates stand in the equations",
+    "runtime/signal_rates": "rates of inputs",
+    "simulation/led_state": "inputs that move constraints and depend on the state",
+    "simulation/progress": "progress=",
+    "simulation/stalling": "runs whose steps lead nowhere",
     "runtime/canonical": "canonical",
     "runtime/change_points": "change_points",
     "runtime/minimal": "minimal",
@@ -22,6 +31,8 @@ LEFT_OUT = {
     "simulation/checkpoint": "checkpoint=",
     "simulation/dae_solution": "dae",
     "simulation/driven": "mechanisms that drivers move entirely",
+    "simulation/solver_state": "checkpoint=",
+    "simulation/steppers": "step and classes of solvers",
 }
 #: Classes whose methods users call.
 PUBLIC = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 
 class Import(NamedTuple):
@@ -73,7 +73,7 @@ def assigned(node: ast.stmt) -> Iterator[str]:
         yield from (part.id for target in targets for part in ast.walk(target) if isinstance(part, ast.Name))
 
 
-def is_typing(node: ast.stmt) -> bool:
+def is_typing(node: ast.AST) -> TypeGuard[ast.If]:
     """Whether a statement is ``if TYPE_CHECKING:``."""
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
@@ -95,6 +95,8 @@ class Uses(ast.NodeVisitor):
         ``("a", "b")`` where a is a plain name.
     imports : list of nodes
         Imports of names inside functions.
+    any_own : bool
+        Whether an attribute of ``self`` is looked up by a name that is put together.
     """
 
     def __init__(self, *nodes: ast.AST) -> None:
@@ -103,6 +105,7 @@ class Uses(ast.NodeVisitor):
         self.attributes: set[str] = set()
         self.of_names: set[tuple[str, str]] = set()
         self.imports: list[ast.ImportFrom] = []
+        self.any_own = False
         for node in nodes:
             self.visit(node)
 
@@ -124,11 +127,17 @@ class Uses(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> None:
         """Note an attribute that is named by a text."""
         if isinstance(node.func, ast.Name) and node.func.id in ("getattr", "hasattr") and len(node.args) > 1:
-            self.attributes |= {str(part.value) for part in node.args[1:2] if isinstance(part, ast.Constant)}
+            one, name = node.args[:2]
+            if isinstance(name, ast.Constant):
+                self.attributes.add(str(name.value))
+            self.any_own |= isinstance(name, ast.JoinedStr) and isinstance(one, ast.Name) and one.id == "self"
         self.generic_visit(node)
 
     def visit_If(self, node: ast.If) -> None:
-        """Pass over what is there for type checkers."""
+        """Of what is there for type checkers only annotations are used."""
+        if is_typing(node):
+            self.names.add("TYPE_CHECKING")
+            self.annotated |= Uses(*(part for part in node.body if isinstance(part, ast.FunctionDef))).annotated
         for part in node.orelse if is_typing(node) else ast.iter_child_nodes(node):
             self.visit(part)
 

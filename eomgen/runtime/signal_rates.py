@@ -16,9 +16,10 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
+from .input_kinds import Expressed, Tabulated
 from .layout import Layout
 from .room import read_number
-from .tapes import DeclaredSignal, Formula
+from .tapes import DeclaredSignal
 
 if TYPE_CHECKING:
     from .protocols import Driven
@@ -60,7 +61,7 @@ def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
     return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function
 
 
-class TableRate:
+class TableRate(Tabulated):
     """A derivative of a table by time: cubic pieces that may jump where they meet, 0 before and after.
 
     At the first and the last time it is that of the piece inside, so that a run over just the table sees no jump.
@@ -153,7 +154,7 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
     for first, of in layout.input_rates.items():
         for name, rate in pairwise([first, *(rate for rate, _ in of)]):
             f, g = (forcing.values.get(n) for n in (name, rate))
-            if not (isinstance(f, Formula | DeclaredSignal) and isinstance(g, Formula | DeclaredSignal)):
+            if not (isinstance(f, Expressed) and isinstance(g, Expressed)):
                 continue
             follows = rate in forcing.derived or (isinstance(f, DeclaredSignal) and isinstance(g, DeclaredSignal))
             if not follows or not f.branches or start == end:
@@ -300,7 +301,7 @@ def fill_rates(
 
 
 def derive(name: str, rate: str, value: Any) -> Any:
-    """The rate of an input given as a number, Formula, Signal or function.
+    """The rate of an input given as a number, expression, Signal or function.
 
     Raises
     ------
@@ -309,8 +310,8 @@ def derive(name: str, rate: str, value: Any) -> Any:
     """
     if isinstance(value, float):
         return 0.0
-    if isinstance(value, Formula):
-        return value.derivative(name, rate)
+    if isinstance(value, Expressed) and (known := value.rate(name, rate)) is not None:
+        return known
     derivative = getattr(value, "derivative", None)
     found = derivative() if callable(derivative) else None
     if found is not None:

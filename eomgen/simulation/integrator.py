@@ -17,11 +17,12 @@ from ..runtime.room import read_number, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
 from .compiled import RESET_FAILED, TOO_SMALL, can_run, stepper_options
+from .crawling import Crawling
 from .events import Events
 from .integrate import choose_solver
 from .run_arguments import check_method, declare, own_step
 from .simulate import simulate
-from .stalling import Crawling, Pace
+from .stalling import Pace
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:

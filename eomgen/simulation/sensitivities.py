@@ -21,6 +21,7 @@ from ..runtime.names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
+from .crawling import Crawling
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import Slopes
 from .integrate import Solution, choose_solver, integrate, require_end
@@ -31,7 +32,7 @@ from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
 from .simulate import simulate
-from .stalling import Crawling, Pace, describe_crawl
+from .stalling import Pace, describe_crawl
 from .tolerances import check_tolerances
 from .variational import Variational
 
