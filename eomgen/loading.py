@@ -9,8 +9,8 @@ from typing import Any
 from .api.model import Model
 from .describe import describe_yaml_file
 from .errors import ModelError, UsageError
-from .files.paths import as_name
-from .numeric.inertia import CHECKS, word_of_check
+from .files.path_names import as_name
+from .numeric.rigid_inertia import CHECKS, word_of_check
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}

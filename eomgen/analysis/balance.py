@@ -13,6 +13,7 @@ import numpy as np
 
 from ..limits.constraints import STATE
 from ..limits.rounding import TINY
+from ..limits.statics import DISPLACED
 from ..numeric import algebra
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
@@ -157,7 +158,7 @@ def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
 
 
 def force_slopes(
-    module: BoundModel, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = 1e-5
+    module: BoundModel, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = DISPLACED
 ) -> tuple[Array, Array]:
     """Changes of the forces (n_dof - k, n_z) and of the enforced velocities (n_v, n_z) along the columns of Z.
 

@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import EquilibriumError
 from ..limits.statics import MOVING
 from ..numeric.scales import Array
-from .creeping import creep
 from .newton import marquardt, newton
 from .search import Point, Search
+from .viscous_descent import creep
 
 REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
 

@@ -11,11 +11,11 @@ from ..limits.statics import DIFFERENCES
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import Balance, force_slopes, weigh
+from .eigenvalue_rounding import judge
 from .linear import linearize
 from .linearization import Linearization
-from .rounding import judge
 from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 

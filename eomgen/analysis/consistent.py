@@ -23,7 +23,7 @@ from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import read_names
+from ..runtime.near_names import read_names
 from ..runtime.room import read_number, read_numbers
 from ..texts import shown
 

@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..limits.rounding import TINY
-from ..limits.statics import AFFINE, REACHED, REMAINDER
+from ..limits.statics import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import read_names
+from ..runtime.near_names import read_names
 from ..runtime.room import read_numbers
 from .constrained import States, free_motions, prepare, solve_multipliers
 from .tables import as_text
@@ -161,7 +161,7 @@ def _solve(A: Array, want: Array, weights: Array) -> Array:
     m, n = A.shape
     if m == n and m:
         rows = np.abs(A * (1.0 / weights)).max(axis=1, keepdims=True)
-        if rows.all() and algebra.cond(A / weights / rows) < 1e-2 / RANK:
+        if rows.all() and algebra.cond(A / weights / rows) < WELL_ABOVE / RANK:
             return np.asarray(algebra.solve(A / rows, want / rows[:, 0]))
     return np.asarray(algebra.lstsq(A / weights, want, rcond=RANK) / weights)
 

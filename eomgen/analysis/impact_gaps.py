@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
 from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
@@ -146,7 +147,7 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
         return float((rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate)(t, x))
     f = forcing.varying[index]
-    if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
+    if any(f(t, x + move) != f(t, x) for move in ELSEWHERE * np.eye(len(x))):
         raise UsageError(words)
     return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 

@@ -17,17 +17,17 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_flag, read_number, read_numbers, require_room
 from ..texts import shown
-from .following import Follower
-from .gaps import describe_gap
-from .ground import Ground
-from .motions import KinematicAnalysis, keep
+from .driven_coordinates import Follower
+from .followed_path import Track
+from .kinematic_motion import KinematicAnalysis, keep
+from .known_range import Ground
+from .open_joint import describe_gap
+from .path_following import Path
 from .singular import Singular
-from .tracks import Track
-from .walking import Path
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -17,7 +17,7 @@ from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import assembly_jacobian
 from .tangent import Tangent
 

@@ -11,7 +11,7 @@ from ..limits.statics import ARRIVED, CLOSE
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .rounding import BALANCED
+from .eigenvalue_rounding import BALANCED
 
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 

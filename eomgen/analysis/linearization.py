@@ -11,8 +11,8 @@ from ..errors import UsageError
 from ..limits.statics import COUPLED, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.names import unknown
-from .rounding import BALANCED
+from ..runtime.near_names import unknown
+from .eigenvalue_rounding import BALANCED
 from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
@@ -248,7 +248,7 @@ class Linearization:
         MissingDependencyError
             SciPy is not installed.
         """
-        from ..runtime.names import require
+        from ..runtime.near_names import require
 
         signal = require("scipy.signal", "scipy", "state_space")
         if not self.inputs or not self.outputs:

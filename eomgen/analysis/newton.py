@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..limits.rounding import TINY
-from ..limits.statics import ARRIVED, SHORTEST
+from ..limits.statics import ARRIVED, DAMPING, GAINED, SHORTEST
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array
@@ -110,7 +110,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
     J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows
     the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
     """
-    damping, growth, columns = 1e-3, 2.0, np.zeros(0)
+    damping, growth, columns = DAMPING, 2.0, np.zeros(0)
     start = Solver(search.linearize(point)).sizes
     for step in range(STEPS):
         solver, here = Solver(search.linearize(point)), point.here
@@ -133,7 +133,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
             if there is not None:
                 lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
                 gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
-            if gain > 1e-4:
+            if gain > GAINED:
                 damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
                 break
             there, damping, growth = None, damping * growth, 2.0 * growth

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
-from ..limits.statics import DIFFERENCES
+from ..limits.statics import DIFFERENCES, LEAST_UNKNOWN
 from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
+from .eigenvalue_rounding import own_accelerations
 from .linear_step import RANK, Linear
-from .rounding import own_accelerations
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
@@ -121,7 +121,8 @@ class Search:
             split = algebra.svd(held * s @ basis)
             free = split[2][len(held) :].T
             basis, inverse = basis @ free, inverse @ free
-        weights = np.maximum(np.abs(point.unknowns), 1e-3 * np.maximum(1.0, np.abs(point.unknowns).max(initial=0.0)))
+        sizes = np.abs(point.unknowns)
+        weights = np.maximum(sizes, LEAST_UNKNOWN * max(1.0, float(sizes.max(initial=0.0))))
         unknown_rates = np.zeros((len(s), len(weights)))
         J = np.vstack([
             (np.hstack([found.by_position @ inverse, found.by_unknown * weights]) / s[:, None])[here.velocities],

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.motions import BLOCKED, LEAPS, SINGULAR, UNJUDGED
+from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .bridging import Bridge, build_bridge
-from .following import Follower, Tangent
+from .change_point_interpolant import Bridge, build_bridge
+from .driven_coordinates import Follower, Tangent
+from .path_following import Point, Walk
 from .roots import find_root
-from .walking import Point, Walk
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
@@ -166,7 +166,7 @@ def _along(other: Follower, k: int, t: float, q: Array) -> Array:
 
 def _to_extreme(other: Follower, follower: Follower, k: int, t: float, q: Array) -> float | None:
     """Newton's step in w to where dy_k/dw = 0, by a central difference of dy_k/dw."""
-    h = 1e-4
+    h = EXTREME
 
     def slope(q: Array) -> float:
         row = follower.matrix(q, t)[follower.layout.n_c + k]
@@ -239,6 +239,6 @@ def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
     """The last point before a leap that is not too near to the singular position."""
     width = after.s - before.s
     return next(
-        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > LEAPS[0] * 1e-2),
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > 0.01 * LEAPS[0]),
         points[0],
     )

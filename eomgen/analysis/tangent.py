@@ -17,7 +17,7 @@ from ..numeric.partitions import partition
 from ..numeric.projection import tangent_projector
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices, Scales
-from ..runtime.names import read_names, unknown
+from ..runtime.near_names import read_names, unknown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

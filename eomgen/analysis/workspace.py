@@ -14,7 +14,7 @@ from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
+from ..runtime.near_names import require, unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number
 from ..runtime.storage import table_path

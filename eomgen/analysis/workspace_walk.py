@@ -3,7 +3,7 @@
 The walk begins at the grid point next to the initial position and floods the grid, so every position hangs together
 with it by a continuous motion: the assembly mode stays.  A step from one point to the next counts only if position and
 direction come out as foretold; else it is halved; near singular positions it is walked in the small steps of
-:mod:`.walking`, over change points too.
+:mod:`.path_following`, over change points too.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..errors import AssemblyError, PartitionError
 from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .following import Follower
+from .driven_coordinates import Follower
+from .followed_path import Track
 from .kinematic import complete, start_from
+from .path_following import Path, Walk
 from .singular import LOW, Singular
-from .tracks import Track
-from .walking import Path, Walk
 from .workspace_grid import Grid, Index
 
 if TYPE_CHECKING:

@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import left_out
 from ..runtime.bound_model import BoundModel
-from ..runtime.names import find_lacking
+from ..runtime.near_names import find_lacking
 from ..runtime.refusals import require_velocities
 
 if TYPE_CHECKING:
     from ..analysis.consistent import consistent as _consistent
     from ..analysis.constrained import multipliers as _multipliers
+    from ..analysis.coordinate_range import motion_range as _motion_range
     from ..analysis.drive import actuator_forces as _actuator_forces
     from ..analysis.equilibrium import equilibrium as _equilibrium
     from ..analysis.impact import impact as _impact
     from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
     from ..analysis.linear import linearize as _linearize
     from ..analysis.modes import modes as _modes
-    from ..analysis.reaching import motion_range as _motion_range
     from ..analysis.reactions import driving_forces as _driving_forces
     from ..analysis.reactions import reactions as _reactions
     from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..runtime.canonical import Canonical
     from ..runtime.minimal import Minimal
-    from ..runtime.report import report as _report
+    from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
     from ..simulation.impact_run import simulate_impacts as _simulate_impacts
     from ..simulation.integrator import integrator as _integrator
@@ -61,9 +61,9 @@ CALLS = {
     "simulate_impacts": "simulation.impact_run",
     "consistent": "analysis.consistent",
     "kinematic_analysis": "analysis.kinematic",
-    "motion_range": "analysis.reaching",
+    "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
-    "report": "runtime.report",
+    "report": "runtime.summary",
 }
 
 
@@ -192,12 +192,12 @@ class Module(BoundModel):
         return find_lacking(self, "a Module", name)
 
     def __repr__(self) -> str:
-        from ..runtime.report import line
+        from ..runtime.summary import line
 
         return line(self)
 
     def _repr_html_(self) -> str:
-        from ..runtime.report import html
+        from ..runtime.summary import html
 
         return html(self)
 

@@ -2,8 +2,8 @@
 
 from ..elements.element_type import Types
 from . import cams, couplings, drivers, gears, planetary, rolling
-from .base import Condition, Constraint, View
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
+from .constraint import Condition, Constraint, View
 from .couplings import Equation, Linear
 from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
 from .gears import Belt, Gear, Rack

@@ -17,7 +17,7 @@ from ..elements.field import Field
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, sqrt
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, View
 from .profiles import Profile
 
 #: The name that stands for the angle in profiles of cams.

@@ -11,7 +11,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import symbols_of
 from ..records import dataclass
-from .base import POSITION, VELOCITY, Condition, Constraint, View
+from .constraint import POSITION, VELOCITY, Condition, Constraint, View
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Condition, Constraint, View, on_two_bodies
+from .constraint import Condition, Constraint, View, on_two_bodies
 
 #: Kinds of tables whose second derivative jumps between points.
 ROUGH = ("monotone",)

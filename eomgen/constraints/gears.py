@@ -9,7 +9,7 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from ..graph.core import Expr, sin
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, View
 
 
 @dataclass(frozen=True)

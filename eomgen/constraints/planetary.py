@@ -11,7 +11,7 @@ from ..elements.field import Field
 from ..graph.core import Expr
 from ..limits.descriptions import TENSOR
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, View
 
 #: The gears of a planetary set.
 WHEELS = ("sun", "planet", "ring")

@@ -17,7 +17,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import VELOCITY, Condition, Constraint, View, on_two_bodies
+from .constraint import VELOCITY, Condition, Constraint, View, on_two_bodies
 
 #: What is wrong where the lowest point of a disc is not defined.
 LYING = "the disc lies flat (axle along the plane's normal)"

@@ -10,8 +10,8 @@ from ..graph import vectors as vec
 from ..joints import JOINTS
 from .description import Entry
 from .mechanism import Body, JointSpec
-from .reading import Reader
 from .sympy_face import name_of
+from .values import Reader
 
 
 @dataclass

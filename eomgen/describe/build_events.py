@@ -13,9 +13,9 @@ from .description import Entry
 from .fields import EVENT, OUTPUT
 from .mechanism import Event
 from .names import QUANTITIES, nearest
-from .reading import Reader, is_number
 from .scope import quantity_of
 from .sympy_face import in_order
+from .values import Reader, is_number
 
 _LATE = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
 _ACCELERATIONS = (2, 9, 10)  #: levels of QUANTITIES

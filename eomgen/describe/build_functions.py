@@ -8,14 +8,14 @@ import numpy as np
 
 from ..graph.functions import Function
 from ..limits.descriptions import APART, PERIODIC
-from ..numeric.functions import Curve, Surface, Twin
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
+from ..numeric.user_functions import Curve, Surface, Twin
 from .build_native import build_native
 from .checks import check_keys
 from .description import Entry, items
 from .fields import FUNCTION, function_fields
 from .names import QUANTITIES, nearest
-from .reading import Reader, is_number
+from .values import Reader, is_number
 
 POINTS = 20_000  #: of a table, those of a grid together
 

@@ -20,8 +20,8 @@ from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
-from .reading import Reader
 from .sympy_face import name_of
+from .values import Reader
 
 
 @dataclass(frozen=True)

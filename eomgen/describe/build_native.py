@@ -15,12 +15,12 @@ from typing import Any
 from ..errors import UsageError
 from ..files.reading import open_plain
 from ..graph.functions import Function, NativeCode
-from ..numeric.functions import Orders, Twin, up_to
+from ..numeric.user_functions import Orders, Twin, up_to
 from ..records import dataclass
 from .description import Entry, items
 from .names import fault_of_name
 from .native_signature import find_signature
-from .reading import Reader
+from .values import Reader
 
 ARGUMENTS = 16  #: of one function
 SIZE = 1_000_000  #: bytes of one source file

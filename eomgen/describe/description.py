@@ -1,7 +1,8 @@
 """Stage describe, raw data: what Python calls and model files both fill, in the layout of the model file.
 
 A :class:`Description` is plain data: sections of named entries whose values are numbers, texts, sequences, mappings or
-SymPy expressions as the user gave them.  Nothing is looked up or judged here; :mod:`~eomgen.describe.build` does that.
+SymPy expressions as the user gave them.  Nothing is looked up or judged here; that is done by
+:mod:`~eomgen.describe.build_mechanism`.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from .description import Entry, items
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest
-from .reading import Reader
 from .scope import ENERGIES, RATES
+from .values import Reader
 
 _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motions
 _A = {"length": "a length", "angle": "an angle"}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, cos, sin
 from ..graph.vectors import Mat3
-from ..limits.rounding import QUARTER
+from ..numeric.rotation_matrices import quarter_turns
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -27,14 +27,11 @@ TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
 
 
 def cosine_and_sine(angle: Expr) -> tuple[Expr, Expr]:
-    """cos and sin of an angle; exact 0 and +-1 for numeric multiples of pi/2 (to within 1e-15 of relative rounding)."""
-    value = angle.value
-    if value is not None:
-        quarter = round(value / (math.pi / 2))
-        if abs(value - quarter * (math.pi / 2)) <= QUARTER * max(1, abs(quarter)):
-            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-            return angle.graph.constant(c), angle.graph.constant(s)
-    return cos(angle), sin(angle)
+    """cos and sin of an angle; exact 0 and +-1 for numeric multiples of pi/2."""
+    exact = None if angle.value is None else quarter_turns(angle.value)
+    if exact is None:
+        return cos(angle), sin(angle)
+    return angle.graph.constant(exact[0]), angle.graph.constant(exact[1])
 
 
 def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:

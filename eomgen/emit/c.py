@@ -8,7 +8,7 @@ from typing import Any
 
 from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
-from ..program.loops import LARGE
+from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels

@@ -1,10 +1,10 @@
-"""Stage emit: the functions a program calls -> Python text that makes them from ``numeric.functions``; twin files."""
+"""Stage emit: the functions a program calls -> Python text that makes them; twin files."""
 
 from __future__ import annotations
 
 from ..errors import UsageError
 from ..graph.functions import Function
-from ..numeric.functions import Curve, Surface, Twin
+from ..numeric.user_functions import Curve, Surface, Twin
 from ..program import Program
 from .c_functions import used_calls
 

@@ -13,10 +13,10 @@ from ..layer import read_layer
 from ..program import Program
 from ..texts import summary_text
 from .c import emit_c
-from .calls import describe_calls
 from .carried import carry
 from .layouts import describe_layouts
 from .numpy import emit_numpy
+from .python_calls import describe_calls
 from .slim import carry_slim
 from .sources import SourceSet, render
 

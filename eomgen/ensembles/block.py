@@ -17,7 +17,7 @@ from ..runtime.signals import Forcing
 from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
 from ..simulation.events import WAIT, Events
 from ..simulation.simulate import simulate
-from .cases import UNASSEMBLED, Cases, assemble_states
+from .given_cases import UNASSEMBLED, Cases, assemble_states
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.counts import as_count
-from ..runtime.names import require
+from ..runtime.near_names import require
 from .block import LOST, MEANING, Block, Plan, find_events
-from .blocks import RUNS, Kept, keep, reduce_block
-from .cases import Cases
+from .given_cases import Cases
 from .handle import Handle
 from .reductions import Custom, Reduction
+from .run_blocks import RUNS, Kept, keep, reduce_block
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

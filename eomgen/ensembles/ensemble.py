@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
+from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
 from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
-from .cases import Cases
+from .given_cases import Cases
 from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ class Ensemble:
         limit : int
             Draw so many runs at most, evenly chosen.
         """
-        from .picture import draw
+        from .column_picture import draw
 
         return draw(self, name, ax, limit)
 

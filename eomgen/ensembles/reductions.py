@@ -15,7 +15,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..texts import shown
 from .block import EVENT, Block, Plan, inputs_at
-from .cases import Cases
+from .given_cases import Cases
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.counts import read_count
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
@@ -22,10 +22,10 @@ from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
-from .blocks import RUNS, Kept, choose_size, run_local, split
-from .cases import Cases, collect_cases
 from .ensemble import Ensemble
+from .given_cases import Cases, collect_cases
 from .reductions import GRAIN, Reduction, choose_reduction
+from .run_blocks import RUNS, Kept, choose_size, run_local, split
 from .store import stored_length
 
 if TYPE_CHECKING:

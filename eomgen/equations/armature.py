@@ -12,7 +12,7 @@ from functools import partial
 from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
-from .equations import Method, Rows, TreeEquations
+from .tree_equations import Method, Rows, TreeEquations
 
 
 def with_armature(method: Method) -> Method:

@@ -20,7 +20,7 @@ from ..limits.inertia import WORTH_A_WORD
 from ..limits.rounding import EPS, TINY
 from ..numeric import algebra
 from ..numeric.partitions import partition
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 FREE = ("newton_euler", "amalgamated")  #: methods that never form the embedded mass matrix
 

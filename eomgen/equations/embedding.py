@@ -20,13 +20,13 @@ from ..graph.count import count
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia, Wrench
+from ..kinematics.joint_rates import joint_rates, slide_accelerations
+from ..kinematics.link_axes import Block, Rows, Turned, falling, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia, Wrench
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.parallel import Resolved, resolve_parallel
-from ..kinematics.rates import joint_rates, slide_accelerations
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, Rows, Turned, falling, turn_forces, turn_links
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

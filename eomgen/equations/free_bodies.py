@@ -15,7 +15,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics, Link, Twist
-from ..kinematics.inertia import Wrench
+from ..kinematics.link_inertia import Wrench
 from ..kinematics.loads import applied_wrenches, drive_inertias
 from ..records import dataclass
 

@@ -13,10 +13,10 @@ from ..graph.core import Expr
 from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics, Twist
-from ..kinematics.inertia import Wrench
-from ..kinematics.units import Units
-from .equations import LinearSystem, TreeEquations, linear_system
+from ..kinematics.link_inertia import Wrench
+from ..kinematics.typical_sizes import Units
 from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
+from .tree_equations import LinearSystem, TreeEquations, linear_system
 
 
 def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:

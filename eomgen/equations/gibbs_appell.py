@@ -16,7 +16,7 @@ from ..graph.differentiate import gradient, jacobian, vjp
 from ..graph.substitute import substitute
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

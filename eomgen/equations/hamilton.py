@@ -17,8 +17,8 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
 from ..kinematics.loads import drive_inertias
-from .energies import form_energies, generalized_forces
-from .equations import TreeEquations
+from .analytical import form_energies, generalized_forces
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

@@ -12,8 +12,8 @@ from __future__ import annotations
 from ..graph import vectors as vec
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from .energies import form_energies, generalized_forces
-from .equations import TreeEquations
+from .analytical import form_energies, generalized_forces
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

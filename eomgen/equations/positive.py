@@ -15,8 +15,8 @@ from ..limits.rounding import TINY
 from ..numeric import algebra
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
-from .equations import TreeEquations
 from .idle import IdleMotion
+from .tree_equations import TreeEquations
 
 REMEDY = "give the body it moves a mass or an inertia; for kinematics alone, check_inertia: note"
 SHOWN = 8  #: bodies that a message names

@@ -18,13 +18,13 @@ from ..graph.differentiate import jacobian
 from ..graph.vectors import Mat3
 from ..kinematics import Kinematics, Link, Twist
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
+from ..kinematics.joint_rates import JointRates, joint_rates
+from ..kinematics.link_axes import Block, falling, turn_back, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
-from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, falling, turn_back, turn_forces, turn_links
 from ..records import dataclass
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
 

@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
 

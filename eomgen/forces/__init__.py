@@ -4,9 +4,9 @@ from ..elements.element_type import ElementType, Types
 from . import actuators, attraction, bushing, contact, friction, laws, muscle, springs, stops
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
-from .base import CoordinateLoad, Force, Load, MarkerLoad, View
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
+from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import Friction, JointFriction
 from .laws import Element
 from .muscle import Muscle

@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import BETWEEN, ON_JOINT, Path, read_angle
 from .routes import VIA, read_joint_or_path
 

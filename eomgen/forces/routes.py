@@ -11,8 +11,8 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Load, MarkerLoad, View
 from .branches import where
+from .force import Load, MarkerLoad, View
 from .paths import Line, Path, read_coordinate
 
 PI = 3.141592653589793

@@ -13,8 +13,8 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import SEQUENCE, Closure, Coordinate, Joint, Shape
-from .rotations import euler, euler_rates
+from .joint import SEQUENCE, Closure, Coordinate, Joint, Shape
+from .rotation_coordinates import euler, euler_rates
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)

@@ -13,8 +13,8 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import LENGTH, Closure, Joint
-from .closures import along, parallel_axes, same_orientation
+from .closure_conditions import along, parallel_axes, same_orientation
+from .joint import LENGTH, Closure, Joint
 
 
 @dataclass(frozen=True)

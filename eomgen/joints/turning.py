@@ -10,9 +10,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import SEQUENCE, Ball, Closure, Coordinate, Joint
-from .closures import along
-from .rotations import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
+from .closure_conditions import along
+from .joint import SEQUENCE, Ball, Closure, Coordinate, Joint
+from .rotation_coordinates import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))

@@ -16,14 +16,14 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
 from ..joints import Ball
 from ..records import dataclass
-from .couplings import couple
-from .flaws import find_flaws, refuse_rows_of_time
+from .constraint_equations import couple
 from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
 from .motion import Motion
 from .state import State, acceleration_name, lay_out
 from .topology import Topology, find_topology
 from .tree import Link, Poses, Twist, build_links, link_twists
+from .undefined_rows import find_flaws, refuse_rows_of_time
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
-from ..graph.rounding import vanishing
+from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
 from ..limits.rounding import ROUNDED
 from ..records import dataclass
+from .angle_sums import sum_of_turns
 from .state import State
 from .tree import Poses
-from .turns import sum_of_turns
 
 
 @dataclass(frozen=True)

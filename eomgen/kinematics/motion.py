@@ -11,10 +11,10 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
 from ..graph.vectors import Mat3, Vec3
+from .angle_sums import sum_of_turns
 from .momentum import Momentum
 from .state import State
 from .tree import Poses, Twist
-from .turns import sum_of_turns
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 

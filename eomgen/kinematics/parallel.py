@@ -15,8 +15,8 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, cos, sin
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .inertia import SpatialInertia, Wrench
-from .rates import JointRates
+from .joint_rates import JointRates
+from .link_inertia import SpatialInertia, Wrench
 from .tree import Link, Twist, link_twists
 
 

@@ -13,7 +13,7 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Graph
 from ..graph.vectors import Mat3
-from .inertia import SpatialInertia, no_inertia, subtract_matrices, symmetric
+from .link_inertia import SpatialInertia, no_inertia, subtract_matrices, symmetric
 from .tree import Link
 
 

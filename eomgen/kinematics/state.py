@@ -10,7 +10,7 @@ from ..frames import GROUND
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian
 from ..joints import Ball
-from ..joints.rotations import parameter_rates
+from ..joints.rotation_coordinates import parameter_rates
 from ..records import dataclass
 from .topology import Topology
 

@@ -19,11 +19,11 @@ from ..graph.differentiate import jacobian
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .couplings import couple
+from .angle_sums import sum_of_turns
+from .constraint_equations import couple
 from .kinematics import Kinematics
 from .motion import Motion
 from .tree import Poses, Twist
-from .turns import sum_of_turns
 
 Row6 = tuple[Expr, ...]  # force, moment
 

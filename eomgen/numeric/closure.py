@@ -17,6 +17,7 @@ from .scales import Array, Position, Scales
 
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
+LEAST, MOST = 1e-8, 1e8  #: the same after a step that gained nothing, and where the search ends
 LONGEST = 0.5  #: largest scaled step
 FAR = 10.0  #: scaled distance above which steps grow with it
 STEEP = 10.0  #: length of a row's scaled gradient above which the row counts less, lest it drown the others
@@ -97,8 +98,8 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         if not gained > 0.0:  # NaN included
             if size <= SETTLED:
                 break
-            damping = max(10.0 * damping, 1e-8)
-            if damping > 1e8:
+            damping = max(10.0 * damping, LEAST)
+            if damping > MOST:
                 break
             continue
         settled = size <= SETTLED and largest(e_trial) > 0.5 * size

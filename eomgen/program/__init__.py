@@ -1,7 +1,7 @@
 """Stage program: SystemTerms -> Program (functions with typed ports, hoisted and counted)."""
 
 from ..kernel_table import KERNELS, Kernel, Sizes
-from .build import ABI, build_program
+from .build_program import ABI, build_program
 from .program import Block, Driver, Limits, Port, Program
 from .terms import SystemTerms
 

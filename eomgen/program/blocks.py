@@ -13,9 +13,9 @@ from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
-from .loops import LoopBlocks
+from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
+from .loop_blocks import LoopBlocks
 from .program import Block, Limits, Port
-from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b

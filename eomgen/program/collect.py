@@ -7,8 +7,8 @@ from typing import Any
 
 from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import Input, Output, Parameter
-from ..equations.equations import TreeEquations
-from ..equations.slopes import ForceSlopes, can_differentiate
+from ..equations.tree_equations import TreeEquations
+from ..equations.tree_slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -23,9 +23,9 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
-from .discs import describe_discs
 from .given_multipliers import multiplier_values
 from .program import Limits
+from .rolling_discs import describe_discs
 from .soundness import flag_forces
 from .terms import SystemTerms
 

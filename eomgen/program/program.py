@@ -7,7 +7,7 @@ from dataclasses import field
 from math import prod
 from typing import Any
 
-from ..equations.equations import LinearSystem
+from ..equations.tree_equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from ..kernel_table import Sizes

@@ -1,14 +1,14 @@
-"""Stage program: the input of :func:`~.build.build_program`: every expression and name that functions are made of."""
+"""Stage program: what :func:`~.build_program.build_program` takes: all expressions and names of the functions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..equations.equations import LinearSystem
-from ..equations.slopes import ForceSlopes
+from ..equations.tree_equations import LinearSystem
+from ..equations.tree_slopes import ForceSlopes
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
-from ..kinematics.turned import Turned
+from ..kinematics.link_axes import Turned
 from ..kinematics.wrenches import JointWrenches
 from ..records import dataclass
 

@@ -13,11 +13,11 @@ from ..errors import ModelError, Problem
 from ..joints import JOINTS
 from ..limits.files import FREEDOMS, LAWS, TIES
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
-from .names import Names, clean_model_name
-from .placement import Inertia, Placement, numbers
+from .link_names import Names, clean_model_name
+from .link_tree import GROUND, Bodies, Body, build_bodies, find_tied
 from .robot import Drive, Joint, Options, Range, Robot
+from .robot_frames import Inertia, Placement, numbers
 from .ties import Sum, Tie, describe_tie
-from .tree import GROUND, Bodies, Body, build_bodies, find_tied
 
 SHOWN = 8  #: joints that a note names
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf
@@ -21,8 +22,8 @@ from .mjcf_equalities import read_equalities
 from .mjcf_fields import NOTED
 from .mjcf_files import Scan
 from .mjcf_text import Text
-from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
 from .robot import Joint, Link, Options, Robot
+from .robot_frames import IDENTITY, Inertia, Placement, moved, numbers
 from .xml_text import Element
 
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint

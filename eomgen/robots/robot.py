@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import Problem
 from ..records import dataclass
-from .placement import IDENTITY, NOTHING, Inertia, Placement
+from .robot_frames import IDENTITY, NOTHING, Inertia, Placement
 from .ties import Tie
 
 Place = tuple[str, int]  # file, line

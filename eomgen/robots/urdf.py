@@ -14,9 +14,9 @@ import numpy as np
 
 from ..errors import ModelError
 from ..limits.files import LARGEST
-from ..numeric.inertia import SWITCH
-from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
+from ..numeric.rigid_inertia import SWITCH
 from .robot import Joint, Link, Mimic, Options, Robot
+from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
 from .urdf_constructs import note_urdf
 from .xml_text import Element
 

@@ -21,7 +21,7 @@ from ..graph.traverse import reachable
 from ..numeric.scales import Array
 from .input_kinds import Expressed
 from .layout import Layout
-from .names import unknown
+from .near_names import unknown
 from .tapes import BRANCHING, SWITCHING, Tape
 
 

@@ -28,7 +28,7 @@ from ..numeric.starts import starts
 from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
-from .names import UnknownNameError, unknown
+from .near_names import UnknownNameError, unknown
 
 
 class Given(NamedTuple):

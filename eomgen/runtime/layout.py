@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
-from .names import check_names
+from .near_names import check_names
 from .room import read_number, read_numbers
 
 ABI = 1  #: layout of the metadata this file reads

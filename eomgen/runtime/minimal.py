@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
-from .paths import STEP, Path
 from .room import read_number, read_numbers
+from .tree_motion import STEP, Path
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..texts import visible
-from .names import require
+from .near_names import require
 
 if TYPE_CHECKING:
     from .protocols import Columns

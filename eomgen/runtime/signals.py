@@ -14,10 +14,11 @@ from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..texts import shown
 from .input_kinds import Expressed, Tabulated
+from .input_texts import is_formula, read_formula
 from .layout import Layout
-from .names import check_names, require_mapping, require_time_and_state, unknown
+from .near_names import check_names, require_mapping, require_time_and_state, unknown
 from .room import as_real, read_number, read_numbers
-from .tapes import DeclaredSignal, is_formula, read_formula
+from .tapes import DeclaredSignal
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
 #: How a table goes on between its times -> the order of its pieces.

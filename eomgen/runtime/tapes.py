@@ -5,39 +5,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..errors import MissingDependencyError
 from ..numeric.scales import Array
 from .input_kinds import Expressed
-from .layout import Layout
-
-if TYPE_CHECKING:
-    from .formulas import Formula
 
 #: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
 Tape = tuple[list[tuple[str, int, int, int]], list[float], list[int]]
-
-
-def read_formula(layout: Layout, text: str, what: str, beside: Formula | None = None) -> Formula:
-    """An expression as text; see :class:`~.formulas.Formula`.
-
-    Raises
-    ------
-    MissingDependencyError
-        In a generated package, which has no parser.
-    UsageError
-        It is no expression, or has a name that the model does not know.
-    """
-    try:
-        from .formulas import Formula
-    except ImportError:
-        raise MissingDependencyError(
-            f"{what}: an expression as text needs eomgen to be read: pip install eomgen, or give a function f(t, x)"
-        ) from None
-    return Formula(layout, text, what, beside)
 
 
 class DeclaredSignal(Expressed):
@@ -171,8 +147,3 @@ BEYOND: dict[str, Callable[[float, float, float], float]] = {
 BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
 #: Those that jump where what they compare is equal.
 SWITCHING = ("sign", "lt", "le", "eq")
-
-
-def is_formula(value: Any) -> bool:
-    """Whether what a user gives is an expression as text."""
-    return isinstance(value, str)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EvaluationError, SimulationError, UnavailableError
+from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
-from .crawling import Crawling
+from .stalled import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -101,7 +102,7 @@ class Run:
         from .stalling import describe_crawl, steepest
 
         with np.errstate(all="ignore"):
-            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", SCIPY_ATOL))
         return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
 
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:

@@ -17,7 +17,7 @@ from ..errors import SimulationError, UsageError
 from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
-from ..runtime.names import require
+from ..runtime.near_names import require
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .event_values import EventValues

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.following import Follower
-from ..analysis.gaps import describe_gap
+from ..analysis.driven_coordinates import Follower
+from ..analysis.followed_path import Track
 from ..analysis.kinematic import complete, start_from, walk_in
-from ..analysis.motions import KinematicAnalysis, keep
+from ..analysis.kinematic_motion import KinematicAnalysis, keep
+from ..analysis.open_joint import describe_gap
+from ..analysis.path_following import Path
 from ..analysis.roots import find_root
-from ..analysis.tracks import Track
-from ..analysis.walking import Path
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing

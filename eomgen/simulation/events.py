@@ -17,12 +17,12 @@ import numpy as np
 
 from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
-from ..limits.runs import CROWD, INSTANT
+from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
+from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
-from ..runtime.names import check_names, require_time_and_state
-from ..runtime.tapes import is_formula, read_formula
+from ..runtime.near_names import check_names, require_time_and_state
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Event:
         if not isfinite(value):
             return nan
         self.known = True
-        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
+        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), EARLIEST):
             return self.left[1] * max(abs(value), TINY)
         return value
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
-from .crossings import Crossings, Step
+from ..runtime.near_names import require, unknown
+from .event_crossings import Crossings, Step
 from .events import Event
 
 if TYPE_CHECKING:

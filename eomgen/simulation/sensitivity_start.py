@@ -51,7 +51,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     UsageError
         A name is none of them.
     """
-    from ..runtime.names import read_names, unknown
+    from ..runtime.near_names import read_names, unknown
 
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
-from .crawling import Crawling
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
 from .recording import record
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
+from .stalled import Crawling
 from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from ..limits.rounding import TINY
 from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from ..runtime.failure import place
-from .crawling import Crawling
+from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any pace

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Dimension, Solid
+from .solid import Dimension, Solid
 
 _LENGTH = Dimension("expression", "length along the axis (m)")
 _RADIUS = Dimension("expression", "radius (m)")

@@ -18,7 +18,7 @@ from .check_joints import placed
 from .comparison import Comparison, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import UNIT
+from .rounding_sizes import UNIT
 from .truth import Truth
 
 TURNING = (Revolute, Continuous)

@@ -14,7 +14,7 @@ from ..frames import GROUND
 from . import bodies
 from .bodies import Matrix, Pose, Rigid, Twist
 from .digits import FIRST, SECOND, Number, Numbers, solve
-from .states import State, System, Values
+from .precise_states import State, System, Values
 
 __all__ = ["State", "System", "Truth", "Values"]
 

@@ -321,7 +321,7 @@ def test_change_points_where_the_determinant_only_touches_zero() -> None:
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.walking import Walk
+    from eomgen.analysis.path_following import Walk
 
     count, real = [0], Walk.forward
 
@@ -345,7 +345,7 @@ def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, mon
 
 
 def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.walking import Walk
+    from eomgen.analysis.path_following import Walk
 
     count, real = [0], Walk.forward
 
@@ -365,7 +365,7 @@ def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypat
 
 
 def test_what_of_a_way_was_walked() -> None:
-    from eomgen.analysis.ground import Ground
+    from eomgen.analysis.known_range import Ground
 
     y = np.array([[0.0, 2.0, 1.0, 4.0, -2.0], [1.0, 1.0, 1.0, 1.0, 1.0]])
     ground, known = Ground(np.zeros(5), y), []

@@ -10,7 +10,7 @@ from eomgen.equations import METHODS, embedding
 from eomgen.graph import evaluate
 from eomgen.graph.core import Expr
 from eomgen.kinematics import Kinematics, analyse
-from eomgen.kinematics.turned import turn_links
+from eomgen.kinematics.link_axes import turn_links
 from eomgen.program.factor import factorize, solve
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...describe.description import Description, Entry
 from .pieces import frame_on, frames_of
-from .texts import scaled
+from .rewritten_texts import scaled
 from .variant import NotApplicable, References, Variant, coordinates_of
 from .visit import bodies_of, copied
 

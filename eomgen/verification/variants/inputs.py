@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
-from .states import Original, compiled
-from .texts import number_of
+from .probe_states import Original, compiled
+from .rewritten_texts import number_of
 from .variant import Variant
 from .visit import copied
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from ...describe.builder import Builder
 
 #: Tolerances of the runs, and what two runs with them may differ by, relative to the size of the state.
-RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
 SLOPE = 0.3
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description, Entry
-from .texts import negative, rewritten
+from .rewritten_texts import negative, rewritten
 from .variant import NotApplicable, Variant, coordinates_of
 from .visit import Slot, Visitor, copied, visit
 

@@ -16,7 +16,7 @@ from ...describe.build_joints import coordinate_names
 from ...describe.description import Description, Entry
 from ...joints import JOINTS
 from ...records import dataclass
-from .texts import names_of
+from .rewritten_texts import names_of
 from .visit import Slot, Visitor, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
