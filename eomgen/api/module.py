@@ -82,7 +82,9 @@ class Call:
                 if str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
                     raise left_out(self.name) from None
                 raise
-            self.function = getattr(part, self.name)
+            self.function = getattr(part, self.name, None)
+            if self.function is None:
+                raise left_out(self.name)
         return self.function if model is None else MethodType(self.function, model)
 
 

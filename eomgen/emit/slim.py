@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from .abridged import abridge
 from .carried import carry, describe_folder
 from .selection import Selection
+from .uses import Source
 
 #: Files that a slim package has not -> what asks for them.
 LEFT_OUT = {
@@ -26,8 +27,7 @@ LEFT_OUT = {
     "runtime/tree_motion": "kinematics",
     "runtime/pickling": "pickling",
     "runtime/plotting": "plot",
-    "runtime/summary": "report",
-    "runtime/storage": "save",
+    "runtime/storage": "save and pickles",
     "simulation/checkpoint": "checkpoint=",
     "simulation/dae_solution": "dae",
     "simulation/driven": "mechanisms that drivers move entirely",
@@ -55,9 +55,12 @@ def carry_slim(package: Mapping[str, str]) -> dict[str, str]:
         Generated files, from which all begins.
     """
     own = {name: text for name, text in package.items() if name.endswith(".py")}
+    typed = [Source("", text) for name, text in package.items() if name.endswith(".pyi")]
     selection = Selection(carry(package) | own, LEFT_OUT)
     for name in own:
         selection.begin(name.removesuffix(".py"))
+    for one in [one for source in typed for one in source.imports.values() if one.home]:
+        selection.reach(one.home, one.name)
     for name in CALLS:
         selection.reach(f"simulation/{name}", name)
     selection.follow(PUBLIC)

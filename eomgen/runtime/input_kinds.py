@@ -1,4 +1,4 @@
-"""Stage runtime: the kinds of inputs that vary and that compiled loops evaluate themselves, by what they all can do."""
+"""Stage runtime: the kinds of inputs that vary: by values at times, by an expression, by a function of time alone."""
 
 from __future__ import annotations
 
@@ -84,3 +84,37 @@ class Expressed:
     def rate(self, name: str, rate: str) -> Expressed | None:
         """The derivative by time along the motion, of an input called ``name``; None where it is not known."""
         return None
+
+
+class OfTime:
+    """A function of time alone, as f(t, x); its rate is that of the object's own ``derivative()``."""
+
+    def __init__(self, function: Any) -> None:
+        self.function = function
+
+    def __call__(self, t: float, x: Any = None) -> Any:
+        """The value at time t."""
+        return self.function(t)
+
+    def derivative(self) -> Any:
+        """The rate, as the object says it."""
+        found = self.function.derivative()
+        return of_time(found) if callable(found) else found
+
+
+def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function itself, or as f(t, x) one with ``derivative()`` that takes the time alone.
+
+    So does one of one argument, or whose second has a number by default, as the splines of SciPy have the order of a
+    derivative there.
+    """
+    from inspect import signature
+
+    if not callable(getattr(function, "derivative", None)):
+        return function
+    try:
+        taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
+    except (TypeError, ValueError):
+        return function
+    alone = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
+    return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function

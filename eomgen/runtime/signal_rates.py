@@ -16,7 +16,7 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
-from .input_kinds import Expressed, Tabulated
+from .input_kinds import Expressed, Tabulated, of_time
 from .layout import Layout
 from .room import read_number
 from .tapes import DeclaredSignal
@@ -25,40 +25,6 @@ if TYPE_CHECKING:
     from .protocols import Driven
 
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
-
-
-class OfTime:
-    """A function of time alone, as f(t, x); its rate is that of the object's own ``derivative()``."""
-
-    def __init__(self, function: Any) -> None:
-        self.function = function
-
-    def __call__(self, t: float, x: Any = None) -> Any:
-        """The value at time t."""
-        return self.function(t)
-
-    def derivative(self) -> Any:
-        """The rate, as the object says it."""
-        found = self.function.derivative()
-        return of_time(found) if callable(found) else found
-
-
-def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function itself, or as f(t, x) one with ``derivative()`` that takes the time alone.
-
-    So does one of one argument, or whose second has a number by default, as the splines of SciPy have the order of a
-    derivative there.
-    """
-    from inspect import signature
-
-    if not callable(getattr(function, "derivative", None)):
-        return function
-    try:
-        taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
-    except (TypeError, ValueError):
-        return function
-    alone = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
-    return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function
 
 
 class TableRate(Tabulated):

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
 from ..texts import shown
-from .input_kinds import Expressed, Tabulated
+from .input_kinds import Expressed, Tabulated, of_time
 from .input_texts import is_formula, read_formula
 from .layout import Layout
 from .near_names import check_names, require_mapping, require_time_and_state, unknown
@@ -215,10 +215,7 @@ class Forcing:
         if isinstance(value, Signal):
             return value
         if callable(value):
-            if callable(getattr(value, "derivative", None)):
-                from .signal_rates import of_time
-
-                value = of_time(value)
+            value = of_time(value)
             require_time_and_state(f"input {name}: its function", value)
             return value
         if is_formula(value):
