@@ -59,8 +59,8 @@ def carry_slim(package: Mapping[str, str]) -> dict[str, str]:
     selection = Selection(carry(package) | own, LEFT_OUT)
     for name in own:
         selection.begin(name.removesuffix(".py"))
-    for one in [one for source in typed for one in source.imports.values() if one.home]:
-        selection.reach(one.home, one.name)
+    for one in (one for source in typed for one in source.imports.values()):
+        selection.reach(one.home or "", one.name)
     for name in CALLS:
         selection.reach(f"simulation/{name}", name)
     selection.follow(PUBLIC)

@@ -236,9 +236,10 @@ class Trajectory:
         UsageError
             The trajectory was read from a file, without the model.
         """
-        if not hasattr(self._columns, "change_points"):
+        columns: Any = self._columns
+        if not hasattr(type(columns), "change_points"):
             raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
-        found: list[ChangePoint] = self._columns.change_points
+        found: list[ChangePoint] = columns.change_points
         return found
 
     @property
