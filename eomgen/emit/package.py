@@ -120,7 +120,7 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
     doc = str(metadata.get("doc") or "").strip()
     q = list(metadata.get("q_reference") or [0.0] * program.sizes.n_q)
     calls, methods = describe_calls(program), SLIM_METHODS if slim else METHODS
-    attributes = [*(name for name, _ in ANNOTATED), *methods]
+    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else ("minimal",)
     return {
         "name": program.name,
         "slim": slim,
@@ -133,7 +133,7 @@ def _context(program: Program, slim: bool) -> dict[str, Any]:
         "layouts": describe_layouts(program),
         "calls": [call for call in calls if not slim or call.text.partition("(")[0] in attributes],
         "attributes": attributes,
-        "listed": fill(", ".join(json.dumps(name) for name in attributes), 110).splitlines(),
+        "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
         "methods": methods,
         "p_values": _numbers(metadata.get("p_values")),
