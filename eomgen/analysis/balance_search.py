@@ -53,7 +53,7 @@ def find_balance(search: Search, q: Array) -> tuple[Point, int]:
 
 def _failure(search: Search, point: Point) -> EquilibriumError:
     here, layout = point.here, search.layout
-    names = [layout.freedoms[k] for k in here.velocities]
+    names = [layout.velocity_labels[k] for k in here.velocities]
     left = dict(zip(names, here.forces.tolist(), strict=True))
     where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
     head = f"no equilibrium of {layout.name!r} found from this guess: "
@@ -61,8 +61,8 @@ def _failure(search: Search, point: Point) -> EquilibriumError:
     if rates.size and rates.max() > MOVING:
         worst = int(here.surplus[rates.argmax()])
         return EquilibriumError(
-            f"{head}nonholonomic constraints move {layout.freedoms[worst]} at a rate of {here.v[worst]:.6g} even "
-            f"where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
+            f"{head}nonholonomic constraints move {layout.velocity_labels[worst]} at a rate of {here.v[worst]:.6g} "
+            f"even where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
             "side vanish somewhere",
             left,
         )

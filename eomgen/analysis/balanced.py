@@ -94,7 +94,7 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
     found: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
         "unknowns": dict(zip(search.names, unknowns.tolist(), strict=True)),
-        "forces": {layout.freedoms[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
+        "forces": {layout.velocity_labels[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
         "supports": {},
         "linear": None,
         "steps": steps,

@@ -1,4 +1,4 @@
-"""Analysis: a walk past a singular position -> position, velocity and acceleration there, from both sides.
+"""Analysis: a continuation past a singular position -> position, velocity and acceleration there, from both sides.
 
 At a singular position Newton's iteration fails and beside it digits are lost, though the branch that is followed runs
 through smoothly.  Hermite's polynomial through two good points on either side has both; its error falls with the
@@ -14,29 +14,29 @@ import numpy as np
 from ..limits.motions import ASTRAY
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales
-from .path_following import Point, Walk
+from .path_following import Continuation, Point
 
-REACH = 0.05  #: scaled motion from the middle of a bridge to its inner piers
+REACH = 0.05  #: scaled motion from the middle of an interpolant to its inner supports
 
 
-class Bridge:
-    """A polynomial through points of a walk.
+class ChangePointInterpolant:
+    """A polynomial through points of a continuation.
 
     Parameters
     ----------
-    piers : sequence of Point
+    supports : sequence of Point
         In order of s.
     scales : Scales
     """
 
-    def __init__(self, piers: Sequence[Point], scales: Scales) -> None:
-        self.piers, self.scales = piers, scales
-        self.nodes = np.repeat([p.s for p in piers], 2)
-        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in piers])
-        self.coefficients = divided(self.nodes, np.repeat([p.q for p in piers], 2, axis=0), slopes)
+    def __init__(self, supports: Sequence[Point], scales: Scales) -> None:
+        self.supports, self.scales = supports, scales
+        self.nodes = np.repeat([p.s for p in supports], 2)
+        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in supports])
+        self.coefficients = divided(self.nodes, np.repeat([p.q for p in supports], 2, axis=0), slopes)
 
     def covers(self, s: float) -> bool:
-        """Whether s lies between the outer piers."""
+        """Whether s lies between the outer supports."""
         return bool(self.nodes[0] <= s <= self.nodes[-1])
 
     def at(self, s: float) -> tuple[Array, Array, Array]:
@@ -74,38 +74,40 @@ def newton(nodes: Array, coefficients: Array, s: float) -> tuple[Array, Array, A
     return value, first, second
 
 
-def build_bridge(walk: Walk, before: Point, after: Point, middle: float) -> Bridge | None:
-    """A bridge over s = middle from good points about it; None where a side is missing.
+def build_interpolant(
+    continuation: Continuation, before: Point, after: Point, middle: float
+) -> ChangePointInterpolant | None:
+    """An interpolant over s = middle from good points about it; None where a side is missing.
 
     Parameters
     ----------
-    walk : Walk
+    continuation : Continuation
     before, after : Point
         Good points of one smooth branch, on either side of ``middle``.
     """
-    scales = walk.follower.scales
+    scales = continuation.driven.scales
     rate = max(largest(before.tangent.rate / scales.q), largest(after.tangent.rate / scales.q))
     if rate == 0.0 or not before.s < middle < after.s:
         return None
     reach = REACH / rate
-    rough = Bridge([before, after], scales)
-    piers = []
+    rough = ChangePointInterpolant([before, after], scales)
+    supports = []
     for part in (-2.0, -1.0, 1.0, 2.0):
         s = middle + part * reach
-        guess = rough.at(s)[0] if rough.covers(s) else _along(walk, rough, s)
-        found = None if guess is None else walk.solve(s, guess)
+        guess = rough.at(s)[0] if rough.covers(s) else _along(continuation, rough, s)
+        found = None if guess is None else continuation.solve(s, guess)
         if found is None:
             return None
-        piers.append(found)
-    bridge = Bridge(piers, scales)
+        supports.append(found)
+    interpolant = ChangePointInterpolant(supports, scales)
     for near in (before, after):  # one branch, or several?
-        if bridge.covers(near.s) and largest(scales.distance(bridge.at(near.s)[0], near.q)) > ASTRAY:
+        if interpolant.covers(near.s) and largest(scales.distance(interpolant.at(near.s)[0], near.q)) > ASTRAY:
             return None
-    return bridge
+    return interpolant
 
 
-def _along(walk: Walk, rough: Bridge, s: float) -> Array | None:
-    """A guess outside a rough bridge, from the nearest points of the walk or on from an end."""
-    scales = walk.follower.scales
-    near = min((*walk.points, *rough.piers), key=lambda p: abs(p.s - s))
+def _along(continuation: Continuation, rough: ChangePointInterpolant, s: float) -> Array | None:
+    """A guess outside a rough interpolant, from the nearest points of the continuation or on from an end."""
+    scales = continuation.driven.scales
+    near = min((*continuation.points, *rough.supports), key=lambda p: abs(p.s - s))
     return scales.move(near.q, near.tangent.rate * (s - near.s) / scales.q)

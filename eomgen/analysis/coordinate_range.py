@@ -13,11 +13,11 @@ from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number, read_numbers
 from ..texts import shown
-from .driven_coordinates import Follower
-from .followed_path import Track
+from .driven_coordinates import DrivenCoordinates
+from .followed_path import FollowedPath
 from .kinematic import complete, start_from
 from .open_joint import describe_gap
-from .path_following import Path
+from .path_following import StraightPath
 from .singular import Singular
 
 if TYPE_CHECKING:
@@ -115,11 +115,11 @@ def _walk_both_ways(
     if start_t != t:
         q = start_from(module, q, t)[1]
     names = complete(module, q, t, () if name == "t" else (name,))
-    follower = Follower(module, names)
-    y = follower.led_values(q, t)
+    driven = DrivenCoordinates(module, names)
+    y = driven.led_values(q, t)
     k = names.index(name) if name in names else -1
     here = t if name == "t" else float(y[k])
-    turns = name != "t" and follower.led_scales[k] == 1.0 and not _is_length(module, name)
+    turns = name != "t" and driven.led_scales[k] == 1.0 and not _is_length(module, name)
     reach = 2 * np.pi if turns else FAR * (1.0 if name == "t" else layout.length)
     low, high = here - reach, here + reach
     if within is not None:
@@ -135,16 +135,16 @@ def _walk_both_ways(
         y1 = np.zeros(len(y))
         if k >= 0:
             y1[k] = sign
-        path = Path(t, y, sign if name == "t" else 0.0, y1)
-        track = Track(follower, path, q, abs(bound - here))
-        singular += track.singular
+        path = StraightPath(t, y, sign if name == "t" else 0.0, y1)
+        followed = FollowedPath(driven, path, q, abs(bound - here))
+        singular += followed.singular
         gap = ""
-        if track.stop is not None:
-            beyond = track.reached + BEYOND * (1.0 if name == "t" else float(follower.led_scales[k]))
-            gap = describe_gap(follower, *path.at(beyond), track.stop.q)
-        whole = within is None and track.stop is None
-        limit = sign * np.inf if whole else here + sign * track.reached
-        found.append((float(limit), track.stop, gap))
+        if followed.stop is not None:
+            beyond = followed.reached + BEYOND * (1.0 if name == "t" else float(driven.led_scales[k]))
+            gap = describe_gap(driven, *path.at(beyond), followed.stop.q)
+        whole = within is None and followed.stop is None
+        limit = sign * np.inf if whole else here + sign * followed.reached
+        found.append((float(limit), followed.stop, gap))
         if turns and whole:
             found.append((-np.inf, None, ""))
             break

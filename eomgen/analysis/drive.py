@@ -198,8 +198,8 @@ def _check_inputs(
 
 def _size(layout: Layout, name: str) -> float:
     """What a force is multiplied by before forces of different kinds are compared: a length of the model for N."""
-    if name in layout.freedoms:
-        return float(layout.scales.q[layout.freedoms.index(name)])
+    if name in layout.velocity_labels:
+        return float(layout.scales.q[layout.velocity_labels.index(name)])
     return float(layout.loop_scales[layout.loops.index(name)]) if name in layout.loops else 1.0
 
 
@@ -211,9 +211,9 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     UsageError
     """
     if actuated is None:
-        return tuple(layout.freedoms[i] for i in layout.independent)
+        return tuple(layout.velocity_labels[i] for i in layout.independent)
     names = read_names("actuated", actuated)
-    allowed = [*layout.freedoms, *layout.loops, *layout.u]
+    allowed = [*layout.velocity_labels, *layout.loops, *layout.u]
     for name in names:
         if name not in allowed:
             near = get_close_matches(name, allowed, 1)
@@ -248,7 +248,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
     count = free.shape[1]
     if a is None or isinstance(a, Mapping):
         given: Mapping[str, Any] = {} if a is None else a
-        rows = {layout.freedoms[i]: int(i) for i in layout.independent}
+        rows = {layout.velocity_labels[i]: int(i) for i in layout.independent}
         keys = rows | {layout.a[i]: i for i in rows.values()}
         for name in given:
             if name not in keys:
@@ -299,8 +299,8 @@ def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
     S, base = np.zeros((layout.n_v, len(names), count)), np.zeros(len(names))
     loops = None
     for i, name in enumerate(names):
-        if name in layout.freedoms:
-            S[layout.freedoms.index(name), i] = 1.0
+        if name in layout.velocity_labels:
+            S[layout.velocity_labels.index(name), i] = 1.0
         elif name in layout.loops:
             if loops is None:
                 loops = states.evaluate(module.kernels.state("loop_coordinate_jacobian"), states.q)
@@ -331,13 +331,13 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     U, sizes, _ = algebra.svd(A)
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), TINY)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
-    moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
+    moved = [layout.velocity_labels[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
     need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"
     where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
     return (
         f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
         f"{', '.join(moved[:4])}; {need} as many drives, "
-        f"such as {', '.join(layout.freedoms[i] for i in layout.independent)}"
+        f"such as {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
     )
 
 
@@ -346,7 +346,7 @@ def _with_drives(states: States, names: Sequence[str], a: Array, multipliers: Ar
     from .reactions import find_reactions
 
     module, layout = states.module, states.module.layout
-    inputs = [i for i, name in enumerate(names) if name in layout.u and name not in layout.freedoms]
+    inputs = [i for i, name in enumerate(names) if name in layout.u and name not in layout.velocity_labels]
     loops = [i for i, name in enumerate(names) if name in layout.loops]
     cut = {layout.loops.index(names[i]): forces[i] for i in loops}
     if not inputs:

@@ -36,7 +36,7 @@ class Tangent(NamedTuple):
     rows: Array  #: (n_c + k,) rows of K that hold that motion least
 
 
-class Follower:
+class DrivenCoordinates:
     """Solves for the motion of a module that is led by some of its coordinates.
 
     Parameters
@@ -58,7 +58,7 @@ class Follower:
         self._kinematics = kernels.state("kinematics", nan=True) if known else None
         self._loops = kernels.motion("loop_coordinates") if layout.n_k else None
         self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
-        chosen = [layout.freedoms[i] for i in layout.independent]
+        chosen = [layout.velocity_labels[i] for i in layout.independent]
         #: whether the compiled kernel leads the same coordinates
         self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)
         self.in_tree = [name in layout.q for name in led]

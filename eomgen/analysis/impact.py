@@ -240,8 +240,8 @@ def _locks(states: States, names: Sequence[str]) -> Array:
     layout = states.module.layout
     rows = np.zeros((len(names), layout.n_v))
     for i, name in enumerate(names):
-        if name in layout.freedoms:
-            rows[i, layout.freedoms.index(name)] = 1.0
+        if name in layout.velocity_labels:
+            rows[i, layout.velocity_labels.index(name)] = 1.0
         else:
             every = states.evaluate(states.module.kernels.state("loop_coordinate_jacobian"), states.q)
             rows[i] = every[layout.loops.index(name), :, 0]

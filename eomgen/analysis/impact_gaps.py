@@ -82,7 +82,7 @@ class Gaps:
         q, v = np.ascontiguousarray(x[: layout.n_q]), np.ascontiguousarray(x[layout.n_q :])
         rows = np.zeros((len(self.names), layout.n_v))
         for i, _ in self.tree:
-            rows[i, layout.freedoms.index(self.names[i])] = 1.0
+            rows[i, layout.velocity_labels.index(self.names[i])] = 1.0
         if self.loops:
             every = self.module.kernels.state("loop_coordinate_jacobian")(q, t=t, u=u)
             for i, j in self.loops:
@@ -191,7 +191,7 @@ def check_gaps(
         raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
     if layout.given_rates:
         raise UsageError("impacts need q' = v; the rates of this model's coordinates are given")
-    coordinates = [*layout.freedoms, *layout.loops]
+    coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
     for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
         for name in names:

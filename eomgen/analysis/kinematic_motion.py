@@ -14,7 +14,7 @@ from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
 from ..runtime.trajectory import Residuals, Trajectory
-from .driven_coordinates import Follower
+from .driven_coordinates import DrivenCoordinates
 from .singular import Singular
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class KinematicAnalysis(Trajectory):
 
 
 def keep(
-    follower: Follower,
+    driven: DrivenCoordinates,
     t: Array,
     parts: Sequence[tuple[Array, Array, Array]],
     found: Sequence[Singular],
@@ -158,7 +158,7 @@ def keep(
 
     ``u`` (n_u, n_t) are inputs that vary; ``header`` has metadata that comes first, ``rest`` what a Trajectory takes.
     """
-    module = follower.module
+    module = driven.module
     q, v, a = (np.concatenate([part[i] for part in parts], axis=1) for i in range(3))
     x = np.concatenate([q, v])
     if u is None:

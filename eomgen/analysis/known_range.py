@@ -7,7 +7,7 @@ import numpy as np
 from ..numeric.scales import Array
 
 
-class Ground:
+class KnownRange:
     """What of a range to and fro on one line was walked already.
 
     Parameters

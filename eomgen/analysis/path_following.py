@@ -1,4 +1,4 @@
-"""Analysis: a Follower and a path (t, y)(s) -> closed positions along it, without ever leaving the branch.
+"""Analysis: driven coordinates and a path (t, y)(s) -> closed positions along it, without ever leaving the branch.
 
 Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
 and 6).  A step counts only if position and direction come out near to what the points before foretold: near a singular
@@ -15,26 +15,26 @@ import numpy as np
 from ..limits.motions import BLOCKED, LEAPS, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .driven_coordinates import Follower, Tangent
+from .driven_coordinates import DrivenCoordinates, Tangent
 
 FIRST = 0.1  #: scaled motion in the first step
 LONG = 0.35  #: scaled motion aimed at in one step
 JUMP = 0.5  #: largest scaled motion in one step
 OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction
-FEWEST = 50  #: steps of a walk
-STEPS = 200_000  #: of one walk
+FEWEST = 50  #: steps of a continuation
+STEPS = 200_000  #: of one continuation
 
 
 class Point(NamedTuple):
-    """One point of a walk; s is the path's parameter."""
+    """One point of a continuation; s is the path's parameter."""
 
     s: float
     q: Array
     tangent: Tangent  #: along s
 
 
-class Path(NamedTuple):
+class StraightPath(NamedTuple):
     """A straight path: t and the led values are linear in s."""
 
     t: float
@@ -47,13 +47,13 @@ class Path(NamedTuple):
         return self.t + s * self.t1, self.y + s * self.y1
 
 
-class Walk:
+class Continuation:
     """Walks along one straight path.
 
     Parameters
     ----------
-    follower : Follower
-    path : Path
+    driven : DrivenCoordinates
+    path : StraightPath
     start : (n_q,) array
         Closed position at s = 0.
     extent : float, optional
@@ -61,24 +61,24 @@ class Walk:
         steps than one way over all of it.
     """
 
-    def __init__(self, follower: Follower, path: Path, start: Array, extent: float = 0.0) -> None:
-        self.follower, self.path, self.extent = follower, path, extent
+    def __init__(self, driven: DrivenCoordinates, path: StraightPath, start: Array, extent: float = 0.0) -> None:
+        self.driven, self.path, self.extent = driven, path, extent
         self.points = [Point(0.0, start, self.tangent(0.0, start))]
         self.leaps: list[tuple[Point, Point]] = []
-        rate = largest(self.points[0].tangent.rate / follower.scales.q)
+        rate = largest(self.points[0].tangent.rate / driven.scales.q)
         self.step = FIRST / rate if rate > 0.0 else 1.0
 
     def tangent(self, s: float, q: Array) -> Tangent:
         """The direction at a position of the path."""
-        return self.follower.tangent(self.path.at(s)[0], q, self.path.t1, self.path.y1)
+        return self.driven.tangent(self.path.at(s)[0], q, self.path.t1, self.path.y1)
 
     def solve(self, s: float, guess: Array) -> Point | None:
         """The point next to a guess."""
-        q = self.follower.position(*self.path.at(s), guess)
+        q = self.driven.position(*self.path.at(s), guess)
         return None if q is None else Point(s, q, self.tangent(s, q))
 
     def to(self, end: float, known: float = 0.0) -> bool:
-        """Walk on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
 
         Up to s = ``known`` the way was walked before and is smooth, so that only the motion limits the steps.
         """
@@ -89,7 +89,7 @@ class Walk:
                 return True
             # however still it stands: a pulse must not be stepped over
             longest = max(end / FEWEST, self.extent / FEWEST, known - here.s)
-            rate = largest(here.tangent.rate / self.follower.scales.q)
+            rate = largest(here.tangent.rate / self.driven.scales.q)
             self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
             h = left if self.step >= left else min(self.step, 0.5 * left)
             found = self.forward(here, h, end if h == left else here.s + h)
@@ -107,7 +107,7 @@ class Walk:
 
     def forward(self, here: Point, h: float, s: float) -> Point | None:
         """One step, None if it fails or is not a smooth continuation."""
-        scales = self.follower.scales
+        scales = self.driven.scales
         bend = self._bend(here)
         ahead = self._predict(here, bend, h)
         if largest(scales.distance(ahead, here.q)) > JUMP:
@@ -133,12 +133,12 @@ class Walk:
         return (here.tangent.rate - before.tangent.rate) / (here.s - before.s)
 
     def _predict(self, here: Point, bend: Array, h: float) -> Array:
-        scales = self.follower.scales
+        scales = self.driven.scales
         return scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / scales.q)
 
     def leap(self, here: Point) -> Point | None:
         """A point behind a singular position that continues the motion smoothly; None if there is none."""
-        scales = self.follower.scales
+        scales = self.driven.scales
         for size in LEAPS:
             near = self._behind(here, size)
             if near is None:
@@ -163,7 +163,7 @@ class Walk:
 
     def _behind(self, here: Point, size: float) -> Point | None:
         """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
-        scales = self.follower.scales
+        scales = self.driven.scales
         for point in reversed(self.points):
             distance = largest(scales.distance(here.q, point.q))
             if distance >= size:

@@ -36,7 +36,7 @@ class Tangent(NamedTuple):
 
 def displacement_names(layout: Layout) -> tuple[str, ...]:
     """What the displacement of each velocity is called: its coordinate, or ``<joint>_rx`` for an angular velocity."""
-    return tuple(f"{n[:-2]}r{n[-1]}" if n == layout.v[k] else n for k, n in enumerate(layout.freedoms))
+    return tuple(f"{n[:-2]}r{n[-1]}" if n == layout.v[k] else n for k, n in enumerate(layout.velocity_labels))
 
 
 def find_tangent(
@@ -82,12 +82,12 @@ def find_tangent(
 
 def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     """Indices of n_dof velocities from their names or those of their coordinates."""
-    allowed = dict.fromkeys((*layout.freedoms, *layout.v))
+    allowed = dict.fromkeys((*layout.velocity_labels, *layout.v))
     chosen, names = [], read_names("independent", names)
     for name in names:
         if name not in allowed:
             raise unknown("coordinate of the tree", name, allowed)
-        chosen.append((layout.freedoms if name in layout.freedoms else layout.v).index(name))
+        chosen.append((layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name))
     if len(set(chosen)) != layout.n_dof or len(chosen) != layout.n_dof:
         raise UsageError(f"independent must name {layout.n_dof} different coordinates, not {', '.join(names)}")
     return np.array(chosen, dtype=np.intp)
@@ -118,7 +118,7 @@ def displacement_rates(layout: Layout, x: Array, rates: Array, displacements: Ar
     if space is None:
         return rates
     result = space.velocities(x[: layout.n_q], rates)
-    for _, j in space.balls:
+    for _, j in space.quaternion_slots:
         w = x[layout.n_q + j : layout.n_q + j + 3]
         result[j : j + 3] += 0.5 * np.cross(displacements[j : j + 3], w, axisa=0, axisb=0, axisc=0)
     return result

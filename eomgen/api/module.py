@@ -5,6 +5,7 @@ Analyses and runs call each other's functions: a subclass that overrides a metho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from importlib import import_module
 from types import MethodType
@@ -41,8 +42,8 @@ if TYPE_CHECKING:
     from ..simulation.steppers import step as _step
     from ..verification.verify import verify as _verify
 
-#: Method -> where the function is, whose first argument is the model; method and function are of one name.
-CALLS = {
+#: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
+CALLS: dict[str, str | Callable[..., Any]] = {
     "simulate": "simulation.simulate",
     "simulate_many": "ensembles.simulate_many",
     "integrator": "simulation.integrator",
@@ -76,16 +77,22 @@ class Call:
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
         if self.function is None:
-            try:
-                part = import_module(f"..{CALLS[self.name]}", __package__)
-            except ModuleNotFoundError as error:
-                if str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
-                    raise left_out(self.name) from None
-                raise
-            self.function = getattr(part, self.name, None)
-            if self.function is None:
-                raise left_out(self.name)
+            self.function = self._find()
         return self.function if model is None else MethodType(self.function, model)
+
+    def _find(self) -> Any:
+        found = CALLS[self.name]
+        if callable(found):
+            return found
+        try:
+            function = getattr(import_module(f"..{found}", __package__), self.name, None)
+        except ModuleNotFoundError as error:
+            if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
+                raise  # something else that it needs
+            function = None
+        if function is None:
+            raise left_out(self.name)
+        return function
 
 
 class Module(BoundModel):
@@ -191,7 +198,12 @@ class Module(BoundModel):
             from ..simulation.steppers import find_solver
 
             return find_solver(self, name)
+        if name in CALLS:  # an analysis of a user's own
+            return Call(name).__get__(self, type(self))
         return find_lacking(self, "a Module", name)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *CALLS})
 
     def __repr__(self) -> str:
         from ..runtime.summary import line

@@ -177,7 +177,7 @@ def _count(text: str) -> int:
 def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
     if not asked:
         if module.n_dof:
-            free = ", ".join(module.layout.freedoms[i] for i in module.layout.independent)
+            free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)
             raise UsageError(f"give --range: {_left(module.n_dof)}, for example of {free}")
         asked = [("t", 0.0, float(module.metadata.get("simulation", {}).get("end") or 10.0), None)]
     names = [name for name, *_ in asked]

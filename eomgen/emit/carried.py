@@ -17,7 +17,7 @@ ALONE = ("errors", "kernel_table", "texts", "analysis", "api", "ensembles", "fil
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
-_TABLE = re.compile(r"^CALLS = \{\n((?:    .*\n)+)\}", re.M)
+_TABLE = re.compile(r"^CALLS\b.* = \{\n((?:    .*\n)+)\}", re.M)
 _ROW = re.compile(r'^    "\w+": "([\w.]+)",$', re.M)
 
 

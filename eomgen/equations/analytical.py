@@ -52,7 +52,7 @@ def generalized_forces(kinematics: Kinematics) -> list[Expr]:
             weights += load.torque
         for along in terms.coordinate_remainder:
             if along.coordinate in kinematics.names:
-                j = kinematics.freedoms.index(along.coordinate)
+                j = kinematics.velocity_labels.index(along.coordinate)
                 direct[j] = direct[j] + along.value
             else:
                 velocities.append(loop.rates[loop.names.index(along.coordinate)])

@@ -43,7 +43,7 @@ def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquatio
 
     1 where there is no degree of freedom.
     """
-    m, names = kinematics.mechanism, kinematics.freedoms
+    m, names = kinematics.mechanism, kinematics.velocity_labels
     n, r = len(names), mobility.rank
     if n == r or m.negative:
         return 1.0

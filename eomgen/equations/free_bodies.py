@@ -95,7 +95,7 @@ class FreeBodies:
             self.loads.append(sub(cross_wrench(twist, link.spatial.times(*twist)), applied))
         self.forces = [self.graph.zero] * len(kinematics.v)
         self.along_cut: dict[str, Expr] = {}
-        place = {name: j for j, name in enumerate(kinematics.freedoms)}
+        place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
         for load in (load for terms in kinematics.forces for load in terms.coordinate_loads):
             if load.coordinate in place:
                 self.forces[place[load.coordinate]] = self.forces[place[load.coordinate]] + load.value

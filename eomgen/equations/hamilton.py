@@ -57,17 +57,17 @@ def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
     return [
         (s.coordinates[0], s.armature)
         for s in joints
-        if s.armature is not None and s.coordinates[0] not in kinematics.freedoms
+        if s.armature is not None and s.coordinates[0] not in kinematics.velocity_labels
     ]
 
 
 def _turned(kinematics: Kinematics, slopes: Sequence[Expr], momenta: Sequence[Expr]) -> list[Expr]:
     """Slopes by q -> generalized forces: N^T slopes, less w x p of turned axes."""
-    if not kinematics.balls:
+    if not kinematics.quaternion_slots:
         return list(slopes)
     graph = kinematics.graph
     result = vjp(list(kinematics.rates), list(slopes), list(kinematics.v))
-    for _, j in kinematics.balls:
+    for _, j in kinematics.quaternion_slots:
         w, p = (vec.vector(graph, x[j : j + 3]) for x in (kinematics.v, momenta))
         result[j : j + 3] = vec.sub(vec.vector(graph, result[j : j + 3]), vec.cross(w, p))
     return result

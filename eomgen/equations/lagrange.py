@@ -25,9 +25,9 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
     slope = gradient(kinetic - potential, q)
-    if kinematics.balls:
+    if kinematics.quaternion_slots:
         slope = vjp(list(kinematics.rates), slope, v)
-    for _, j in kinematics.balls:
+    for _, j in kinematics.quaternion_slots:
         w, p = (vec.vector(graph, x[j : j + 3]) for x in (v, momentum))
         slope[j : j + 3] = vec.sub(vec.vector(graph, slope[j : j + 3]), vec.cross(w, p))
     applied = generalized_forces(kinematics)

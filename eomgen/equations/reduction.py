@@ -28,7 +28,7 @@ def reduce_to_independent(
         Numbers of the parameters, inputs and t, by which pivots are judged.
     """
     graph, n = kinematics.graph, len(kinematics.v)
-    free = [kinematics.freedoms.index(name) for name in mobility.independent]
+    free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
     bound = [j for j in range(n) if j not in free]
     if not bound:
         return equations.mass_matrix, tuple(-h for h in equations.bias)

@@ -95,9 +95,9 @@ def can_differentiate(kinematics: Kinematics) -> bool:
 
 
 def coordinate_places(kinematics: Kinematics) -> list[int]:
-    """Per velocity the coordinate whose rate it is, -1 for angular velocities of balls."""
-    turning = {k for ball in kinematics.balls for k in range(ball.velocity, ball.velocity + 3)}
-    parameters = {k for ball in kinematics.balls for k in range(ball.coordinate, ball.coordinate + 4)}
+    """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints."""
+    turning = {k for ball in kinematics.quaternion_slots for k in range(ball.velocity, ball.velocity + 3)}
+    parameters = {k for ball in kinematics.quaternion_slots for k in range(ball.coordinate, ball.coordinate + 4)}
     plain = iter([k for k in range(len(kinematics.q)) if k not in parameters])
     return [-1 if k in turning else next(plain) for k in range(len(kinematics.v))]
 
@@ -105,7 +105,7 @@ def coordinate_places(kinematics: Kinematics) -> list[int]:
 def _last(kinematics: Kinematics, link: Link) -> int:
     """One more than the last coordinate of the link's joint."""
     end = link.first + len(link.columns)
-    return end + sum(ball.velocity < end for ball in kinematics.balls)
+    return end + sum(ball.velocity < end for ball in kinematics.quaternion_slots)
 
 
 class ForceSlopes:
@@ -340,10 +340,10 @@ class ForceSlopes:
         return along + vec.dot(swept[1], exerted.wrench[1])
 
     def _by_coordinates(self, slopes: Entries) -> Entries:
-        """Derivatives by the angles of balls as derivatives by Euler parameters: d(angles)/de = 4 N^T / e^2."""
+        """Derivatives by angles of spherical joints as those by Euler parameters: d(angles)/de = 4 N^T / e^2."""
         kinematics = self._kinematics
         found = {(i, self._places[j]): value for (i, j), value in slopes.items() if self._places[j] >= 0}
-        for ball in kinematics.balls:
+        for ball in kinematics.quaternion_slots:
             e = kinematics.q[ball.coordinate : ball.coordinate + 4]
             rates = list(kinematics.rates[ball.coordinate : ball.coordinate + 4])
             N = jacobian(rates, kinematics.v[ball.velocity : ball.velocity + 3])

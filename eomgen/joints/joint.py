@@ -39,7 +39,7 @@ class Velocity(NamedTuple):
     of: int | None = None
 
 
-class Ball(NamedTuple):
+class QuaternionSlot(NamedTuple):
     """Euler parameters e0 .. e3 and the angular velocity that goes with them: numbers of their first entries."""
 
     coordinate: int
@@ -82,7 +82,7 @@ class Joint(ABC):
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
-    balls : where four of the coordinates are Euler parameters
+    quaternion_slots : where four of the coordinates are Euler parameters
     """
 
     type_name: ClassVar[str]
@@ -91,12 +91,12 @@ class Joint(ABC):
     counts_turns: ClassVar[bool] = False
     options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
-    balls: ClassVar[tuple[Ball, ...]] = ()
+    quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
 
     @property
     def velocities(self) -> tuple[Velocity, ...]:
         """The generalized velocities, in order: the rates of the coordinates, but for Euler parameters."""
-        turning = {ball.coordinate: ball for ball in self.balls}
+        turning = {ball.coordinate: ball for ball in self.quaternion_slots}
         found: list[Velocity] = []
         for k, coordinate in enumerate(self.coordinates):
             if k in turning:

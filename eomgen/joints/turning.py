@@ -11,7 +11,7 @@ from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .closure_conditions import along
-from .joint import SEQUENCE, Ball, Closure, Coordinate, Joint
+from .joint import SEQUENCE, Closure, Coordinate, Joint, QuaternionSlot
 from .rotation_coordinates import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
@@ -44,7 +44,7 @@ class Turning(Joint):
         if self.in_parameters:
             n = len(self.place)
             object.__setattr__(self, "coordinates", (*self.place, *PARAMETERS))
-            object.__setattr__(self, "balls", (Ball(n, n),))
+            object.__setattr__(self, "quaternion_slots", (QuaternionSlot(n, n),))
 
     @property
     def in_parameters(self) -> bool:

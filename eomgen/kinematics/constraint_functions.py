@@ -34,7 +34,7 @@ class ConstraintFunctions:
         c, loop = kinematics.constraints, kinematics.loop_coordinates
         self.n, self.m, self.k = len(kinematics.v), len(c.labels), len(loop.names)
         self.h = len(c.values)
-        space = Space.of(self.n, kinematics.balls)
+        space = Space.of(self.n, kinematics.quaternion_slots)
         self.neutral = np.zeros(len(kinematics.names)) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())

@@ -14,7 +14,7 @@ from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
 from ..graph.substitute import substitute, symbols_of
-from ..joints import Ball
+from ..joints import QuaternionSlot
 from ..records import dataclass
 from .constraint_equations import couple
 from .length import length_scale
@@ -71,7 +71,7 @@ class Kinematics:
     kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
     velocity_names: tuple[str, ...]
     velocity_kinds: tuple[str, ...]
-    balls: tuple[Ball, ...]  #: where Euler parameters stand in q, and their angular velocity in v
+    quaternion_slots: tuple[QuaternionSlot, ...]  #: where Euler parameters stand in q, and their angular velocity in v
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
@@ -115,7 +115,7 @@ class Kinematics:
         return clock(self.graph, self.mechanism.inputs)
 
     @cached_property
-    def freedoms(self) -> tuple[str, ...]:
+    def velocity_labels(self) -> tuple[str, ...]:
         """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
         if self.mechanism.given is not None:
             places = self.coordinate_of
@@ -174,7 +174,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
-    second = jvp(list(rates), state.along) if layout.balls or layout.given else a
+    second = jvp(list(rates), state.along) if layout.quaternion_slots or layout.given else a
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
     motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
@@ -190,7 +190,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         kinds=kinds,
         velocity_names=layout.velocity_names,
         velocity_kinds=layout.velocity_kinds,
-        balls=layout.balls,
+        quaternion_slots=layout.quaternion_slots,
         q=q,
         v=v,
         a=a,
@@ -214,7 +214,7 @@ def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker
     """Angular velocities that cut joints in Euler parameters would have as velocities."""
     found = {}
     for spec in (mechanism.joints[k] for k in topology.cut):
-        for ball in spec.joint.balls:
+        for ball in spec.joint.quaternion_slots:
             for axis, name in enumerate(spec.velocities[ball.velocity : ball.velocity + 3]):
                 found[name] = (spec.predecessor, spec.successor, axis)
     return found

@@ -106,7 +106,7 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     unit = {"length": kinematics.length_scale, "angle": graph.one}
     first: dict[Expr, Expr] = {}
     second: dict[Expr, Expr] = {}
-    real = {i for i, _ in kinematics.balls}
+    real = {i for i, _ in kinematics.quaternion_slots}
     for j, (symbol, name, kind) in enumerate(zip(kinematics.q, kinematics.names, kinematics.kinds, strict=True)):
         first[symbol] = known.get(name, graph.one if j in real else graph.zero)
         second[symbol] = first[symbol] + unit.get(kind, graph.one) * (0.3 + 0.07 * j)

@@ -120,7 +120,7 @@ def build_program(
         parameter_only=parameter_only,
         preferred=terms.preferred,
         parent=terms.parent,
-        balls=terms.balls,
+        quaternion_slots=terms.quaternion_slots,
         given_rates=terms.given_rates,
         coordinate_of=terms.coordinate_of,
         counts=counts,

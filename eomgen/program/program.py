@@ -133,7 +133,7 @@ class Program:
     preferred: tuple[int, ...]
     parent: tuple[int, ...]
     counts: Mapping[str, Operations]
-    balls: tuple[tuple[int, int], ...] = ()
+    quaternion_slots: tuple[tuple[int, int], ...] = ()
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)

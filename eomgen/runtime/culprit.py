@@ -44,7 +44,7 @@ def find_culprit(
             return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
         weights = np.abs(vectors[:, 0])
         moved = zip(layout.independent, weights, strict=True)
-        names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
+        names = [layout.velocity_labels[i] for i, w in moved if w > 0.1 * weights.max()]
         moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
         size = "negative" if values[0] < -SINGULAR else "no"
         return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
@@ -55,7 +55,7 @@ def find_culprit(
         worst = int(np.abs(layout.scales.residual(e)).argmax())
         return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
     if status == 4:
-        return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
+        return f"independent are {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
     return ""
 
 

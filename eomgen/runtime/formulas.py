@@ -86,7 +86,7 @@ class Formula(Expressed):
             It would need accelerations.
         """
         layout, graph = self.layout, self.expression.graph
-        moving = dict(zip(layout.freedoms, layout.v, strict=True))
+        moving = dict(zip(layout.velocity_labels, layout.v, strict=True))
         states = sorted(symbols_of([self.expression]) & set(layout.x))
         for state in states:
             if state not in layout.q or state not in moving:

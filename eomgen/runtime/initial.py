@@ -70,7 +70,7 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
                 wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
-                what = "angular velocity; give that" if layout.balls else "velocities; give those"
+                what = "angular velocity; give that" if layout.quaternion_slots else "velocities; give those"
                 raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates)
@@ -207,7 +207,7 @@ class Initial:
         layout = self.layout
         if not layout.n_h:
             return self.assembled(guess)
-        favoured = [layout.freedoms[i] for i in layout.independent]
+        favoured = [layout.velocity_labels[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
             try:
@@ -357,7 +357,9 @@ class Initial:
             else:
                 basis = added
                 kept[name] = value
-        whole = [layout.q[i : i + 4] for i, _ in layout.balls]  # Euler parameters are held together or not at all
+        whole = [
+            layout.q[i : i + 4] for i, _ in layout.quaternion_slots
+        ]  # Euler parameters are held together or not at all
         torn = {name for four in whole if not all(name in kept for name in four) for name in four}
         return {name: value for name, value in kept.items() if name not in torn}
 
@@ -368,7 +370,7 @@ class Initial:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
         if name in layout.q:
             index, unit = layout.q.index(name), np.eye(len(self.place.q))
-            if any(i < index < i + 4 for i, _ in layout.balls):
+            if any(i < index < i + 4 for i, _ in layout.quaternion_slots):
                 return []
             return [unit[k] for k in self.place.velocities([index])]
         index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)

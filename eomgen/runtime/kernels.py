@@ -82,7 +82,7 @@ class Kernels:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
             if layout.n_c == 0 and name == "project":
-                return Identity(layout.n_x, [i for i, _ in layout.balls])
+                return Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
         kernel: State = self._make(self.core.state, name, nan)
@@ -252,11 +252,11 @@ class Nothing:
 
 
 class Identity(Constant):
-    """The projection of a tree: nothing to do but for the length of Euler parameters, which start at ``balls``."""
+    """The projection of a tree: nothing to do but for the length of Euler parameters."""
 
-    def __init__(self, n_in: int, balls: Sequence[int] = ()) -> None:
+    def __init__(self, n_in: int, quaternion_slots: Sequence[int] = ()) -> None:
         super().__init__(np.zeros(n_in), n_in)
-        self.balls = balls
+        self.quaternion_slots = quaternion_slots
 
     def __call__(
         self,
@@ -268,7 +268,7 @@ class Identity(Constant):
     ) -> Array:
         """A copy of x."""
         result = _write(super().__call__(x, out=out), read_numbers("x", x))
-        for i in self.balls:
+        for i in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
 

@@ -27,7 +27,7 @@ def facts(module: BoundModel) -> list[tuple[str, str]]:
         ("coordinates", listed(layout.q)),
     ]
     if layout.n_c:
-        lines.append(("independent", listed([layout.freedoms[i] for i in layout.independent])))
+        lines.append(("independent", listed([layout.velocity_labels[i] for i in layout.independent])))
         lines.append(("cut joints", listed(data.get("loop_joint_names", ()))))
         redundant = [layout.constraint_labels[i] for i in data.get("redundant_rows", ())]
         rows = f"{layout.n_c}" + (f", redundant at the reference: {listed(redundant)}" if redundant else "")

@@ -116,7 +116,7 @@ class Path:
             )
 
     def _place(self, target: Array) -> str:
-        return place([self.layout.freedoms[i] for i in self.layout.independent], target).removeprefix(", ")
+        return place([self.layout.velocity_labels[i] for i in self.layout.independent], target).removeprefix(", ")
 
     def _blocked(self, target: Array, found: Array) -> EvaluationError:
         """Why the step to independent values failed."""

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.driven_coordinates import Follower
-from ..analysis.followed_path import Track
-from ..analysis.kinematic import complete, start_from, walk_in
+from ..analysis.driven_coordinates import DrivenCoordinates
+from ..analysis.followed_path import FollowedPath
+from ..analysis.kinematic import complete, follow_to_start, start_from
 from ..analysis.kinematic_motion import KinematicAnalysis, keep
 from ..analysis.open_joint import describe_gap
-from ..analysis.path_following import Path
+from ..analysis.path_following import StraightPath
 from ..analysis.roots import find_root
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
@@ -125,28 +125,28 @@ def simulate_driven(
         t0, q = start, module.x0(initial, t=start)[: module.n_q]
     else:
         t0, q = start_from(module, initial, start)
-    follower = Follower(module, complete(module, q, t0, ()))
-    q = walk_in(follower, q, (t0, nothing), (start, nothing))
+    driven = DrivenCoordinates(module, complete(module, q, t0, ()))
+    q = follow_to_start(driven, q, (t0, nothing), (start, nothing))
     sense = 1.0 if end >= start else -1.0
-    track = Track(follower, Path(start, nothing, sense, nothing), q, abs(end - start))
-    if track.stop is not None:
-        beyond = 0.9 * track.reached + 0.1 * track.end
-        gap = describe_gap(follower, *track.path.at(beyond), track.stop.q)
+    followed = FollowedPath(driven, StraightPath(start, nothing, sense, nothing), q, abs(end - start))
+    if followed.stop is not None:
+        beyond = 0.9 * followed.reached + 0.1 * followed.end
+        gap = describe_gap(driven, *followed.path.at(beyond), followed.stop.q)
         raise SimulationError(
-            f"the drivers cannot go on from t = {track.stop.t:.6g} s of {end:.6g} s: {track.stop}; {gap}; "
+            f"the drivers cannot go on from t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
             "change the drivers' values, or the dimensions"
         )
-    own = track.nodes[track.nodes <= track.end]
+    own = followed.nodes[followed.nodes <= followed.end]
     if t_eval is None:
         s = np.unique(
-            np.concatenate([own, np.linspace(0.0, track.end, FEWEST)]) if len(own) < FEWEST else [*own, track.end]
+            np.concatenate([own, np.linspace(0.0, followed.end, FEWEST)]) if len(own) < FEWEST else [*own, followed.end]
         )
         t = start + sense * s
     else:
         t = t_eval
         s = sense * (t - start)
-    run = _Run(track, forcing, start, sense)
-    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [track.end]])))
+    run = _Run(followed, forcing, start, sense)
+    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [followed.end]])))
     message, status = ("A termination event occurred.", 1) if last is not None else ("The end was reached.", 0)
     if last is not None:
         kept = s < last
@@ -163,13 +163,13 @@ def simulate_driven(
 
 
 class _Run:
-    """Samples of one track as states."""
+    """Samples of one followed path as states."""
 
-    def __init__(self, track: Track, forcing: Forcing, start: float, sense: float) -> None:
-        self.track, self.forcing, self.start, self.sense = track, forcing, start, sense
+    def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float) -> None:
+        self.followed, self.forcing, self.start, self.sense = followed, forcing, start, sense
 
     def state(self, s: float) -> Array:
-        q, v, _ = self.track.motion(np.array([s]), None)
+        q, v, _ = self.followed.motion(np.array([s]), None)
         return np.concatenate([q[:, 0], v[:, 0]])
 
     def _value(self, event: Event, s: float) -> float:
@@ -179,7 +179,7 @@ class _Run:
         """Times and states of events, and where a terminal one ends the run."""
         found: list[list[float]] = [[] for _ in events]
         if events:
-            q, v, _ = self.track.motion(grid, None)
+            q, v, _ = self.followed.motion(grid, None)
             states = np.concatenate([q, v])
         last: float | None = None
         for event, places in zip(events, found, strict=True):
@@ -197,23 +197,23 @@ class _Run:
         kept = [np.array([s for s in places if last is None or s <= last]) for places in found]
         times = [self.start + self.sense * s for s in kept]
         states_at = [np.array([self.state(float(s)) for s in places]).reshape(len(places), -1).T for places in kept]
-        width = self.track.follower.layout.n_x
+        width = self.followed.driven.layout.n_x
         return times, [x if x.size else np.empty((width, 0)) for x in states_at], last
 
     def keep(
         self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
     ) -> KinematicAnalysis:
         """The trajectory at parameters s."""
-        motion = self.track.motion(s, None)
+        motion = self.followed.motion(s, None)
         sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
             times, self.sense * (times - self.start), [], [], header
         )
         u = self.forcing.sample(t, np.concatenate(motion[:2]))
         return keep(
-            self.track.follower,
+            self.followed.driven,
             t,
             [motion],
-            self.track.singular,
+            self.followed.singular,
             None,
             len(t),
             (),

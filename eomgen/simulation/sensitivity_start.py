@@ -83,7 +83,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
     declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
-    free = [layout.freedoms[i] for i in layout.independent] + list(layout.q)
+    free = [layout.velocity_labels[i] for i in layout.independent] + list(layout.q)
     rates = [layout.v[i] for i in layout.independent] + list(layout.v)
     for first, second, rest, positions in (
         (chosen.positions, declared.positions, [n for n in free if n in layout.q], True),

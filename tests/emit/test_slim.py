@@ -22,7 +22,7 @@ from eomgen.generation import generate
 
 ROOT = Path(eg.__file__).parent
 #: Lines of Python, blank ones, comments and stubs included, setup.py and the numpy target's own equations apart.
-MOST = {"cython": 5450, "numpy": 7050}
+MOST = {"cython": 5470, "numpy": 7050}
 
 
 def bouncing() -> eg.Model:
