@@ -127,6 +127,10 @@ class Events:
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
+        if any(event.action == WAIT for event in self.model):  # here, so that a slim package refuses before the run
+            from ..analysis.impact import strike_events
+
+            self._strike = strike_events
 
     def __len__(self) -> int:
         return len(self.names)
@@ -184,9 +188,7 @@ class Events:
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
-            from ..analysis.impact import strike_events
-
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+            after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:

@@ -308,3 +308,32 @@ def test_the_command_line(tmp_path: Path) -> None:
     with pytest.raises(SystemExit):
         main([*arguments, "--slim"])
     assert not (tmp_path / "pendulum" / "analysis" / "equilibrium.py").exists()
+
+
+def struck() -> eg.Model:
+    """A mass that impacts, by the law of restitution."""
+    m = eg.Model("struck")
+    m.prismatic("J", m.ground, m.body("b", mass=1.0), axis="x", coordinate="s")
+    m.event("wall", "s + 0.5", restitution=0.5)
+    return m
+
+
+BEFORE = """
+import importlib, json, sys
+sys.modules["eomgen"] = sys.modules["sympy"] = None
+package = importlib.import_module(json.load(sys.stdin))
+assert package.rhs(0.0, package.x0()).shape == (package.n_x,)
+try:
+    package.simulate((0.0, 1e-9))
+except package.EomgenError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("build", "what"),
+    [(struck, "events with impacts"), (lambda: models.build("driven_slider_crank"), "mechanisms that drivers move")],
+)
+def test_a_run_that_it_cannot_end_does_not_begin(build: Any, what: str, tmp_path: Path) -> None:
+    folder = generate(build(), tmp_path, target="numpy", slim=True)
+    assert f"generate it without --slim for {what}" in run_alone(tmp_path, BEFORE, folder.name)
