@@ -12,6 +12,21 @@ from collections.abc import Collection, Iterable, Mapping
 from .uses import Import, Source, Uses
 
 
+class Sources(dict[str, Source]):
+    """Files without their endings, each read when it is first needed."""
+
+    def __init__(self, texts: Mapping[str, str]) -> None:
+        super().__init__()
+        self.texts = {name.removesuffix(".py"): text for name, text in texts.items()}
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.texts
+
+    def __missing__(self, name: str) -> Source:
+        self[name] = found = Source(name, self.texts[name])
+        return found
+
+
 class Selection:
     """What is reached.
 
@@ -36,9 +51,7 @@ class Selection:
     """
 
     def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
-        self.sources = {
-            name.removesuffix(".py"): Source(name.removesuffix(".py"), text) for name, text in texts.items()
-        }
+        self.sources = Sources(texts)
         self.left_out = left_out
         self.files: set[str] = set()
         self.kept: set[tuple[str, str]] = set()
