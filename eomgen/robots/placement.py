@@ -9,6 +9,7 @@ import numpy as np
 
 from ..limits.rounding import QUARTER
 from ..records import dataclass
+from ..rotations.scalars import cosine_and_sine, matrix_from_roll_pitch_yaw
 
 Numbers = Sequence[float]
 
@@ -66,19 +67,7 @@ def placed(position: Numbers, rpy: Numbers, snap: float) -> Placement:
 
     Angles within ``snap`` (rad) of a multiple of pi/2 are taken as that multiple, whose cosine and sine are exact.
     """
-    (cr, sr), (cp, sp), (cy, sy) = (cosine_and_sine(angle, snap) for angle in rpy)
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return Placement(about_z @ about_y @ about_x, np.array(position, dtype=float))
-
-
-def cosine_and_sine(angle: float, snap: float) -> tuple[float, float]:
-    """cos and sin, exact 0 and +-1 within ``snap`` of a multiple of pi/2."""
-    quarter = round(angle / (math.pi / 2))
-    if abs(angle - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
-        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return math.cos(angle), math.sin(angle)
+    return Placement(np.array(matrix_from_roll_pitch_yaw(rpy, snap)), np.array(position, dtype=float))
 
 
 def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
@@ -90,7 +79,7 @@ def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
     across = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], across)
     yaw = math.atan2(R[1, 0], R[0, 0]) if across > 0 else 0.0
-    c, s = cosine_and_sine(yaw, 0.0)
+    c, s = cosine_and_sine(yaw)
     roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
     return np.array([roll, pitch, yaw])
 
@@ -116,7 +105,7 @@ def about(axis: Numbers, angle: float) -> np.ndarray:
         return np.eye(3)
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    c, s = cosine_and_sine(angle, 0.0)
+    c, s = cosine_and_sine(angle)
     turned: np.ndarray = np.eye(3) + s * K + (1 - c) * (K @ K)
     return turned
 
