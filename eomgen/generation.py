@@ -10,7 +10,7 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
-from .files.paths import as_path
+from .files.path_names import as_path
 from .pipeline import build, derive
 from .verification.record import record
 from .verification.recorded import FILE

@@ -179,7 +179,7 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
     """The functions to generate for a target."""
     from .describe.digest import model_digest
     from .program import Limits
-    from .program.build import build_program
+    from .program.build_program import build_program
     from .program.collect import collect_metadata, collect_terms
 
     if target not in TARGETS:

@@ -18,7 +18,7 @@ from .description import items, place_of
 from .fields import KINDS, POINT, SOLID, SOLID_KEYS, solid_fields
 from .names import nearest
 from .placement import TURNS, turn_matrix
-from .reading import Reader
+from .values import Reader
 
 
 def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[MassProperties]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
-from ..graph.rounding import is_rounding, with_bounds
+from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..operations import CONDITION, operations_with

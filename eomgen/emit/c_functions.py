@@ -1,6 +1,6 @@
 """Stage emit: the functions a program calls -> C files of their own: tables as constants, native sources as they are.
 
-The arithmetic is that of :mod:`eomgen.numeric.functions`.  Everything is re-entrant: tables are constant.
+The arithmetic is that of :mod:`eomgen.numeric.user_functions`.  Everything is re-entrant: tables are constant.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import UsageError
 from ..graph.functions import Function
 from ..graph.traverse import reachable
-from ..numeric.functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
+from ..numeric.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from ..program import Program
 from .sources import render
 

@@ -35,7 +35,7 @@ def series_files(program: Program) -> dict[str, str]:
     """
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")
-    printer = _Printer(series, references(program, block.inputs))
+    printer = _SeriesPrinter(series, references(program, block.inputs))
     used = sorted({t.kind for t in series.terms} & OPERATIONS.keys())
     context = {
         "name": program.name,
@@ -71,7 +71,7 @@ class _Factor(NamedTuple):
         return _Factor(self.number * other.number, tuple(sorted(self.names + other.names)))
 
 
-class _Printer:
+class _SeriesPrinter:
     """Statements of the order 0 and of order k; ``a3`` is the value of term 3, ``b3`` its coefficient of order k."""
 
     def __init__(self, series: Series, texts: dict[int, str]) -> None:

@@ -16,7 +16,7 @@ from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operation
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
 from .c_functions import each_lane, each_name
-from .straight import Piece, Pieces, cut, references
+from .straight import Pieces, PrintedFunction, cut, references
 
 SIGNATURE = (
     "real t, const real *restrict x, const real *restrict u,\n"
@@ -33,7 +33,7 @@ def literal(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-class _Printer:
+class _CPrinter:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str]) -> None:
@@ -68,20 +68,20 @@ class _Printer:
             return [self.operand(k) for k in node[1:]]
         return [self.real(k) for k in node[1:]]
 
-    def condition(self, i: int, piece: Piece) -> str:
+    def condition(self, i: int, piece: PrintedFunction) -> str:
         if i in piece.inlined:
             node = self._nodes[i]
             return OPERATIONS[node[0]].c.format(*self.operands(node))
         return f"({self.real(i)} != 0.0)"
 
-    def failed(self, i: int, piece: Piece | None) -> str:
+    def failed(self, i: int, piece: PrintedFunction | None) -> str:
         """The text of a check that is not passed; NaN passes, and is found in the result."""
         node = self._nodes[i]
         if piece is not None and i in piece.inlined and node[0] == "lt":
             return "{} >= {}".format(*self.operands(node))
         return f"{self.real(i)} <= 0.0"
 
-    def _value(self, i: int, piece: Piece) -> str:
+    def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
         kind = node[0]
         if kind in self._calls:
@@ -95,7 +95,7 @@ class _Printer:
         text = row.c.format(*self.operands(node))
         return f"choose({text}, same(1.0), same(0.0))" if row.kind == CONDITION else text
 
-    def lines(self, piece: Piece) -> list[str]:
+    def lines(self, piece: PrintedFunction) -> list[str]:
         result: list[str] = []
         loaded: set[int] = set()
         angles = gather_angles(self._graph, piece)
@@ -113,7 +113,7 @@ class _Printer:
                 self._statement(i, piece, loaded, result)
         return result
 
-    def _statement(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         if i not in piece.inlined:
             self._load(i, piece, loaded, result)
             result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
@@ -128,7 +128,7 @@ class _Printer:
             self.used.add("w")
             result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
 
-    def _load(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _load(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read values of earlier pieces just before their first use."""
         for k in self._nodes[i][1:]:
             if k in piece.inlined:
@@ -136,7 +136,7 @@ class _Printer:
             else:
                 self._read(k, piece, loaded, result)
 
-    def _read(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _read(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read a value of an earlier piece, if it is one."""
         if i in piece.loads and i not in loaded:
             loaded.add(i)
@@ -166,7 +166,7 @@ def print_block(program: Program, block: Block) -> Printed:
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
-    printer = _Printer(program, texts)
+    printer = _CPrinter(program, texts)
     main = _direct(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
@@ -184,7 +184,7 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
     return Printed(_function(f"static flag {name}", used, main), tuple(functions), pieces.work)
 
 
-def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
+def _direct(printer: _CPrinter, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
     texts = [(k, printer.real(i)) for k, i in pieces.direct]
     zeros = [k for k, text in texts if text == "same(0.0)"]

@@ -13,9 +13,9 @@ from ..layer import read_layer
 from ..program import Program
 from ..texts import summary_text
 from .c import emit_c
-from .calls import describe_calls
 from .layouts import describe_layouts
 from .numpy import emit_numpy
+from .python_calls import describe_calls
 from .sources import SourceSet, render
 
 #: Annotated attributes of the package, all of its default module.

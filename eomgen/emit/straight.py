@@ -16,7 +16,7 @@ from ..records import dataclass
 
 
 @dataclass(frozen=True)
-class Piece:
+class PrintedFunction:
     """A run of statements, printed as one function.
 
     Attributes
@@ -45,7 +45,7 @@ class Piece:
 class Pieces:
     """All of a block: its pieces, results that need no statement, and the work slots used."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PrintedFunction, ...]
     direct: tuple[tuple[int, int], ...]  #: (place in the result, id of a leaf or a hoisted value)
     checks: tuple[int, ...]  #: checks that are leaves or hoisted values
     work: int
@@ -83,7 +83,7 @@ def cut(
                 work += 1
             slots[i] = free.pop()
         pieces.append(
-            Piece(
+            PrintedFunction(
                 statements=c.statements,
                 loads={i: slots[i] for i in c.imports},
                 stores={i: slots[i] for i in c.exports},

@@ -21,13 +21,13 @@ from ..graph.spatial import Wrench, add, dot
 from ..graph.vectors import Mat3, Vec3
 from ..kinematics import Kinematics
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia
+from ..kinematics.joint_rates import joint_rates, slide_accelerations
+from ..kinematics.link_axes import Rows, SlidingTriple, Turned, falling, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.parallel import Resolved, resolve_parallel
-from ..kinematics.rates import joint_rates, slide_accelerations
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, Rows, Turned, falling, turn_forces, turn_links
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -69,7 +69,7 @@ def _turned_system(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     rest: tuple[Expr, ...],
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
 ) -> tuple[Rows, tuple[Expr, ...]]:
     """M and h in turned velocities."""
     matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
@@ -112,7 +112,7 @@ def _sweep(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     a: tuple[Expr, ...],
-    blocks: Sequence[Block] = (),
+    blocks: Sequence[SlidingTriple] = (),
 ) -> tuple[Expr, ...]:
     """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
     graph, links, twists = kinematics.graph, resolved.links, resolved.twists

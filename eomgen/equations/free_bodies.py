@@ -56,7 +56,7 @@ class FreeBodies:
             self.loads.append(sub(cross_wrench(twist, link.spatial.times(*twist)), applied))
         self.forces = [self.graph.zero] * len(kinematics.v)
         self.along_cut: dict[str, Expr] = {}
-        place = {name: j for j, name in enumerate(kinematics.freedoms)}
+        place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
         for load in (load for terms in kinematics.forces for load in terms.coordinate_loads):
             if load.coordinate in place:
                 self.forces[place[load.coordinate]] = self.forces[place[load.coordinate]] + load.value
@@ -119,7 +119,7 @@ class FreeBodies:
 
 
 @dataclass(frozen=True)
-class CutJoint:
+class FreeBodyCut:
     """A cut joint between two bodies: rows W of C' = W V with V the twist of S relative to P, in S axes at S."""
 
     outer: int  #: link of the predecessor, GROUND for ground
@@ -171,13 +171,13 @@ class CutJoint:
             balances[self.outer] = sub(balances[self.outer], carried)
 
 
-def cut_joints(bodies: FreeBodies) -> list[CutJoint]:
+def cut_joints(bodies: FreeBodies) -> list[FreeBodyCut]:
     """The joints that close loops, as constraints between two free bodies."""
     kinematics = bodies.kinematics
     return [_cut(bodies, kinematics.mechanism.joints[k]) for k in kinematics.topology.cut]
 
 
-def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
+def _cut(bodies: FreeBodies, spec: JointSpec) -> FreeBodyCut:
     kinematics, graph = bodies.kinematics, bodies.graph
     poses = kinematics.poses
     pose = poses.relative(spec.predecessor, spec.successor)
@@ -188,7 +188,7 @@ def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
     relative = sub(second, above)
     measured = any(name in bodies.along_cut for name in spec.coordinates) or spec.armature is not None
     kinds, rows, rest = _differentiate(bodies, spec, pose, relative, measured)
-    return CutJoint(
+    return FreeBodyCut(
         outer=links[0],
         inner=links[1],
         holder=holder,

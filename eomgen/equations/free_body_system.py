@@ -14,9 +14,9 @@ from ..graph.differentiate import jacobian
 from ..graph.spatial import Twist, Wrench, add, dot, scaled
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
-from ..kinematics.units import Units
-from .equations import LinearSystem, TreeEquations, linear_system
-from .free_bodies import CutJoint, FreeBodies
+from ..kinematics.typical_sizes import Units
+from .free_bodies import FreeBodies, FreeBodyCut
+from .tree_equations import LinearSystem, TreeEquations, linear_system
 
 
 def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
@@ -93,7 +93,7 @@ class Unknowns:
 class Forces:
     """Multipliers of cut joints and couplings, their equations, and what they do to bodies and joints."""
 
-    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns, units: Units) -> None:
+    def __init__(self, bodies: FreeBodies, cuts: Sequence[FreeBodyCut], unknowns: Unknowns, units: Units) -> None:
         self.bodies, self.cuts, self.unknowns = bodies, cuts, unknowns
         self.first = len(unknowns.symbols)
         self.rows = bodies.couplings

@@ -20,13 +20,13 @@ from ..graph.tensors import add_matrices, rotate, rotate_symmetric, skew, symmet
 from ..graph.vectors import Mat3
 from ..kinematics import Kinematics, Link
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia
+from ..kinematics.joint_rates import JointRates, joint_rates
+from ..kinematics.link_axes import SlidingTriple, falling, turn_back, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
-from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, falling, turn_back, turn_forces, turn_links
 from ..records import dataclass
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -190,7 +190,7 @@ def _newton_euler(
 
 def _articulated(
     kinematics: Kinematics,
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
     inertias: list[SpatialInertia],
     products: list[Twist],
     loads: list[Wrench],

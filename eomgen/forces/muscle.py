@@ -9,7 +9,7 @@ from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import BETWEEN, Path
 from .routes import VIA, read_path
 

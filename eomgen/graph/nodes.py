@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..limits.rounding import TINY
+from ..limits.rounding import NORMAL, TINY
 from ..operations import OPERATIONS
 from ..operations.row import ODD
 
@@ -167,7 +167,7 @@ class Nodes:
                 return self.mul(self._const(-value), y[1])
             if y[0] == "mul":  # merge constant factors, unless that would overflow or lose digits
                 u, rest = (y[1], y[2]) if nodes[y[1]][0] == "const" else (y[2], y[1])
-                if nodes[u][0] == "const" and 1e-290 < abs(value * nodes[u][1]) < math.inf:
+                if nodes[u][0] == "const" and NORMAL < abs(value * nodes[u][1]) < math.inf:
                     return self.mul(self._const(value * nodes[u][1]), rest)
             return self._node(("mul", a, b) if a < b else ("mul", b, a))
         if x[0] == "neg":

@@ -15,10 +15,10 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
-from ..joints.rotations import about
+from ..joints.rotation_coordinates import about
 from ..records import dataclass
-from .inertia import SpatialInertia
-from .rates import JointRates
+from .joint_rates import JointRates
+from .link_inertia import SpatialInertia
 from .tree import Link, link_twists
 
 

@@ -14,7 +14,7 @@ from ..graph import vectors as vec
 from ..graph.core import Graph
 from ..graph.tensors import subtract_matrices, symmetric
 from ..graph.vectors import Mat3
-from .inertia import SpatialInertia, no_inertia
+from .link_inertia import SpatialInertia, no_inertia
 from .tree import Link
 
 

@@ -10,11 +10,11 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.rounding import settled_rotation
+from ..graph.rounding_bounds import settled_rotation
 from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .inertia import SpatialInertia, body_inertia, place_point, settled_matrix
+from .link_inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
 
 

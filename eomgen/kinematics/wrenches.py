@@ -20,11 +20,11 @@ from ..graph.spatial import Twist
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .couplings import couple
+from .angle_sums import sum_of_turns
+from .constraint_equations import couple
 from .kinematics import Kinematics
-from .motion import Motion
+from .motion import MarkerMotion
 from .tree import Poses
-from .turns import sum_of_turns
 
 Row6 = tuple[Expr, ...]  # force, moment
 
@@ -266,8 +266,8 @@ class JointWrenches:
         placed = {n: (y + changes[n] if n in changes else y, r, a) for n, (y, r, a) in known.items()}
         moving = {n: (y, r + changes[n] if n in changes else r, a) for n, (y, r, a) in known.items()}
         plain, state, turning = kinematics.poses, kinematics.motion.state, kinematics.motion.turning
-        displaced = Motion(_Displaced(kinematics, self.origins, moves), kinematics.twists, state, placed, turning)
-        pushed = Motion(plain, self._pushed_twists(moves), state, moving, turning)
+        displaced = MarkerMotion(_Displaced(kinematics, self.origins, moves), kinematics.twists, state, placed, turning)
+        pushed = MarkerMotion(plain, self._pushed_twists(moves), state, moving, turning)
         rows = [r for r in couple(self.mechanism, displaced).rows if r.level == "position"]
         rows += [r for r in couple(self.mechanism, pushed).rows if r.level != "position"]
         every = [s for six in symbols for s in six]

@@ -11,12 +11,12 @@ from ..errors import AssemblyError
 from ..limits.constraints import CONTRADICTION, MEASURED
 from . import algebra
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
-from .closure import FAR, Equations, System, close, closed, remoteness
+from .closure import FAR, ClosureSystem, WantedValues, close, closed, remoteness
 from .projection import largest
 from .ranks import rank
 from .scales import Array, Indices, Position, Scales
 
-__all__ = ["Assembly", "Equations", "Rates", "VelocityEquations", "assemble", "assemble_velocity", "starts"]
+__all__ = ["Assembly", "Rates", "VelocityEquations", "WantedValues", "assemble", "assemble_velocity", "starts"]
 
 RESTARTS = 24  #: further starts near the guess
 RADII = (0.05, 0.2, 0.5, 1.0, 1.6, 2.4)  #: scaled distance of the starts, each used for a few
@@ -39,7 +39,7 @@ def assemble(
     scales: Scales,
     *,
     held: Sequence[int] | Indices = (),
-    equations: Equations | None = None,
+    equations: WantedValues | None = None,
     alignment: Callable[[Array], Array] | None = None,
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
@@ -56,7 +56,7 @@ def assemble(
     scales : Scales
     held : sequence of int
         Coordinates that must not move.
-    equations : Equations, optional
+    equations : WantedValues, optional
         Values of functions of q to reach exactly.
     alignment : callable, optional
         q -> (n_a,) numbers that are positive unless a loop closes with a joint's axes flipped.
@@ -79,7 +79,7 @@ def assemble(
     held = scales.velocities(held)
     free = np.ones(len(scales.q))
     free[held] = 0.0
-    system = System(position, scales, free, equations)
+    system = ClosureSystem(position, scales, free, equations)
     best, least, flipped = guess, np.inf, False
     for attempt, start in enumerate(starts(guess, free, scales, restarts)):
         with np.errstate(all="ignore"):
@@ -117,7 +117,7 @@ def _halton(index: int, base: int) -> float:
 class _Failure(NamedTuple):
     """Everything needed to say why an assembly failed."""
 
-    system: System
+    system: ClosureSystem
     guess: Array
     held: Indices
     best: Array
@@ -140,7 +140,7 @@ class _Failure(NamedTuple):
         if not given:
             tried = f"({self.restarts + 1} starts tried)"
             return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
-        free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
+        free = ClosureSystem(self.system.position, self.system.scales, np.ones_like(self.system.free))
         for start in starts(self.best, free.free, free.scales, self.restarts // 2):
             with np.errstate(all="ignore"):
                 q, residual = close(free, start)

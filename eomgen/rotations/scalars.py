@@ -14,7 +14,7 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..limits.descriptions import UNIT
-from ..limits.rounding import QUARTER
+from ..numeric.rotation_matrices import quarter_turns
 
 Scalar = Any  #: a number, an :class:`~eomgen.graph.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]
@@ -68,14 +68,11 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     return apply("atan2", y, x)
 
 
-def cosine_and_sine(angle: Scalar, snap: float = 0.0) -> tuple[Scalar, Scalar]:
-    """cos and sin; exact 0 and +-1 for numbers within ``snap``, or rounding, of a multiple of pi/2."""
+def cosine_and_sine(angle: Scalar) -> tuple[Scalar, Scalar]:
+    """cos and sin; exact 0 and +-1 for numeric multiples of pi/2."""
     value = angle.value if isinstance(angle, Expr) else angle
-    if isinstance(value, int | float):
-        quarter = round(value / (math.pi / 2))
-        if abs(value - quarter * (math.pi / 2)) <= max(snap, QUARTER * max(1, abs(quarter))):
-            return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-    return cos(angle), sin(angle)
+    exact = quarter_turns(value) if isinstance(value, int | float) else None
+    return exact or (cos(angle), sin(angle))
 
 
 def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
@@ -87,9 +84,9 @@ def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
     return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
 
 
-def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar], snap: float = 0.0) -> list[list[Scalar]]:
+def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar]) -> list[list[Scalar]]:
     """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF."""
-    x, y, z = (about(axis, *cosine_and_sine(angle, snap)) for axis, angle in enumerate(angles))
+    x, y, z = (about(axis, *cosine_and_sine(angle)) for axis, angle in enumerate(angles))
     return times(z, times(y, x))
 
 

@@ -178,7 +178,7 @@ def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = 
     position = module.constraints.every
     velocity = module.kernels.state("velocity_constraints")
     correction = np.abs(x - raw)
-    for i, _ in module.layout.balls:  # their length means nothing
+    for i, _ in module.layout.quaternion_slots:  # their length means nothing
         e = raw[i : i + 4]
         correction[i : i + 4] = np.abs(x[i : i + 4] - e / np.sqrt((e * e).sum(axis=0)))
     return Residuals(

@@ -85,7 +85,7 @@ class Kernels:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
             if layout.n_c == 0 and name == "project":
-                return Identity(layout.n_x, [i for i, _ in layout.balls])
+                return Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
         kernel: State = self._make(self.core.state, name, nan)
@@ -123,7 +123,7 @@ class Kernels:
                 return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
             weights = np.abs(vectors[:, 0])
             moved = zip(layout.independent, weights, strict=True)
-            names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
+            names = [layout.velocity_labels[i] for i, w in moved if w > 0.1 * weights.max()]
             moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
             size = "negative" if values[0] < -SINGULAR else "no"
             return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
@@ -134,7 +134,7 @@ class Kernels:
             worst = int(np.abs(layout.scales.residual(e)).argmax())
             return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
         if status == 4:
-            return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
+            return f"independent are {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
         return ""
 
     def _not_finite(self, t: float, x: Array, p: Array | None, u: Array | None) -> str:
@@ -296,11 +296,11 @@ class Nothing:
 
 
 class Identity(Constant):
-    """The projection of a tree: nothing to do but for the length of Euler parameters, which start at ``balls``."""
+    """The projection of a tree: nothing to do but for the length of Euler parameters."""
 
-    def __init__(self, n_in: int, balls: Sequence[int] = ()) -> None:
+    def __init__(self, n_in: int, quaternion_slots: Sequence[int] = ()) -> None:
         super().__init__(np.zeros(n_in), n_in)
-        self.balls = balls
+        self.quaternion_slots = quaternion_slots
 
     def __call__(
         self,
@@ -312,7 +312,7 @@ class Identity(Constant):
     ) -> Array:
         """A copy of x."""
         result = _write(super().__call__(x, out=out), read_numbers("x", x))
-        for i in self.balls:
+        for i in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
 

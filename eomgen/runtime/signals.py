@@ -15,7 +15,7 @@ from ..numeric.scales import Array
 from ..numeric.splines import slopes
 from ..texts import shown
 from .layout import Layout
-from .names import check_names, require_mapping, require_time_and_state, unknown
+from .near_names import check_names, require_mapping, require_time_and_state, unknown
 from .rate_checks import require_agreement
 from .room import as_real, read_number, read_numbers
 from .signal_rates import TableRate, derive, fill_rates, jumps, of_time, pieces_of, require_smooth

@@ -16,7 +16,7 @@ from ..errors import ExpressionError, MissingDependencyError, UsageError
 from ..numeric.scales import Array
 from ..operations import OPERATIONS, operations_with
 from .layout import Layout
-from .names import unknown
+from .near_names import unknown
 
 if TYPE_CHECKING:
     from ..graph.core import Expr
@@ -100,7 +100,7 @@ class Formula:
         from ..graph.substitute import symbols_of
 
         layout, graph = self.layout, self.expression.graph
-        moving = dict(zip(layout.freedoms, layout.v, strict=True))
+        moving = dict(zip(layout.velocity_labels, layout.v, strict=True))
         states = sorted(symbols_of([self.expression]) & set(layout.x))
         for state in states:
             if state not in layout.q or state not in moving:

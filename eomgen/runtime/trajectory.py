@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
-from .names import find_lacking, require, unknown
+from .near_names import find_lacking, require, unknown
 from .room import read_numbers
 from .storage import FORMAT, Stored, save
 

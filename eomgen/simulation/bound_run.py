@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import EvaluationError, SimulationError
+from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .progress import Progress
@@ -90,7 +91,7 @@ class Run:
         if self.troubled(crawl.t, crawl.x):
             return self.ended(crawl.t, end, method, "", crawl.x)
         with np.errstate(all="ignore"):
-            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", SCIPY_ATOL))
         return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
 
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
-from .crossings import Crossings, Step
-from .events import Event
+from ..runtime.near_names import require, unknown
+from .event_crossings import Crossings, Step
+from .events import RunEvent
 from .stalling import Pace
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def integrate(
     x0: Array,
     solver: Any,
     t_eval: Array | None,
-    events: Sequence[Event],
+    events: Sequence[RunEvent],
     dense: bool,
     options: dict[str, Any],
     pace: Pace,
@@ -166,8 +166,8 @@ class _Journey:
     """One run on its way."""
 
     def __init__(
-        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None, events: Sequence[Event],
-        dense: bool, options: dict[str, Any], pace: Pace,
+        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
+        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace,
     ) -> None:  # fmt: skip
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
         self.options, self.pace = options, pace

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run

@@ -112,7 +112,7 @@ class _Local:
         return total
 
     def _expand(self, centre: list[float]) -> None:
-        from ..numeric.functions import up_to
+        from ..numeric.user_functions import up_to
 
         self.centre, self.terms = centre, []
         for total in range(3):

@@ -15,12 +15,12 @@ from sympy.codegen.cfunctions import expm1, fma
 import eomgen as eg
 from eomgen.describe.expressions import parse
 from eomgen.graph import Graph, count, evaluate, gradient
-from eomgen.graph.rounding import with_bounds
+from eomgen.graph.rounding_bounds import with_bounds
 from eomgen.graph.sympy_lower import lower
 from eomgen.graph.sympy_raise import raise_inline
 from eomgen.operations import OPERATIONS, Operation, function
 from eomgen.verification.digits import Digits, context
-from eomgen.verification.rounding import bounded
+from eomgen.verification.rounding_sizes import bounded
 
 X, Y, Z = sympy.symbols("x y z", real=True)
 AT = {"x": 0.7, "y": 1.3, "z": -0.4}

@@ -44,14 +44,14 @@ FAULTS = (
         ("tests/graph/test_rounding.py::test_bounds_hold_and_are_not_far_above[1e-06]",),
     ),
     Fault(
-        "rounding-terms", "eomgen/graph/rounding.py",
+        "rounding-terms", "eomgen/graph/rounding_bounds.py",
         "found[i] = found[operands[0]] + found[operands[1]]",
         'found[i] = graph.apply("abs", Expr(graph, i))',
         "the size of a sum's terms is taken from the sum",
         ("tests/graph/test_rounding.py::test_terms_of_a_sum_of_products",),
     ),
     Fault(
-        "settled-rotation-sign", "eomgen/graph/rounding.py",
+        "settled-rotation-sign", "eomgen/graph/rounding_bounds.py",
         "graph.constant(math.copysign(1.0, value))",
         "graph.one",
         "a turn of half a turn becomes none",
