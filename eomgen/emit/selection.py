@@ -9,10 +9,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Iterable, Mapping
 
-from .uses import Import, Source, Uses
+from .uses import Import, SourceText, Uses
 
 
-class Sources(dict[str, Source]):
+class Sources(dict[str, SourceText]):
     """Files without their endings, each read when it is first needed."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
@@ -22,8 +22,8 @@ class Sources(dict[str, Source]):
     def __contains__(self, name: object) -> bool:
         return name in self.texts
 
-    def __missing__(self, name: str) -> Source:
-        self[name] = found = Source(name, self.texts[name])
+    def __missing__(self, name: str) -> SourceText:
+        self[name] = found = SourceText(name, self.texts[name])
         return found
 
 
@@ -98,7 +98,7 @@ class Selection:
         self.files.add(file)
         self._use(self.sources[file], *self.sources[file].rest)
 
-    def _keep(self, source: Source, name: str) -> None:
+    def _keep(self, source: SourceText, name: str) -> None:
         if (source.name, name) in self.kept:
             return
         if name in source.imports:
@@ -129,7 +129,7 @@ class Selection:
             self._load(one.home)
             self._keep(self.sources[one.home], one.name)
 
-    def _look_into(self, source: Source, node: ast.ClassDef) -> None:
+    def _look_into(self, source: SourceText, node: ast.ClassDef) -> None:
         for place, part in enumerate(node.body):
             member = (source.name, node.name, place)
             if member in self.members:
@@ -140,7 +140,7 @@ class Selection:
                 if self._use(source, part).any_own:
                     self.whole.add((source.name, node.name))
 
-    def _use(self, source: Source, *nodes: ast.AST) -> Uses:
+    def _use(self, source: SourceText, *nodes: ast.AST) -> Uses:
         used = Uses(*nodes)
         self.attributes |= used.attributes
         self.annotated |= {(source.name, name) for name in used.annotated}
@@ -154,7 +154,7 @@ class Selection:
                 self._reach(found, attribute)
         return used
 
-    def _is_class(self, source: Source, name: str) -> bool:
+    def _is_class(self, source: SourceText, name: str) -> bool:
         """Whether a name of an annotation is that of a class of another file, which is kept for other reasons only."""
         one = source.imports.get(name) or source.types.get(name)
         if one is None or one.home is None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from .abridged import abridge
 from .carried import carry, describe_folder
 from .selection import Selection
-from .uses import Source
+from .uses import SourceText
 
 #: Files that a slim package has not -> what asks for them.
 LEFT_OUT = {
@@ -55,7 +55,7 @@ def carry_slim(package: Mapping[str, str]) -> dict[str, str]:
         Generated files, from which all begins.
     """
     own = {name: text for name, text in package.items() if name.endswith(".py")}
-    typed = [Source("", text) for name, text in package.items() if name.endswith(".pyi")]
+    typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
     selection = Selection(carry(package) | own, LEFT_OUT)
     for name in own:
         selection.begin(name.removesuffix(".py"))

@@ -93,8 +93,8 @@ def assemble(
 def _failed(system: ClosureSystem, *found: Any) -> AssemblyError:
     """The error that says why; a slim package says only that."""
     try:
-        from .assembly_failure import Failure
+        from .assembly_failure import AssemblyFailure
     except UnavailableError:
         return AssemblyError("the loops do not close with the given values; give others, or check the dimensions")
-    failure = Failure(system, *found)
+    failure = AssemblyFailure(system, *found)
     return AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])

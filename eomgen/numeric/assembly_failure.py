@@ -16,7 +16,7 @@ from .scales import Array, Indices
 from .starts import starts
 
 
-class Failure(NamedTuple):
+class AssemblyFailure(NamedTuple):
     """Everything needed to say why an assembly failed."""
 
     system: ClosureSystem
