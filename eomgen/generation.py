@@ -12,6 +12,7 @@ from .emit import emit_package
 from .emit.write import write_package
 from .files.path_names import as_path
 from .pipeline import build, derive
+from .targets import TARGETS
 from .verification.record import record
 from .verification.recorded import FILE
 
@@ -52,6 +53,6 @@ def generate(
     equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
     sources = dict(emit_package(program, target, slim))
-    if target != "c" and not slim:
+    if TARGETS[target].module and not slim:
         sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)

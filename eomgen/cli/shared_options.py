@@ -15,6 +15,7 @@ import click
 from ..errors import ModelError, UsageError
 from ..files.reading import kind_of
 from ..files.writing import refuse_link
+from ..targets import TARGETS
 
 if TYPE_CHECKING:
     from ..api.model import Model
@@ -91,13 +92,12 @@ def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
 
 def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """``--target`` with these choices."""
-    about = {"c": "C library", "cython": "extension module", "numpy": "Python that imports NumPy alone, no compiler"}
     return click.option(
         "--target",
         type=click.Choice(list(targets)),
         default="cython",
         show_default=True,
-        help="; ".join(f"{target}: {about[target]}" for target in targets) + ".",
+        help="; ".join(f"{target}: {TARGETS[target].about}" for target in targets) + ".",
     )
 
 

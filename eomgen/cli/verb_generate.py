@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ..targets import TARGETS
 from .failures import reports_failures
 from .screen import print_json, say, stage
 from .shared_options import (
@@ -32,7 +33,7 @@ from .shared_options import (
 @method_option
 @baumgarte_option
 @independent_option
-@target_option("c", "cython", "numpy")
+@target_option(*TARGETS)
 @click.option(
     "--slim", is_flag=True, help="Only calls, events and simulate, in a small package; the rest refuses by name."
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from textwrap import fill
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import UsageError
 from ..layer import read_layer
 from ..program import Program
+from ..targets import find_target
 from ..texts import summary_text
 from .c import emit_c
 from .carried import carry
@@ -18,7 +19,7 @@ from .layouts import describe_layouts
 from .numpy import emit_numpy
 from .python_calls import describe_calls
 from .slim import carry_slim
-from .sources import SourceSet, render
+from .sources import SourceSet, metadata_json, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -63,16 +64,15 @@ def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet
     UsageError
         An unknown target, or ``slim`` for a library of C, which holds no Python.
     """
-    makers: dict[str, Callable[..., dict[str, str]]] = {"cython": _cython, "numpy": _numpy, "c": _c_library}
-    if target not in makers:
-        raise UsageError(f"no target {target!r}; there are {', '.join(makers)}")
-    if slim and target == "c":
-        raise UsageError("a C library holds no Python that could be left out; slim is for target cython or numpy")
+    row = find_target(target)
+    if slim and not row.module:
+        raise UsageError(f"target {target} holds no Python that could be left out; slim is for target cython or numpy")
     program = replace(program, metadata={**program.metadata, "target": target})
-    return SourceSet(makers[target](program, _context(program, slim)))
+    return SourceSet({"model.json": metadata_json(program), **row.files(program, _context(program, slim))})
 
 
-def _cython(program: Program, context: dict[str, Any]) -> dict[str, str]:
+def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Sources in C and Cython, what builds them, and what of eomgen they need."""
     sources = emit_c(program)
     written = (*sources, *read_layer())
     context |= {
@@ -87,12 +87,14 @@ def _cython(program: Program, context: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _numpy(program: Program, context: dict[str, Any]) -> dict[str, str]:
+def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Functions of NumPy arrays, and what of eomgen they need."""
     own = emit_numpy(program, bundled=True)
     return {**own, **_python_files(context, own)}
 
 
-def _c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
+def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Sources, headers, Makefile."""
     sources = emit_c(program)
     c_files = [name for name in sources if name.endswith(".c")]
     objects = [name.removesuffix(".c") + ".o" for name in c_files]
