@@ -34,7 +34,7 @@ def load(
         True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
     **robot
         For robots: ``floating``, ``lock``, ``mimic``, ``limits`` and the other fields of
-        :class:`eomgen.robots.Options`.
+        :class:`eomgen.robots.RobotOptions`.
 
     Returns
     -------

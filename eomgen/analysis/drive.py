@@ -26,7 +26,7 @@ from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.room import read_numbers
-from .constrained import States, free_motions, prepare, solve_multipliers
+from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def _solve(A: Array, want: Array, weights: Array) -> Array:
 
 
 def _check_inputs(
-    states: States, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
+    states: ProjectedStates, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
 ) -> None:
     """The forces found, applied all at once, must make the motion: inputs may multiply each other.
 
@@ -236,7 +236,7 @@ def _basis(J: Array, layout: Layout) -> Array:
     return free_motions(J, s)
 
 
-def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Array:
+def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: Any) -> Array:
     """Accelerations that the constraints allow, (n_v, k).
 
     Raises
@@ -292,7 +292,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
     return result
 
 
-def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
+def _effects(states: ProjectedStates, names: Sequence[str]) -> tuple[Array, Array]:
     """Generalized forces (n_v, n, k) of a unit of each drive, and what each drive has already (n,)."""
     module, layout = states.module, states.module.layout
     count = len(states.t)
@@ -312,7 +312,7 @@ def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
     return S, base
 
 
-def _input_effect(states: States, j: int) -> Array:
+def _input_effect(states: ProjectedStates, j: int) -> Array:
     """Generalized forces (n_v, k) of a unit of an input, in which forces must be linear."""
     module = states.module
     h = []
@@ -341,7 +341,7 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     )
 
 
-def _with_drives(states: States, names: Sequence[str], a: Array, multipliers: Array, forces: Array) -> Array:
+def _with_drives(states: ProjectedStates, names: Sequence[str], a: Array, multipliers: Array, forces: Array) -> Array:
     """Reactions of all joints while the drives act."""
     from .reactions import find_reactions
 

@@ -18,7 +18,7 @@ from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.layout import Layout
-    from .tangent import Tangent
+    from .tangent import TangentSpace
 
 
 class Linearization:
@@ -58,7 +58,7 @@ class Linearization:
         states: tuple[str, ...],
         drift: Array,
         second: tuple[Array, Array, Array] | None = None,
-        tangent: Tangent | None = None,
+        tangent: TangentSpace | None = None,
         own: Array | None = None,
     ) -> None:
         self.own = own  # accelerations of the model's own forces, scaled (1/s^2)

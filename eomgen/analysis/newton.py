@@ -19,7 +19,7 @@ from ..numeric.scales import Array
 from .linear_step import Solver
 
 if TYPE_CHECKING:
-    from .search import Point, Search
+    from .search import Search, SearchPoint
 
 STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
@@ -28,7 +28,9 @@ POLISHED = 8  #: most steps after the correction has reached rounding
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
 
-def newton(search: Search, point: Point, plain: bool = False, reach: float = np.inf) -> tuple[Point, int, bool]:
+def newton(
+    search: Search, point: SearchPoint, plain: bool = False, reach: float = np.inf
+) -> tuple[SearchPoint, int, bool]:
     """The last iterate, the number of steps, and whether it is balanced.
 
     plain: whole steps, whatever they lead to; reach: largest scaled distance from the start.
@@ -79,7 +81,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
     return point, STEPS, False
 
 
-def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Point:
+def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array) -> SearchPoint:
     """The iterate of whole steps from here, as long as each halves the residual.
 
     Where stiff forces stand beside soft ones, a correction within rounding of the stiff ones may leave more than that
@@ -104,7 +106,7 @@ def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Po
     return point
 
 
-def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
+def marquardt(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
     """Down the residual: Levenberg and Marquardt's steps, with columns scaled by the largest norms that they have had.
 
     J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows

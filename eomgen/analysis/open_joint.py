@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.constraints import CONTRADICTION
-from ..numeric.closure import Equations, System, close
+from ..numeric.closure import ClosureSystem, WantedValues, close
 from ..numeric.scales import Array
 from .driven_coordinates import DrivenCoordinates
 
@@ -39,9 +39,9 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
         return driven.closure(q, t)
 
     names = [driven.led[k] for k in loops]
-    equations = Equations(led, y[loops], sizes, driven.wraps[loops].tolist(), names) if loops else None
+    equations = WantedValues(led, y[loops], sizes, driven.wraps[loops].tolist(), names) if loops else None
     with np.errstate(all="ignore"):
-        q, _ = close(System(position, scales, free, equations), start)
+        q, _ = close(ClosureSystem(position, scales, free, equations), start)
     C = position(q)[0]
     if not C.size:
         return "beyond, nothing is open"

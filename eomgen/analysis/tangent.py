@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..runtime.layout import Layout
 
 
-class Tangent(NamedTuple):
+class TangentSpace(NamedTuple):
     """Directions of a state x = [q; v] on the constraints; n_z displacements, n_dof velocities."""
 
     positions: Indices  #: (n_z,) independent displacements, as indices of velocities
@@ -41,7 +41,7 @@ def displacement_names(layout: Layout) -> tuple[str, ...]:
 
 def find_tangent(
     module: BoundModel, t: float, x: Array, jacobian: Array, independent: Sequence[str] | None = None
-) -> Tangent:
+) -> TangentSpace:
     """The independent directions at a state on the constraints.
 
     Parameters
@@ -77,7 +77,7 @@ def find_tangent(
     dv = _velocity_change(layout, x, jacobian[:n_q, :n_q] @ dq, dq)
     dv = dv - B @ dv[velocities]  # the independent velocities stay
     T = np.block([[dq, np.zeros((n_q, B.shape[1]))], [dv, B]])
-    return Tangent(positions, velocities, Z, B, T)
+    return TangentSpace(positions, velocities, Z, B, T)
 
 
 def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:

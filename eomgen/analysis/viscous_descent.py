@@ -19,14 +19,14 @@ from ..numeric.scales import Array
 from .newton import CONTRACTS, LONGEST
 
 if TYPE_CHECKING:
-    from .search import Point, Search
+    from .search import Search, SearchPoint
 
 STEPS = 400  #: at most
 TRIES = 60  #: of a step, each with a quarter of the time
 CORRECTIONS = 5  #: of a step, at most
 
 
-def creep(search: Search, point: Point) -> tuple[Point, int, bool]:
+def creep(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
     """An iterate near which it rests, the number of steps, and False: Newton's iteration has the last word."""
     rate = None
     for step in range(STEPS):
@@ -65,7 +65,7 @@ class _Flow(NamedTuple):
     slope: float  #: size of A
 
     @classmethod
-    def at(cls, search: Search, point: Point) -> _Flow | None:
+    def at(cls, search: Search, point: SearchPoint) -> _Flow | None:
         """None where there is none."""
         linear = search.linearize(point)
         if linear.flow is None:
@@ -81,7 +81,9 @@ class _Flow(NamedTuple):
         return np.asarray(algebra.solve(shifted, drive)) if _definite(self.M @ shifted) else None
 
 
-def _corrected(search: Search, start: Point, rate: float, displacement: Array) -> tuple[Point | None, float]:
+def _corrected(
+    search: Search, start: SearchPoint, rate: float, displacement: Array
+) -> tuple[SearchPoint | None, float]:
     """The iterate an implicit step away, None where Newton's iteration does not contract; its first contraction."""
     before, first, point = float(np.linalg.norm(displacement)), 1.0, start
     for k in range(CORRECTIONS):

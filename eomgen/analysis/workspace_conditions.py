@@ -63,7 +63,7 @@ class Conditions(NamedTuple):
     found: list[WorkspaceSingular]
 
 
-class Reader:
+class ConditionReader:
     """Outputs and their Jacobian at single positions.
 
     Parameters
@@ -142,7 +142,7 @@ class Reader:
                 raise UsageError(f"output {name!r} depends on velocities or accelerations; a workspace has positions")
 
 
-def judge(stage: Stage, reader: Reader, filled: Flood) -> Conditions:
+def judge(stage: Stage, reader: ConditionReader, filled: Flood) -> Conditions:
     """Outputs, Jacobians and singular positions of all reached points."""
     grid = stage.grid
     n_y, n_x = len(grid.of), len(grid.names)
@@ -191,7 +191,7 @@ def _lost(stage: Stage, index: Index, place: tuple[float, Array], q: Array, dire
 
 
 def _crossings(
-    stage: Stage, reader: Reader, filled: Flood, J: Array, lost: np.ndarray[Any, Any]
+    stage: Stage, reader: ConditionReader, filled: Flood, J: Array, lost: np.ndarray[Any, Any]
 ) -> list[tuple[Index, Index, WorkspaceSingular]]:
     """Where det J changes its sign between two neighbours; ``lost`` are points known to be singular themselves."""
     with np.errstate(invalid="ignore"):
@@ -211,7 +211,7 @@ def _crossings(
     return found
 
 
-def _locate(stage: Stage, reader: Reader, filled: Flood, one: Index, other: Index) -> WorkspaceSingular | None:
+def _locate(stage: Stage, reader: ConditionReader, filled: Flood, one: Index, other: Index) -> WorkspaceSingular | None:
     """The zero of det J between two neighbours; None if they do not lie on one branch."""
     driven = stage.driven
     q = filled.q[one]

@@ -68,7 +68,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
 }
 
 
-class Call:
+class LateMethod:
     """A function of another part of the package as a method, which is loaded when it is asked for."""
 
     def __init__(self, name: str) -> None:
@@ -199,7 +199,7 @@ class Module(BoundModel):
 
             return find_solver(self, name)
         if name in CALLS:  # an analysis of a user's own
-            return Call(name).__get__(self, type(self))
+            return LateMethod(name).__get__(self, type(self))
         return find_lacking(self, "a Module", name)
 
     def __dir__(self) -> list[str]:
@@ -217,4 +217,4 @@ class Module(BoundModel):
 
 
 for _name in CALLS:
-    setattr(Module, _name, Call(_name))
+    setattr(Module, _name, LateMethod(_name))

@@ -35,7 +35,7 @@ EXTRAS = {
 }
 
 
-class Finding(NamedTuple):
+class Check(NamedTuple):
     """One thing looked at; ``needed`` is False for what eomgen can do without."""
 
     name: str
@@ -66,24 +66,24 @@ def doctor(as_json: bool) -> None:
         sys.exit(TOOLCHAIN)
 
 
-def _python() -> Iterator[Finding]:
+def _python() -> Iterator[Check]:
     from .. import __version__
 
-    yield Finding("eomgen", True, __version__)
+    yield Check("eomgen", True, __version__)
     detail = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
-    yield Finding("python", sys.version_info >= (3, 11), detail, "install Python 3.11 or later")
+    yield Check("python", sys.version_info >= (3, 11), detail, "install Python 3.11 or later")
 
 
-def _packages() -> Iterator[Finding]:
+def _packages() -> Iterator[Check]:
     for name in CORE:
         version = _version(name)
-        yield Finding(name, version is not None, version or "missing", f"pip install {name}")
+        yield Check(name, version is not None, version or "missing", f"pip install {name}")
     for extra, (purpose, packages) in EXTRAS.items():
         versions = {name: _version(name) for name in packages}
         missing = [name for name, version in versions.items() if version is None]
         detail = f"without {', '.join(missing)}" if missing else ", ".join(f"{n} {v}" for n, v in versions.items())
         remedy = f'pip install "eomgen[{extra}]"'
-        yield Finding(f"[{extra}]", not missing, f"{purpose}: {detail}", remedy, needed=False)
+        yield Check(f"[{extra}]", not missing, f"{purpose}: {detail}", remedy, needed=False)
 
 
 def _version(name: str) -> str | None:
@@ -93,19 +93,19 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _compiler() -> Iterator[Finding]:
+def _compiler() -> Iterator[Check]:
     from ..compilation import find_compiler
 
     try:
         found = find_compiler()
     except EomgenError as error:
         what, _, remedy = str(error).partition("\n")
-        yield Finding("compiler", False, what, remedy)
+        yield Check("compiler", False, what, remedy)
     else:
-        yield Finding("compiler", True, f"{found.path}: {found.version.splitlines()[0]}")
+        yield Check("compiler", True, f"{found.path}: {found.version.splitlines()[0]}")
 
 
-def _compiles() -> Finding:
+def _compiles() -> Check:
     """Compile the shipped pendulum afresh and compare one call with the closed form."""
     from math import sin
     from time import perf_counter
@@ -119,10 +119,10 @@ def _compiles() -> Finding:
             acceleration = float(module.rhs(0.0, [0.5, 0.0])[1])
     except (EomgenError, OSError) as error:
         what, _, rest = str(error).partition("\n")
-        return Finding("small model", False, what, rest)
+        return Check("small model", False, what, rest)
     if abs(acceleration + 9.81 * sin(0.5)) > UNMOVED:
-        return Finding("small model", False, f"a pendulum accelerates by {acceleration}", "try another compiler by CC=")
-    return Finding("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
+        return Check("small model", False, f"a pendulum accelerates by {acceleration}", "try another compiler by CC=")
+    return Check("small model", True, f"compiled and called in {perf_counter() - start:.1f} s")
 
 
 @contextmanager
@@ -139,14 +139,14 @@ def _fresh_cache() -> Iterator[None]:
                 os.environ["EOMGEN_CACHE_DIR"] = before
 
 
-def _cache() -> Finding:
+def _cache() -> Check:
     from ..compilation import Cache, cache_directory
 
     try:
         cache = Cache(cache_directory())
         cache.require_own()
     except EomgenError as error:
-        return Finding("cache", False, "not safe to use, or not there", str(error))
+        return Check("cache", False, "not safe to use, or not there", str(error))
     entries = cache.entries()
     detail = f"{cache.root}: {len(entries)} entries, {readable_size(sum(e.size for e in entries))}"
     folder = next(p for p in (cache.root, *cache.root.parents) if p.exists())
@@ -155,4 +155,4 @@ def _cache() -> Finding:
             writable = folder.is_dir()
     except OSError:
         writable = False
-    return Finding("cache", writable, detail, f"make {folder} writable, or set EOMGEN_CACHE_DIR")
+    return Check("cache", writable, detail, f"make {folder} writable, or set EOMGEN_CACHE_DIR")

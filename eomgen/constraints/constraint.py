@@ -1,7 +1,7 @@
 """Constraint elements: each a frozen class holding graph expressions and markers, asked for conditions that must hold.
 
-An element sees the mechanism's motion through a :class:`View`, which the kinematics stage provides.  Coordinates are
-held as symbols under their own names; the kinematics stage replaces those of cut joints.
+An element sees the mechanism's motion through a :class:`ConstraintView`, which the kinematics stage provides.
+Coordinates are held as symbols under their own names; the kinematics stage replaces those of cut joints.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..records import dataclass
 POSITION, VELOCITY = "position", "velocity"
 
 
-class View(Protocol):
+class ConstraintView(Protocol):
     """Motion of markers, as expressions; in ground axes unless said."""
 
     graph: Graph
@@ -59,18 +59,18 @@ class Constraint(ABC):
     name: str
 
     @abstractmethod
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         """The equations this element adds."""
 
-    def aligned(self, view: View) -> list[Expr]:
+    def aligned(self, view: ConstraintView) -> list[Expr]:
         """Expressions that must be positive: the equations alone also admit contact from the wrong side."""
         return []
 
-    def is_defined(self, view: View) -> bool:
+    def is_defined(self, view: ConstraintView) -> bool:
         """Whether the angle it is about is defined everywhere."""
         return True
 
-    def hints(self, view: View) -> list[tuple[Expr, Expr]]:
+    def hints(self, view: ConstraintView) -> list[tuple[Expr, Expr]]:
         """Where assembly may look for a coordinate of the element's own: (its symbol, a value near by)."""
         return []
 

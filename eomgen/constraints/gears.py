@@ -9,7 +9,7 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from ..graph.core import Expr, sin
 from ..records import dataclass
-from .constraint import Condition, Constraint, View
+from .constraint import Condition, Constraint, ConstraintView
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Pair(Constraint):
     ratio: Expr
     phase: Expr
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
 
 
@@ -56,7 +56,7 @@ class Rack(Constraint):
     radius: Expr
     offset: Expr
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("travel", self.rack - self.radius * self.pinion - self.offset, "length")]
 
 

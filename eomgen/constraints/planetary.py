@@ -11,7 +11,7 @@ from ..elements.field import Field
 from ..graph.core import Expr
 from ..limits.descriptions import TENSOR
 from ..records import dataclass
-from .constraint import Condition, Constraint, View
+from .constraint import Condition, Constraint, ConstraintView
 
 #: The gears of a planetary set.
 WHEELS = ("sun", "planet", "ring")
@@ -40,7 +40,7 @@ class Planetary(Constraint):
     planet_radius: Expr | None
     phase: Expr
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
         rows: list[Condition] = []
         if self.planet is None:

@@ -12,10 +12,10 @@ from ..forces import FORCES
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.operations import FOLD
 from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
+from ..operations import OPERATIONS
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
 from .build_equations import build_equations, check_energies, declare_equations
@@ -25,7 +25,7 @@ from .build_joints import build_joints, declare_coordinates
 from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
-from .description import GROUND_NAME, Description, Entry, Faults, items
+from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .element_entry import Surroundings
 from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
@@ -136,14 +136,14 @@ def build(description: Description) -> Mechanism:
     )
 
 
-def _described(reader: Reader, entry: Entry, fields: Fields) -> tuple[str, str]:
+def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[str, str]:
     """Unit and doc of an entry, its keys checked."""
     check_keys(entry.path, entry.values, fields, reader.faults)
     unit, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
     return unit, doc
 
 
-def _parameter(reader: Reader, entry: Entry) -> Parameter:
+def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
     reader.names.declare("parameter", entry.name, entry.path)
     unit, doc = _described(reader, entry, PARAMETER)
     given = entry.values.get("value")
@@ -151,7 +151,7 @@ def _parameter(reader: Reader, entry: Entry) -> Parameter:
     return Parameter(str(entry.name), value, unit, doc)
 
 
-def _input(reader: Reader, entry: Entry) -> Input:
+def _input(reader: Reader, entry: DescribedEntry) -> Input:
     reader.names.declare("input", entry.name, entry.path)
     unit, doc = _described(reader, entry, INPUT)
     given = entry.values.get("value")
@@ -159,7 +159,7 @@ def _input(reader: Reader, entry: Entry) -> Input:
     return Input(str(entry.name), value or 0.0, unit, doc)
 
 
-def _with_signal(reader: Reader, given: Input, entry: Entry) -> Input:
+def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
     """The input with its expression over time, read when all coordinates are known."""
     if entry.values.get("signal") is None:
         return given
@@ -170,12 +170,12 @@ def _with_signal(reader: Reader, given: Input, entry: Entry) -> Input:
             reader.faults.add(
                 path, f"the input {name!r} cannot stand here", "t, coordinates, velocities, parameters can"
             )
-    if any(reader.graph.nodes[i][0] not in (*FOLD, *LEAVES) for i in reachable(reader.graph, [expression.id])):
+    if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
         reader.faults.add(path, "a function that the model declares cannot stand here", "write the expression out")
     return replace(given, signal=expression)
 
 
-def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
+def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
     """Bodies, with all markers taken in before anything refers to them."""
     faults, graph = reader.faults, reader.graph
     ground = [entry for entry in entries if entry.name == GROUND_NAME]
@@ -199,7 +199,7 @@ def _bodies(reader: Reader, entries: list[Entry]) -> tuple[Body, ...]:
     return tuple(read_body(reader, entry, check) for entry in usable)
 
 
-def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
+def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntry]:
     """Markers of a body: a mapping from a file, a list of (name, placement) from Python."""
     path = f"{entry.path}.markers"
     given: Any = entry.values.get("markers", ())
@@ -208,7 +208,7 @@ def _marker_entries(reader: Reader, entry: Entry) -> list[Entry]:
     if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
         reader.wrong(path, given, "markers")
         return []
-    return [Entry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+    return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
 
 
 def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
@@ -220,7 +220,7 @@ def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
         reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
 
 
-def _outputs(reader: Reader, entries: list[Entry]) -> tuple[Output, ...]:
+def _outputs(reader: Reader, entries: list[DescribedEntry]) -> tuple[Output, ...]:
     made = [_output(reader, entry) for entry in entries]
     seen: set[str] = set()
     for entry, output in zip(entries, made, strict=True):
@@ -230,7 +230,7 @@ def _outputs(reader: Reader, entries: list[Entry]) -> tuple[Output, ...]:
     return tuple(made)
 
 
-def _output(reader: Reader, entry: Entry) -> Output:
+def _output(reader: Reader, entry: DescribedEntry) -> Output:
     faults, path = reader.faults, entry.path
     unit, doc = _described(reader, entry, OUTPUT_FIELDS)
     expression: Expr = reader.stand_in

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..graph import vectors as vec
+from ..graph.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..graph.vectors import Mat3, Vec3
-from ..solids import MassProperties, combine, shift_tensor, turn_tensor
-from ..solids.properties import add_tensors
-from .description import Entry, items
+from ..solids import MassProperties, combine
+from .description import DescribedEntry, items
 from .fields import KINDS
 from .mechanism import Body
 from .names import nearest
@@ -27,7 +27,7 @@ OWN = ("mass", "com", "first_moment", "inertia", "principal")
 POINTS = ("com", "origin")  #: words for the point an inertia is about
 
 
-def read_body(reader: Reader, entry: Entry, check: str) -> Body:
+def read_body(reader: Reader, entry: DescribedEntry, check: str) -> Body:
     """One body; ``check`` says what becomes of an impossible inertia unless the body says otherwise."""
     path, values = entry.path, {k: v for k, v in entry.values.items() if v is not None}
     graph, faults = reader.graph, reader.faults
@@ -72,7 +72,7 @@ def _own(
     if rotation != reader.identity:  # which mirrors the upper triangle
         if not is_symmetric(tensor):
             reader.faults.add(f"{path}.inertia", *ASYMMETRIC)
-        tensor = turn_tensor(rotation, tensor)
+        tensor = rotate_symmetric(rotation, tensor)
     moment: Vec3 | None = None
     if "first_moment" in values:
         moment = reader.vector(f"{path}.first_moment", values["first_moment"])
@@ -85,10 +85,10 @@ def _own(
     about_point = None if point is None else point[0]
     if point is not None:
         negative = shift_tensor(-mass, vec.sub(com, point[0]))
-        tensor = add_tensors(tensor, negative)
+        tensor = add_matrices(tensor, negative)
     for p in points if moment is not None or at_origin is not None else ():
         moment = None if moment is None else vec.add(moment, vec.scale(p.mass, p.com))
-        at_origin = None if at_origin is None else add_tensors(at_origin, shift_tensor(p.mass, p.com))
+        at_origin = None if at_origin is None else add_matrices(at_origin, shift_tensor(p.mass, p.com))
     whole = combine(graph, [MassProperties(mass, com, tensor), *points])
     return Body(
         name, whole.mass, whole.com, whole.inertia, moment, at_origin, check=check, plane=axis, about=about_point

@@ -9,10 +9,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Iterable, Mapping
 
-from .uses import Import, Source, Uses
+from .uses import CodeFile, Import, Uses
 
 
-class Sources(dict[str, Source]):
+class CodeFiles(dict[str, CodeFile]):
     """Files without their endings, each read when it is first needed."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
@@ -22,8 +22,8 @@ class Sources(dict[str, Source]):
     def __contains__(self, name: object) -> bool:
         return name in self.texts
 
-    def __missing__(self, name: str) -> Source:
-        self[name] = found = Source(name, self.texts[name])
+    def __missing__(self, name: str) -> CodeFile:
+        self[name] = found = CodeFile(name, self.texts[name])
         return found
 
 
@@ -51,7 +51,7 @@ class Selection:
     """
 
     def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
-        self.sources = Sources(texts)
+        self.sources = CodeFiles(texts)
         self.left_out = left_out
         self.files: set[str] = set()
         self.kept: set[tuple[str, str]] = set()
@@ -98,7 +98,7 @@ class Selection:
         self.files.add(file)
         self._use(self.sources[file], *self.sources[file].rest)
 
-    def _keep(self, source: Source, name: str) -> None:
+    def _keep(self, source: CodeFile, name: str) -> None:
         if (source.name, name) in self.kept:
             return
         if name in source.imports:
@@ -116,8 +116,8 @@ class Selection:
         """Follow an import, and an attribute of it where it is a file."""
         if one.home is None:
             return
-        inner = f"{one.home}/{one.name}" if one.home else one.name
-        for file in (one.home, inner):
+        home, inner = self._homes(one)
+        for file in (home, inner):
             if file in self.left_out:
                 self.refused.add(file)
                 return
@@ -125,11 +125,16 @@ class Selection:
             self._load(inner)
             if attribute is not None:
                 self._keep(self.sources[inner], attribute)
-        elif one.home in self.sources:
-            self._load(one.home)
-            self._keep(self.sources[one.home], one.name)
+        elif home in self.sources:
+            self._load(home)
+            self._keep(self.sources[home], one.name)
 
-    def _look_into(self, source: Source, node: ast.ClassDef) -> None:
+    def _homes(self, one: Import) -> tuple[str, str]:
+        """The file that an import is from, and the file that it is if it is one."""
+        home = one.home or ""
+        return (home if home in self.sources else f"{home}/__init__"), (f"{home}/{one.name}" if home else one.name)
+
+    def _look_into(self, source: CodeFile, node: ast.ClassDef) -> None:
         for place, part in enumerate(node.body):
             member = (source.name, node.name, place)
             if member in self.members:
@@ -140,7 +145,7 @@ class Selection:
                 if self._use(source, part).any_own:
                     self.whole.add((source.name, node.name))
 
-    def _use(self, source: Source, *nodes: ast.AST) -> Uses:
+    def _use(self, source: CodeFile, *nodes: ast.AST) -> Uses:
         used = Uses(*nodes)
         self.attributes |= used.attributes
         self.annotated |= {(source.name, name) for name in used.annotated}
@@ -154,18 +159,17 @@ class Selection:
                 self._reach(found, attribute)
         return used
 
-    def _is_class(self, source: Source, name: str) -> bool:
+    def _is_class(self, source: CodeFile, name: str) -> bool:
         """Whether a name of an annotation is that of a class of another file, which is kept for other reasons only."""
         one = source.imports.get(name) or source.types.get(name)
         if one is None or one.home is None:
             return False
-        return one.home not in self.sources or isinstance(
-            self.sources[one.home].definitions.get(one.name), ast.ClassDef
-        )
+        home, _ = self._homes(one)
+        return home not in self.sources or isinstance(self.sources[home].definitions.get(one.name), ast.ClassDef)
 
     def defined(self, one: Import) -> bool:
         """Whether what is imported is there."""
         if one.home is None:
             return True
-        inner = f"{one.home}/{one.name}" if one.home else one.name
-        return inner in self.files or (one.home, one.name) in self.kept
+        home, inner = self._homes(one)
+        return inner in self.files or (home, one.name) in self.kept

@@ -16,7 +16,7 @@ class Import(NamedTuple):
     name: str  #: what it is called there
 
 
-class Source:
+class CodeFile:
     """One file.
 
     Parameters

@@ -11,7 +11,7 @@ from ..runtime.near_names import require
 from ..texts import visible
 
 
-class Columns(Protocol):
+class DrawnEnsemble(Protocol):
     """What an :class:`~.ensemble.Ensemble` is drawn from."""
 
     t: Any
@@ -24,7 +24,7 @@ class Columns(Protocol):
     def unit(self, name: str) -> str: ...
 
 
-def draw(ensemble: Columns, name: str, ax: Any, limit: int) -> Any:
+def draw(ensemble: DrawnEnsemble, name: str, ax: Any, limit: int) -> Any:
     """See :meth:`.ensemble.Ensemble.plot`; returns the axes."""
     values, limit = ensemble[name], read_count("limit, of the runs drawn,", limit, 1)
     if ax is None:

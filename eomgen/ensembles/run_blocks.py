@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from .block import COUNTS, Block, Plan, run_block
+from .block import COUNTS, Plan, RunBlock, run_block
 from .given_cases import Cases
 from .reductions import GRAIN, Arrays, Reduction
 
@@ -29,7 +29,7 @@ def reduce_block(
 
 
 def keep(
-    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, block: Block, words: dict[int, str]
+    module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, block: RunBlock, words: dict[int, str]
 ) -> Kept:
     """What a reduction makes of a block, and the numbers of each run."""
     kept = reduction.reduce(module, cases, plan, block)

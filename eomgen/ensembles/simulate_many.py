@@ -88,7 +88,7 @@ def simulate_many(
     reduce : {'states', 'statistics', 'events'} or callable, optional
         What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count,
         mean, variance, least and greatest of states and outputs over the runs; or what ``reduce(block)`` returns for
-        each :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
+        each :class:`~.block.RunBlock`, a mapping of names to arrays.  Only what is kept takes memory.
     threads : int, optional
         Runs at a time; all processors by default.
     cluster : True, int, str or dask Client, optional

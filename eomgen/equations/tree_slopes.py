@@ -24,19 +24,21 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
+from ..graph.spatial import Twist, Wrench, add, dot
 from ..graph.substitute import symbols_of
+from ..graph.tensors import add_matrices, rotate
 from ..graph.vectors import Mat3, Vec3
-from ..kinematics import Kinematics, Link, Twist
+from ..kinematics import Kinematics, Link
 from ..kinematics.joint_rates import joint_rates, slide_accelerations
-from ..kinematics.link_inertia import SpatialInertia, Wrench, add_matrices, rotate
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
 from ..kinematics.regroup import regroup
-from .embedding import _add, _lift, _moment, _project, _turning
+from .embedding import _moment, _turning
 
 Entries = dict[tuple[int, int], Expr]
 
 
-class Field(NamedTuple):
+class MotionField(NamedTuple):
     """A column of the motion subspace, link axes: the field s x r + l, and its rates as seen from ground."""
 
     s: Vec3
@@ -163,15 +165,15 @@ class ForceSlopes:
         link = self._kinematics.links[k]
         return vec.zero(self._kinematics.graph) if link.parent == GROUND else link.down(self._omegas[link.parent])
 
-    def _field(self, k: int, s: Vec3, l: Vec3, index: int) -> Field:
+    def _field(self, k: int, s: Vec3, l: Vec3, index: int) -> MotionField:
         kinematics = self._kinematics
         if self._places[index] < 0:
             above, still = self._above(k), vec.zero(kinematics.graph)
-            return Field(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
+            return MotionField(s, l, vec.cross(above, s), vec.cross(vec.add(above, self._omegas[k]), s), still)
         x = jvp([*s, *l], kinematics.flow)
         own, moved = (x[0], x[1], x[2]), (x[3], x[4], x[5])
         two = kinematics.graph.constant(2.0)
-        return Field(
+        return MotionField(
             s,
             l,
             vec.add(vec.cross(self._omegas[k], s), own),
@@ -238,14 +240,14 @@ class ForceSlopes:
                     self._lifted[i, at] = Lifted(force, whirl)
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
-                        mass[i, j] = _project((other.s, other.l), force)
-                        slopes[j, i] = _project((other.s, other.l), rate)
+                        mass[i, j] = dot((other.s, other.l), force)
+                        slopes[j, i] = dot((other.s, other.l), rate)
                         if j != i:
                             along = vec.dot(other.twice_s_rate, force[0]) + vec.dot(other.s, whirl)
                             slopes[i, j] = along + vec.dot(other.twice_l_rate, force[1])
                     if links[at].parent != GROUND:
                         whirl = vec.add(links[at].up(whirl), vec.cross(self._step(at), links[at].up(force[1])))
-                        force, rate = _lift(links[at], force), _lift(links[at], rate)
+                        force, rate = links[at].lift(force), links[at].lift(rate)
             if (p := links[k].parent) != GROUND:
                 part = self._carried(k, body)
                 own = bodies[p]
@@ -320,21 +322,21 @@ class ForceSlopes:
                     for d, other in enumerate(self._fields[at][:columns]):
                         j = links[at].first + d
                         if j == i or at != k or self._places[j] >= 0:
-                            slopes[j, i] = _project((other.s, other.l), wrench)
+                            slopes[j, i] = dot((other.s, other.l), wrench)
                         else:  # columns of one ball turn with each other
                             slopes[j, i] = self._inner(swept[k][c], field, self._lifted[j, k])
                         if j != i:
                             slopes[i, j] = self._inner(swept[at][d], other, own)
                     if links[at].parent != GROUND:
-                        wrench = _lift(links[at], wrench)
+                        wrench = links[at].lift(wrench)
             if (p := links[k].parent) != GROUND:
-                wrenches[p] = _add(wrenches[p], _lift(links[k], wrenches[k]))
+                wrenches[p] = add(wrenches[p], links[k].lift(wrenches[k]))
         slopes = self._by_coordinates(slopes)
         _subtract(slopes, self._forces_by_position)
         return slopes
 
     @staticmethod
-    def _inner(swept: Twist, field: Field, exerted: Lifted) -> Expr:
+    def _inner(swept: Twist, field: MotionField, exerted: Lifted) -> Expr:
         """How the force along a column changes as all that carries it moves along another one."""
         along = vec.dot(swept[0], exerted.wrench[0]) + vec.dot(field.s_rate, exerted.whirl)
         return along + vec.dot(swept[1], exerted.wrench[1])
@@ -365,9 +367,9 @@ def applied_forces(kinematics: Kinematics) -> list[Expr]:
     result = coordinate_forces(kinematics)
     for k in reversed(range(len(links))):
         for c, column in enumerate(links[k].columns):
-            result[links[k].first + c] = result[links[k].first + c] + _project(column, wrenches[k])
+            result[links[k].first + c] = result[links[k].first + c] + dot(column, wrenches[k])
         if links[k].parent != GROUND:
-            wrenches[links[k].parent] = _add(wrenches[links[k].parent], _lift(links[k], wrenches[k]))
+            wrenches[links[k].parent] = add(wrenches[links[k].parent], links[k].lift(wrenches[k]))
     return result
 
 

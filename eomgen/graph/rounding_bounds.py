@@ -8,56 +8,20 @@ that what cancels is judged by the magnitudes of the terms that were added, not 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..limits.rounding import ROUNDED
+from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
 from .differentiate import gradient
-from .elementary import ELEMENTARY, Elementary
 from .evaluate import Evaluator
 from .substitute import symbols_of
 from .traverse import LEAVES, common_graph, reachable
 from .vectors import Mat3, Vec3
 
 TRIES = 3  #: random points at which an identity is tried
-
-#: Operations that are analytic wherever they are defined: what vanishes around a point vanishes everywhere.
-ANALYTIC = LEAVES | {"add", "sub", "mul", "div", "neg"} | {n for n, f in ELEMENTARY.items() if f.entire}
-
-EXACT = frozenset({"neg", "abs", "min", "max", "select"})  #: operations that do not round
-
-Numbers = Sequence[float]
-
-
-def _by_rate(function: Elementary) -> Callable[[float, Numbers, Numbers], float]:
-    def spread(y: float, x: Numbers, e: Numbers) -> float:
-        with np.errstate(all="ignore"):
-            return float(function.rate(x[0], y)) * e[0]
-
-    return spread
-
-
-#: How bounds (e, f) of operands (a, b) reach y = operation(a, b), rounding of y itself apart.
-SPREAD: dict[str, Callable[[float, Numbers, Numbers], float]] = {
-    "add": lambda y, x, e: e[0] + e[1],
-    "sub": lambda y, x, e: e[0] + e[1],
-    "mul": lambda y, x, e: abs(x[1]) * e[0] + abs(x[0]) * e[1],
-    "div": lambda y, x, e: (e[0] + abs(y) * e[1]) / abs(x[1]),
-    "neg": lambda y, x, e: e[0],
-    "pow": lambda y, x, e: abs(x[1] * y / x[0]) * e[0] + (abs(y * math.log(x[0])) * e[1] if e[1] else 0.0),
-    "sqrt": lambda y, x, e: 0.5 * e[0] / y if e[0] else 0.0,
-    "atan2": lambda y, x, e: (abs(x[1]) * e[0] + abs(x[0]) * e[1]) / (x[0] * x[0] + x[1] * x[1]),
-    "abs": lambda y, x, e: e[0],
-    "min": lambda y, x, e: e[0] if y == x[0] else e[1],
-    "max": lambda y, x, e: e[0] if y == x[0] else e[1],
-    "select": lambda y, x, e: e[1] if x[0] else e[2],
-}
-
-
-for _name, _function in ELEMENTARY.items():
-    SPREAD[_name] = _by_rate(_function)
 
 
 def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -91,20 +55,24 @@ def _spread(
     names = list(values)
     found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
     bounds: dict[int, float] = {}
-    for i in order:
-        operation, *operands = graph.nodes[i]
-        y = found[i]
-        if operation == "sym":
-            bounds[i] = given.get(operands[0], 0.0)
-            continue
-        own = 0.0 if given or operation in EXACT else abs(y)  # a table or a function in C knows its value
-        spread = SPREAD.get(operation)
-        bounds[i] = own
-        if spread is not None:
-            try:
-                bounds[i] += spread(y, [found[k] for k in operands], [bounds[k] for k in operands])
-            except (ValueError, ZeroDivisionError, OverflowError):
-                bounds[i] = math.inf
+    nodes = graph.nodes
+    with np.errstate(all="ignore"):
+        for i in order:
+            operation, *operands = nodes[i]
+            if operation == "sym":
+                bounds[i] = given.get(operands[0], 0.0)
+                continue
+            y, row = found[i], OPERATIONS.get(operation)
+            bound = 0.0 if given or (row is not None and row.exact) else abs(y)
+            if row is not None and row.rates:  # a table or a function in C knows its value
+                try:
+                    x = [found[k] for k in operands]
+                    for rate, k in zip(row.rates, operands, strict=True):
+                        if bounds[k]:
+                            bound += rate(y, *x) * bounds[k]
+                except (ValueError, ArithmeticError):
+                    bound = math.inf
+            bounds[i] = float(bound)
     return np.array([found[y.id] for y in outputs]), np.array([bounds[y.id] for y in outputs])
 
 
@@ -167,9 +135,10 @@ def terms_of(x: Expr) -> Expr:
 
 def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
     found: dict[int, bool] = {}
+    analytic = operations_with(lambda row: row.analytic)
     for i in reachable(graph, (y.id for y in outputs)):
         operation, *operands = graph.nodes[i]
-        found[i] = operation in ANALYTIC and (operation in LEAVES or all(found[k] for k in operands))
+        found[i] = operation in LEAVES or (operation in analytic and all(found[k] for k in operands))
     return [found[y.id] for y in outputs]
 
 

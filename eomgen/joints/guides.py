@@ -76,7 +76,7 @@ class Guide(Joint):
         raise TypeError(f"a {self.type_name} joint cannot be cut")
 
 
-class Turning(Guide):
+class TurningGuide(Guide):
     """A guide on which S also turns freely about its origin, in Euler angles."""
 
     sequence: str
@@ -115,7 +115,7 @@ class SurfaceSlider(Guide):
 
 
 @dataclass(frozen=True)
-class PointOnCurve(Turning):
+class PointOnCurve(TurningGuide):
     """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
 
     A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
@@ -133,7 +133,7 @@ class PointOnCurve(Turning):
 
 
 @dataclass(frozen=True)
-class PointOnSurface(Turning):
+class PointOnSurface(TurningGuide):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "point_on_surface"

@@ -18,7 +18,7 @@ from .joint import LENGTH, Closure, Joint
 
 
 @dataclass(frozen=True)
-class Constraint(Joint):
+class RodJoint(Joint):
     """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
 
     role: ClassVar[str] = "loop"
@@ -44,7 +44,7 @@ def apart(length: Expr, position: Vec3) -> Closure:
 
 
 @dataclass(frozen=True)
-class Distance(Constraint):
+class Distance(RodJoint):
     """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "distance"
@@ -58,7 +58,7 @@ class Distance(Constraint):
 
 
 @dataclass(frozen=True)
-class RevoluteSpherical(Constraint):
+class RevoluteSpherical(RodJoint):
     """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "revolute_spherical"
@@ -71,7 +71,7 @@ class RevoluteSpherical(Constraint):
 
 
 @dataclass(frozen=True)
-class Inline(Constraint):
+class Inline(RodJoint):
     """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "inline"
@@ -82,7 +82,7 @@ class Inline(Constraint):
 
 
 @dataclass(frozen=True)
-class Inplane(Constraint):
+class Inplane(RodJoint):
     """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "inplane"
@@ -93,7 +93,7 @@ class Inplane(Constraint):
 
 
 @dataclass(frozen=True)
-class Parallel(Constraint):
+class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "parallel"
@@ -107,7 +107,7 @@ class Parallel(Constraint):
 
 
 @dataclass(frozen=True)
-class Perpendicular(Constraint):
+class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "perpendicular"
@@ -118,7 +118,7 @@ class Perpendicular(Constraint):
 
 
 @dataclass(frozen=True)
-class Orientation(Constraint):
+class Orientation(RodJoint):
     """All axes stay parallel, the origins are free: S does not turn against P.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "orientation"

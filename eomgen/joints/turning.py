@@ -26,7 +26,7 @@ PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
 
 
 @dataclass(frozen=True)
-class Turning(Joint):
+class RotatingJoint(Joint):
     """What spherical and free joints share: how they describe a rotation.
 
     ``rotation`` is ``euler_angles`` (intrinsic, x-y'-z'' unless ``sequence`` says otherwise; singular where the middle
@@ -69,7 +69,7 @@ class Turning(Joint):
 
 
 @dataclass(frozen=True)
-class Spherical(Turning):
+class Spherical(RotatingJoint):
     """Turns about a point.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "spherical"
@@ -89,7 +89,7 @@ class Spherical(Turning):
 
 
 @dataclass(frozen=True)
-class Free(Turning):
+class Free(RotatingJoint):
     """Six degrees of freedom: position of S in P axes, then its rotation.  Removes none."""
 
     type_name: ClassVar[str] = "free"

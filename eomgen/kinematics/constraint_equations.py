@@ -8,7 +8,7 @@ from ..describe.mechanism import Mechanism
 from ..graph.core import Expr
 from ..graph.substitute import substitute, symbols_of
 from .loops import Row
-from .motion import Motion
+from .motion import MarkerMotion
 
 
 class Coupled(NamedTuple):
@@ -23,7 +23,7 @@ class Coupled(NamedTuple):
     hints: list[tuple[str, Expr]]
 
 
-def couple(mechanism: Mechanism, motion: Motion) -> Coupled:
+def couple(mechanism: Mechanism, motion: MarkerMotion) -> Coupled:
     """Ask every constraint element for its equations; coordinates of cut joints become functions of the tree's."""
     rows: list[Row] = []
     aligned: list[tuple[str, Expr]] = []

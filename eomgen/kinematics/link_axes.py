@@ -25,7 +25,7 @@ Rows = tuple[tuple[Expr, ...], ...]
 
 
 @dataclass(frozen=True)
-class Block:
+class SlidingTriple:
     """Three velocities of a link: the first, link axes to the axes they are along, gravity in these if it falls."""
 
     link: int
@@ -39,7 +39,7 @@ class Turned:
     """M w' + h = 0 in turned velocities; ``form`` derives (M, h) when they are first asked for."""
 
     form: Callable[[], tuple[Rows, tuple[Expr, ...]]]
-    blocks: tuple[Block, ...]
+    blocks: tuple[SlidingTriple, ...]
 
     @cached_property
     def system(self) -> tuple[Rows, tuple[Expr, ...]]:
@@ -51,23 +51,23 @@ class Turned:
         return turn_back(self.blocks, solution)
 
 
-def turn_links(kinematics: Kinematics) -> tuple[Kinematics, tuple[Block, ...]]:
+def turn_links(kinematics: Kinematics) -> tuple[Kinematics, tuple[SlidingTriple, ...]]:
     """The kinematics with unit vectors for the columns of such joints, and where these are."""
     links: list[Link] = []
-    blocks: list[Block] = []
+    blocks: list[SlidingTriple] = []
     graph = kinematics.graph
     for k, link in enumerate(kinematics.links):
         if _slides_along_parent(link):
             unit = [(vec.zero(graph), axis) for axis in vec.identity(graph)]
             falls = link.parent == GROUND
             gravity = vec.transpose_times(link.turn, kinematics.mechanism.gravity) if falls else None
-            blocks.append(Block(k, link.first, link.joint_rotation, gravity))
+            blocks.append(SlidingTriple(k, link.first, link.joint_rotation, gravity))
             link = replace(link, columns=(*unit, *link.columns[3:]))
         links.append(link)
     return (replace(kinematics, links=tuple(links)) if blocks else kinematics), tuple(blocks)
 
 
-def turn_forces(blocks: Sequence[Block], forces: Sequence[Expr]) -> list[Expr]:
+def turn_forces(blocks: Sequence[SlidingTriple], forces: Sequence[Expr]) -> list[Expr]:
     """Forces along the velocities v -> along w."""
     result = list(forces)
     for b in blocks:
@@ -76,7 +76,7 @@ def turn_forces(blocks: Sequence[Block], forces: Sequence[Expr]) -> list[Expr]:
     return result
 
 
-def turn_back(blocks: Sequence[Block], accelerations: Sequence[Expr]) -> list[Expr]:
+def turn_back(blocks: Sequence[SlidingTriple], accelerations: Sequence[Expr]) -> list[Expr]:
     """w' -> v'."""
     result = list(accelerations)
     for b in blocks:
@@ -86,7 +86,7 @@ def turn_back(blocks: Sequence[Block], accelerations: Sequence[Expr]) -> list[Ex
     return result
 
 
-def falling(blocks: Sequence[Block]) -> frozenset[int]:
+def falling(blocks: Sequence[SlidingTriple]) -> frozenset[int]:
     """Links from which outwards gravity is left out."""
     return frozenset(b.link for b in blocks if b.gravity is not None)
 

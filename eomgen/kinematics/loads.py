@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.spatial import Wrench
 from .kinematics import Kinematics
-from .link_inertia import Wrench
 
 
 def applied_wrenches(kinematics: Kinematics) -> list[Wrench]:

@@ -14,7 +14,7 @@ from ..graph.substitute import substitute, symbols_of
 from ..limits.rounding import ROUNDED
 from ..records import dataclass
 from .angle_sums import sum_of_turns
-from .state import State
+from .state import MotionSymbols
 from .tree import Poses
 
 
@@ -101,7 +101,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State, length: Expr
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: MotionSymbols, length: Expr
 ) -> Constraints:
     """Form C_q, C_t, C' and gamma of the rows that do not vanish identically; ``length`` is that of the mechanism."""
     sizes = {"length": length.value or 0.0, "angle": 1.0}

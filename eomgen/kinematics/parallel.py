@@ -13,11 +13,12 @@ from dataclasses import fields, replace
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, cos, sin
+from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
 from .joint_rates import JointRates
-from .link_inertia import SpatialInertia, Wrench
-from .tree import Link, Twist, link_twists
+from .link_inertia import SpatialInertia
+from .tree import Link, link_twists
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class StateLayout:
 
 
 @dataclass(frozen=True)
-class State:
+class MotionSymbols:
     """The symbols of the motion: coordinates, velocities, accelerations, time; and q' in terms of them."""
 
     q: tuple[Expr, ...]

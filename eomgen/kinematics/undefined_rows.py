@@ -9,17 +9,17 @@ from ..constraints import RollingDisc
 from ..describe.mechanism import Mechanism
 from ..errors import ModelError, Problem
 from ..forces import Line, Route
-from ..frames import Cylinder, Marker
+from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import symbols_of
-from .motion import Motion
+from .motion import MarkerMotion
 
 if TYPE_CHECKING:
     from .loops import Constraints
 
 
-def find_flaws(mechanism: Mechanism, motion: Motion) -> list[Problem]:
+def find_flaws(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
     """Force elements whose ends never part or lie in a cylinder, and discs that lie flat, at every position."""
     problems = []
     for force in mechanism.forces:
@@ -38,11 +38,11 @@ def find_flaws(mechanism: Mechanism, motion: Motion) -> list[Problem]:
     return problems
 
 
-def _meet(motion: Motion, start: Marker, end: Marker) -> bool:
+def _meet(motion: MarkerMotion, start: Marker, end: Marker) -> bool:
     return all(x.is_zero for x in motion.relative(start, end).position)
 
 
-def _flaws_of_route(mechanism: Mechanism, motion: Motion, place: str, route: Route) -> list[Problem]:
+def _flaws_of_route(mechanism: Mechanism, motion: MarkerMotion, place: str, route: Route) -> list[Problem]:
     problems = []
     stops = [route.start, *route.via, route.end]
     for k, (one, other) in enumerate(pairwise(stops)):
@@ -50,7 +50,7 @@ def _flaws_of_route(mechanism: Mechanism, motion: Motion, place: str, route: Rou
             what = f"{one.label} and {other.label}, which follow each other, are always at the same point"
             problems.append(mechanism.problem(place, what, "leave one of them out"))
         for cylinder, end in ((one, other), (other, one)):
-            if isinstance(cylinder, Cylinder) and isinstance(end, Marker):
+            if isinstance(cylinder, WrapCylinder) and isinstance(end, Marker):
                 x, y, _ = motion.relative(cylinder.marker, end).position
                 number = _number(mechanism, x * x + y * y - cylinder.radius * cylinder.radius)
                 if number is not None and number < 0.0:

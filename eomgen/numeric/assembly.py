@@ -9,12 +9,12 @@ import numpy as np
 
 from ..errors import AssemblyError, UnavailableError
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
-from .closure import Equations, System, close, closed
+from .closure import ClosureSystem, WantedValues, close, closed
 from .projection import largest
 from .scales import Array, Indices, Position, Scales
 from .starts import starts
 
-__all__ = ["Assembly", "Equations", "Rates", "VelocityEquations", "assemble", "assemble_velocity"]
+__all__ = ["Assembly", "Rates", "VelocityEquations", "WantedValues", "assemble", "assemble_velocity"]
 
 RESTARTS = 24  #: further starts near the guess
 
@@ -35,7 +35,7 @@ def assemble(
     scales: Scales,
     *,
     held: Sequence[int] | Indices = (),
-    equations: Equations | None = None,
+    equations: WantedValues | None = None,
     alignment: Callable[[Array], Array] | None = None,
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
@@ -52,7 +52,7 @@ def assemble(
     scales : Scales
     held : sequence of int
         Coordinates that must not move.
-    equations : Equations, optional
+    equations : WantedValues, optional
         Values of functions of q to reach exactly.
     alignment : callable, optional
         q -> (n_a,) numbers that are positive unless a loop closes with a joint's axes flipped.
@@ -75,7 +75,7 @@ def assemble(
     held = scales.velocities(held)
     free = np.ones(len(scales.q))
     free[held] = 0.0
-    system = System(position, scales, free, equations)
+    system = ClosureSystem(position, scales, free, equations)
     best, least, flipped = guess, np.inf, False
     for attempt, start in enumerate(starts(guess, free, scales, restarts)):
         with np.errstate(all="ignore"):
@@ -90,11 +90,11 @@ def assemble(
     raise _failed(system, guess, held, best, flipped, names, labels, restarts)
 
 
-def _failed(system: System, *found: Any) -> AssemblyError:
+def _failed(system: ClosureSystem, *found: Any) -> AssemblyError:
     """The error that says why; a slim package says only that."""
     try:
-        from .assembly_failure import Failure
+        from .assembly_failure import AssemblyFailure
     except UnavailableError:
         return AssemblyError("the loops do not close with the given values; give others, or check the dimensions")
-    failure = Failure(system, *found)
+    failure = AssemblyFailure(system, *found)
     return AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])

@@ -9,17 +9,17 @@ import numpy as np
 
 from ..limits.constraints import CONTRADICTION, MEASURED
 from . import algebra
-from .closure import FAR, System, close, closed, remoteness
+from .closure import FAR, ClosureSystem, close, closed, remoteness
 from .projection import largest
 from .ranks import rank
 from .scales import Array, Indices
 from .starts import starts
 
 
-class Failure(NamedTuple):
+class AssemblyFailure(NamedTuple):
     """Everything needed to say why an assembly failed."""
 
-    system: System
+    system: ClosureSystem
     guess: Array
     held: Indices
     best: Array
@@ -43,7 +43,7 @@ class Failure(NamedTuple):
         if not given:
             tried = f"({self.restarts + 1} starts tried)"
             return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
-        free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
+        free = ClosureSystem(self.system.position, self.system.scales, np.ones_like(self.system.free))
         for start in starts(self.best, free.free, free.scales, self.restarts // 2):
             with np.errstate(all="ignore"):
                 q, residual = close(free, start)

@@ -2,15 +2,15 @@
 
 from ..kernel_table import KERNELS, Kernel, Sizes
 from .build_program import ABI, build_program
-from .program import Block, Driver, Limits, Port, Program
+from .program import Block, KernelDriver, Limits, Port, Program
 from .terms import SystemTerms
 
 __all__ = [
     "ABI",
     "KERNELS",
     "Block",
-    "Driver",
     "Kernel",
+    "KernelDriver",
     "Limits",
     "Port",
     "Program",

@@ -17,7 +17,7 @@ from ..kernel_table import KERNELS, Kernel, Sizes
 from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
-from .program import Block, Driver, Limits, Program
+from .program import Block, KernelDriver, Limits, Program
 from .terms import SystemTerms
 
 #: Version of the generated functions' signatures and of the table that describes them.
@@ -72,7 +72,7 @@ def build_program(
         has |= {"dae_residual": False, "dae_jacobian": False}
     wanted = [k for k in _select(kernels) if has.get(k.name, True) and not (k.late and 0 in k.shape(sizes))]
     blocks: dict[str, Block] = {}
-    drivers: list[Driver] = []
+    drivers: list[KernelDriver] = []
     needed: dict[str, None] = {}
     for kernel in wanted:
         block = maker.public(kernel.name)
@@ -81,7 +81,7 @@ def build_program(
             continue
         behind = maker.drivers_need(kernel.name)
         needed.update(dict.fromkeys(behind))
-        drivers.append(Driver(kernel.name, tuple(map(maker.port, kernel.inputs)), kernel.shape(sizes), behind))
+        drivers.append(KernelDriver(kernel.name, tuple(map(maker.port, kernel.inputs)), kernel.shape(sizes), behind))
     for other in needed:
         if other not in blocks:
             public = maker.public(other) if any(k.name == other for k in KERNELS) else None

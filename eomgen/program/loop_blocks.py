@@ -18,7 +18,7 @@ from ..limits.crossings import NEAR_SQUARE
 from ..limits.inertia import STILL
 from ..limits.rounding import ROW
 from .factor import exceeding
-from .sparse import Factor, Row, dot, factorize, fill, gram, rows_of, times, transpose
+from .sparse import Row, SparseFactor, dot, factorize, fill, gram, rows_of, times, transpose
 from .terms import SystemTerms
 from .triangular import DiagonalBlock, diagonal_blocks
 
@@ -106,7 +106,7 @@ class LoopBlocks:
             pattern[i] = dict.fromkeys(sorted({j for k in row for j in touching[k]}))
         return 2 * fill(pattern) + n * f * f + f**3 // 6
 
-    def _regularised(self, rows: Sequence[Row], relative: Expr | float) -> tuple[Factor, Expr]:
+    def _regularised(self, rows: Sequence[Row], relative: Expr | float) -> tuple[SparseFactor, Expr]:
         """The factor of J J^T + relative max(diag) I, and what was added."""
         G = gram(rows)
         size = largest([row.get(i, self.terms.graph.zero) for i, row in enumerate(G)])
@@ -143,7 +143,7 @@ class LoopBlocks:
 
     # -- velocity and acceleration --------------------------------------------------------------------------------
     @cached_property
-    def _factor(self) -> tuple[Factor, tuple[int, int]]:
+    def _factor(self) -> tuple[SparseFactor, tuple[int, int]]:
         """The factor of J J^T, and how many passes of both corrections by it leave no trace of its regularisation."""
         if self.gentle:
             factor, term = self._regularised(self.J, GENTLE)

@@ -74,7 +74,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Driver:
+class KernelDriver:
     """A public function that target code with loops and Newton iterations computes from blocks.
 
     Attributes
@@ -127,7 +127,7 @@ class Program:
     inputs: tuple[str, ...]
     sizes: Sizes
     blocks: tuple[Block, ...]
-    drivers: tuple[Driver, ...]
+    drivers: tuple[KernelDriver, ...]
     hoisted: tuple[Expr, ...]
     parameter_only: frozenset[int]
     preferred: tuple[int, ...]
@@ -173,8 +173,8 @@ class Program:
         return not self.block_names.isdisjoint(BY_COLUMNS)
 
     @property
-    def kernels(self) -> tuple[Block | Driver, ...]:
+    def kernels(self) -> tuple[Block | KernelDriver, ...]:
         """The public functions, in the order of the metadata."""
-        found: dict[str, Block | Driver] = {b.name: b for b in self.blocks if b.public}
+        found: dict[str, Block | KernelDriver] = {b.name: b for b in self.blocks if b.public}
         found.update((d.name, d) for d in self.drivers)
         return tuple(found[name] for name in self.metadata["kernels"])

@@ -16,7 +16,7 @@ from ..describe.scope import RATES
 _STRANGE = re.compile(r"[^A-Za-z0-9_]")
 
 
-class Names:
+class RobotNames:
     """Gives out names: bodies and joints have a list each; coordinates, parameters and inputs share one."""
 
     def __init__(self) -> None:

@@ -13,19 +13,19 @@ from ..describe.names import nearest
 from ..errors import ModelError
 from ..numeric.rigid_inertia import fault_of_inertia, inertia_scales, longest_within
 from ..numeric.rotation_matrices import about
-from .robot import Joint, Link, Options, Robot
+from .robot import Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, Inertia, Placement, moved, sum_inertias
 
 GROUND = ""  #: the body that stands still
 
 
 @dataclass
-class Body:
+class RobotBody:
     """Links that move as one: frames of the links in the body, and the joint that carries it."""
 
     name: str
-    joint: Joint | None
-    members: list[tuple[Link, Placement]] = field(default_factory=list)
+    joint: RobotJoint | None
+    members: list[tuple[RobotLink, Placement]] = field(default_factory=list)
 
     def inertia(self) -> Inertia:
         """Of all links together, in body axes."""
@@ -36,12 +36,12 @@ class Body:
 class Bodies:
     """The bodies of a robot in order from the root (ground first), and where each link is."""
 
-    bodies: dict[str, Body]
+    bodies: dict[str, RobotBody]
     home: dict[str, tuple[str, Placement]]  #: link -> body and frame in it
     massless: bool = False  #: nothing that moves has a mass: a robot for kinematics
 
 
-def build_bodies(robot: Robot, options: Options) -> Bodies:
+def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
     """Sort the links into bodies.
 
     Raises
@@ -59,15 +59,15 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
         if options.check_inertia == "error":
             _check_inertias(robot)
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
-    carried: dict[str, list[Joint]] = {}
+    carried: dict[str, list[RobotJoint]] = {}
     for joint in robot.joints.values():
         carried.setdefault(joint.parent, []).append(joint)
-    base = Body(GROUND, None)
+    base = RobotBody(GROUND, None)
     found = Bodies({GROUND: base}, {})
     link = robot.links[root]
     if options.floating:
-        free = Joint("base", "free", GROUND, root, link.place)
-        found.bodies[root] = Body(root, free, [(link, IDENTITY)])
+        free = RobotJoint("base", "free", GROUND, root, link.place)
+        found.bodies[root] = RobotBody(root, free, [(link, IDENTITY)])
         found.home[root] = root, IDENTITY
     else:
         base.members.append((link, IDENTITY))
@@ -81,7 +81,7 @@ def build_bodies(robot: Robot, options: Options) -> Bodies:
             frame = frame @ joint.outer @ joint.inner.inverse()
         else:
             body, frame = link.name, IDENTITY
-            found.bodies[body] = Body(body, joint)
+            found.bodies[body] = RobotBody(body, joint)
         found.bodies[body].members.append((link, frame))
         found.home[link.name] = body, frame
         waiting.extend(reversed(carried.get(link.name, ())))
@@ -114,7 +114,7 @@ def find_tied(robot: Robot, found: Bodies) -> set[str]:
     return tied
 
 
-def _lock(robot: Robot, options: Options) -> None:
+def _lock(robot: Robot, options: RobotOptions) -> None:
     """Turn locked joints into welds at their values."""
     for name, value in options.locked.items():
         joint = robot.joints.get(name)
@@ -137,7 +137,7 @@ def _lock(robot: Robot, options: Options) -> None:
 
 def _check_ends(robot: Robot) -> None:
     """Note joints whose links do not exist, and links that two joints carry."""
-    carrier: dict[str, Joint] = {}
+    carrier: dict[str, RobotJoint] = {}
     for joint in robot.joints.values():
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link and link not in robot.links:
@@ -175,7 +175,7 @@ def _root(robot: Robot) -> str:
     return roots[0].name if roots else ""
 
 
-def _check_mimic(robot: Robot, joint: Joint) -> None:
+def _check_mimic(robot: Robot, joint: RobotJoint) -> None:
     if joint.mimic is None:
         return
     other = robot.joints.get(joint.mimic.joint)
@@ -215,7 +215,7 @@ def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
     A robot without any mass is no slip of the pen: it is one for kinematics, and a note says so.
     """
     heavy: set[str] = set()
-    idle: list[Joint] = []
+    idle: list[RobotJoint] = []
     for body in reversed(found.bodies.values()):  # children come after their parents
         inertia = body.inertia()
         if not inertia.is_nothing:

@@ -17,7 +17,7 @@ from ..files.path_names import as_name
 from ..limits.files import LARGEST
 from ..numeric.rigid_inertia import CHECKS, word_of_check
 from .describe_robot import describe_robot
-from .robot import Options
+from .robot import RobotOptions
 from .urdf import read_urdf
 from .xml_text import read_xml
 
@@ -33,7 +33,7 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
     ----------
     path : str or path
     **given
-        Fields of :class:`~eomgen.robots.robot.Options`.
+        Fields of :class:`~eomgen.robots.robot.RobotOptions`.
 
     Returns
     -------
@@ -66,14 +66,14 @@ def describe_file(path: str | os.PathLike[str], **given: Any) -> Description:
     return describe_robot(robot, options)
 
 
-def make_options(given: dict[str, Any]) -> Options:
+def make_options(given: dict[str, Any]) -> RobotOptions:
     """Checked options.
 
     Raises
     ------
     UsageError
     """
-    known = [field.name for field in fields(Options)]
+    known = [field.name for field in fields(RobotOptions)]
     for key in given:
         if key not in known:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
@@ -97,7 +97,7 @@ def make_options(given: dict[str, Any]) -> Options:
         raise UsageError(f"snap={given['snap']!r}: an angle (rad), 0 or positive")
     if given.get("assets") is not None:
         as_name("assets", given["assets"])
-    return Options(**given)
+    return RobotOptions(**given)
 
 
 def _is_number(value: Any) -> bool:

@@ -23,7 +23,7 @@ from .room import read_numbers
 
 if TYPE_CHECKING:
     from .protocols import Core, Motion, State, Timed
-    from .tree_motion import Path
+    from .tree_motion import DependentMotion
 
 
 class BoundModel(Assembled, Momenta):
@@ -165,10 +165,10 @@ class BoundModel(Assembled, Momenta):
     # kinematics
 
     @cached_property
-    def _path(self) -> tuple[Path, Callable[[float], Array]]:
-        from .tree_motion import Path
+    def _path(self) -> tuple[DependentMotion, Callable[[float], Array]]:
+        from .tree_motion import DependentMotion
 
-        return Path(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
+        return DependentMotion(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
 
     def kinematics(
         self,

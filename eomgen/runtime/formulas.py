@@ -22,7 +22,7 @@ from ..numeric.scales import Array
 from .input_kinds import Expressed
 from .layout import Layout
 from .near_names import unknown
-from .tapes import BRANCHING, SWITCHING, Tape
+from .tapes import Tape, bends, jumps_where_equal
 
 
 class Formula(Expressed):
@@ -60,15 +60,15 @@ class Formula(Expressed):
     def branches(self) -> bool:
         """Whether it has conditions, at which it may jump or bend."""
         graph = self.expression.graph
-        return any(graph.nodes[i][0] in BRANCHING for i in reachable(graph, [self.expression.id]))
+        return bends(graph.nodes[i][0] for i in reachable(graph, [self.expression.id]))
 
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
         graph, found = self.expression.graph, []
         for i in reachable(graph, [self.expression.id]):
             node = graph.nodes[i]
-            if node[0] in SWITCHING:
-                found.append(Expr(graph, graph.sub(*node[1:3]) if node[0] != "sign" else node[1]))
+            if jumps_where_equal(node[0]):
+                found.append(Expr(graph, graph.sub(*node[1:]) if len(node) == 3 else node[1]))
         evaluate, values = compile_evaluator(found, ("t", *self.layout.x, *self.layout.p)), p.tolist()
         return lambda t, x: [float(value) for value in evaluate([t, *np.asarray(x).tolist(), *values])]
 

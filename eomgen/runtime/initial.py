@@ -18,7 +18,7 @@ from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
 from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
-from ..numeric.closure import Equations, System, close, closed
+from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.continuation import follow, follow_time
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
@@ -108,7 +108,7 @@ class Initial:
         """A position with coordinates of the tree replaced; loops are not closed."""
         return self._with(q, values)
 
-    def _equations(self, values: Mapping[str, float]) -> Equations | None:
+    def _equations(self, values: Mapping[str, float]) -> WantedValues | None:
         layout = self.layout
         names = [name for name in values if name in layout.loops]
         if not names:
@@ -120,7 +120,7 @@ class Initial:
             return y[chosen], y_q[chosen]
 
         wanted = np.array([values[name] for name in names])
-        return Equations(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
+        return WantedValues(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
 
     # positions
 
@@ -229,7 +229,7 @@ class Initial:
         layout = self.layout
         free = np.ones(len(self.place.q))
         free[self.place.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
-        system = System(self.position, self.place, free, self._equations(given))
+        system = ClosureSystem(self.position, self.place, free, self._equations(given))
         found = [first]
         for start in starts(first, free, self.place, tries):
             with np.errstate(all="ignore"):

@@ -9,10 +9,10 @@ from ..texts import visible
 from .near_names import require
 
 if TYPE_CHECKING:
-    from .protocols import Columns
+    from .protocols import TrajectoryLike
 
 
-def plot(trajectory: Columns, names: Sequence[str], ax: Any = None) -> Any:
+def plot(trajectory: TrajectoryLike, names: Sequence[str], ax: Any = None) -> Any:
     """Draw columns over time; see :meth:`.trajectory.Trajectory.plot`."""
     rows = {name: trajectory[name] for name in names}  # unknown names fail before a figure opens
     pyplot = require("matplotlib.pyplot", "matplotlib", "plot")

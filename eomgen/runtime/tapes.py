@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..numeric.scales import Array
+from ..operations import OPERATIONS, operations_with
 from .input_kinds import Expressed
 
 #: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
@@ -42,7 +41,7 @@ class DeclaredSignal(Expressed):
     @property
     def branches(self) -> bool:
         """Whether it has conditions, at which it may jump or bend."""
-        return not {op for op, *_ in self.tape[0]}.isdisjoint(BRANCHING)
+        return bends(op for op, *_ in self.tape[0])
 
     def function(self, p: Array) -> Callable[[float, Array], float]:
         """f(t, x) at given parameters (n_p,)."""
@@ -52,9 +51,9 @@ class DeclaredSignal(Expressed):
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
         code, numbers, _ = self.tape
-        own = [(op, a, b) for op, a, b, _ in code if op in SWITCHING]
-        added = [("sub", a, b, 0) for op, a, b in own if op != "sign"]
-        out = [*range(len(code), len(code) + len(added)), *(a for op, a, _ in own if op == "sign")]
+        own = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if jumps_where_equal(op)]
+        added = [("sub", a, b, 0) for arity, a, b in own if arity == 2]
+        out = [*range(len(code), len(code) + len(added)), *(a for arity, a, _ in own if arity == 1)]
         return _player(([*code, *added], numbers, out), p)
 
     def slopes(self, p: Array) -> Callable[[float, Array], Array]:
@@ -67,6 +66,16 @@ class DeclaredSignal(Expressed):
             return result
 
         return slopes
+
+
+def bends(operations: Iterable[str]) -> bool:
+    """Whether one of them may jump or bend."""
+    return not operations_with(lambda row: row.bends).isdisjoint(operations)
+
+
+def jumps_where_equal(operation: str) -> bool:
+    """Whether it jumps where what it compares is equal."""
+    return operation in OPERATIONS and OPERATIONS[operation].jumps
 
 
 def _tape(given: Sequence[Any]) -> Tape:
@@ -89,61 +98,14 @@ def _player(tape: Tape, p: Array) -> Callable[[float, Array], list[float]]:
             elif op in leaves:
                 value = leaves[op][a]
             else:
-                operands = (results[a], results[b], results[c])
+                row = OPERATIONS[op]
+                operands = (results[a], results[b], results[c])[: row.arity]
                 try:
-                    value = OPERATIONS[op](*operands)
+                    value = row.value(*operands)
                 except (ArithmeticError, ValueError):  # outside of its domain, or infinite: as C has it
                     with np.errstate(all="ignore"):
-                        value = BEYOND[op](*operands)
+                        value = row.array(*operands)
             results.append(float(value))
         return [results[k] for k in out]
 
     return play
-
-
-def _one(function: Callable[[float], float]) -> Callable[[float, float, float], float]:
-    return lambda a, b, c: function(a)
-
-
-def _two(function: Callable[[float, float], float]) -> Callable[[float, float, float], float]:
-    return lambda a, b, c: function(a, b)
-
-
-#: Functions of one argument, by the names of math.h.
-FUNCTIONS = (
-    *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("asinh", "acosh", "atanh"),
-)
-#: What each operation of a tape does, as tape.c does it.
-OPERATIONS: dict[str, Callable[[float, float, float], float]] = {
-    "add": lambda a, b, c: a + b,
-    "sub": lambda a, b, c: a - b,
-    "mul": lambda a, b, c: a * b,
-    "div": lambda a, b, c: a / b,
-    "neg": lambda a, b, c: -a,
-    "pow": _two(math.pow),
-    "atan2": _two(math.atan2),
-    "abs": _one(abs),
-    "sign": lambda a, b, c: a if a != a else (a > 0) - (a < 0),
-    "min": lambda a, b, c: a if a <= b or a != a else b,
-    "max": lambda a, b, c: a if a >= b or a != a else b,
-    "lt": lambda a, b, c: a < b,
-    "le": lambda a, b, c: a <= b,
-    "eq": lambda a, b, c: a == b,
-    "not": lambda a, b, c: not a,
-    "and": lambda a, b, c: bool(a) and bool(b),
-    "or": lambda a, b, c: bool(a) or bool(b),
-    "select": lambda a, b, c: b if a else c,
-}
-OPERATIONS |= {name: _one(getattr(math, name)) for name in FUNCTIONS}
-#: The same where Python raises what C has a value for: log(0), 1/0, exp(1000).
-BEYOND: dict[str, Callable[[float, float, float], float]] = {
-    "div": lambda a, b, c: float(np.divide(a, b)),
-    "pow": lambda a, b, c: float(np.power(a, b)),
-} | {name: _one(getattr(np, re.sub("^a", "arc", name))) for name in FUNCTIONS}
-
-
-#: Operations at which an expression may jump or bend.
-BRANCHING = ("abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select")
-#: Those that jump where what they compare is equal.
-SWITCHING = ("sign", "lt", "le", "eq")

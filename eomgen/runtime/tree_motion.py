@@ -23,7 +23,7 @@ JUMP = 0.6  #: largest scaled change of any coordinate in one step; more may be 
 HALVINGS = 8  #: of a step, before giving up
 
 
-class Path:
+class DependentMotion:
     """Solves the dependent coordinates of one model, never switching branch silently."""
 
     def __init__(self, kernels: Kernels) -> None:
@@ -132,7 +132,7 @@ class Path:
 
 
 def motions(
-    path: Path,
+    path: DependentMotion,
     reference: Callable[[float], Array],
     given: Sequence[ArrayLike | None],
     guess: Array | None,
@@ -142,7 +142,7 @@ def motions(
 
     Parameters
     ----------
-    path : Path
+    path : DependentMotion
     reference : callable
         t -> the closed position (n,) to start from.
     given : three arrays (n_dof,) or (n_dof, k), or None

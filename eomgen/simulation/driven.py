@@ -19,7 +19,7 @@ from ..analysis.roots import find_root
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
-from .events import UNWATCHED, Event, Events
+from .events import UNWATCHED, Events, RunEvent
 from .run_arguments import find_span, ordered_times
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def simulate_driven(
     initial: Mapping[str, float] | ArrayLike | None,
     forcing: Forcing,
     t_eval: Array | None,
-    events: Sequence[Event],
+    events: Sequence[RunEvent],
     given: Mapping[str, Any],
 ) -> KinematicAnalysis:
     """The motion over a span; see :func:`~.simulate.simulate`.
@@ -102,7 +102,7 @@ def simulate_driven(
     span : (float, float)
     t_eval : (n_t,) array, optional
         Within the span, in order.
-    events : sequence of Event
+    events : sequence of RunEvent
     given : mapping
         Options meant for an integrator; tolerances and steps have no meaning here.
 
@@ -145,7 +145,7 @@ def simulate_driven(
     else:
         t = t_eval
         s = sense * (t - start)
-    run = _Run(followed, forcing, start, sense)
+    run = _DrivenRun(followed, forcing, start, sense)
     t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [followed.end]])))
     message, status = ("A termination event occurred.", 1) if last is not None else ("The end was reached.", 0)
     if last is not None:
@@ -162,7 +162,7 @@ def simulate_driven(
     )
 
 
-class _Run:
+class _DrivenRun:
     """Samples of one followed path as states."""
 
     def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float) -> None:
@@ -172,10 +172,10 @@ class _Run:
         q, v, _ = self.followed.motion(np.array([s]), None)
         return np.concatenate([q[:, 0], v[:, 0]])
 
-    def _value(self, event: Event, s: float) -> float:
+    def _value(self, event: RunEvent, s: float) -> float:
         return event(self.start + self.sense * s, self.state(s))
 
-    def find(self, events: Sequence[Event], grid: Array) -> tuple[list[Array], list[Array], float | None]:
+    def find(self, events: Sequence[RunEvent], grid: Array) -> tuple[list[Array], list[Array], float | None]:
         """Times and states of events, and where a terminal one ends the run."""
         found: list[list[float]] = [[] for _ in events]
         if events:

@@ -18,7 +18,7 @@ from ..limits.rounding import EPS
 from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
 from ..numeric.scales import Array
 from .event_values import EventValues
-from .events import GO_ON, RESET, UNWATCHED, WAIT, Event, Events, crowd_of
+from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of
 
 GOLDEN = 0.3819660112501051
 
@@ -52,7 +52,7 @@ class Crossings:
 
     Parameters
     ----------
-    events : sequence of Event
+    events : sequence of RunEvent
     rhs : callable
         (t, x) -> x'.
     start, end : float
@@ -64,7 +64,9 @@ class Crossings:
         Times and states of each event so far.
     """
 
-    def __init__(self, events: Sequence[Event], rhs: Callable[[float, Array], Array], start: float, end: float) -> None:
+    def __init__(
+        self, events: Sequence[RunEvent], rhs: Callable[[float, Array], Array], start: float, end: float
+    ) -> None:
         self.events, self.rhs, self.span, self.forward = events, rhs, abs(end - start), -1.0 if end < start else 1.0
         n = len(events)
         self.t: list[list[float]] = [[] for _ in events]

@@ -16,7 +16,7 @@ from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
-from .events import Event
+from .events import RunEvent
 
 if TYPE_CHECKING:
     from .solver_state import Pause
@@ -127,7 +127,7 @@ def integrate(
     x0: Array,
     solver: Any,
     t_eval: Array | None,
-    events: Sequence[Event],
+    events: Sequence[RunEvent],
     dense: bool,
     options: dict[str, Any],
     pace: Pace | None,
@@ -166,8 +166,8 @@ class _Journey:
     """One run on its way."""
 
     def __init__(
-        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None, events: Sequence[Event],
-        dense: bool, options: dict[str, Any], pace: Pace | None,
+        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
+        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace | None,
     ) -> None:  # fmt: skip
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
         self.options, self.pace = options, pace

@@ -23,7 +23,7 @@ from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .events import Events, told_by_the_caller, warn_of_unknown
-from .input_slopes import Slopes
+from .input_slopes import SlopesNow
 from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
 from .recording import record
@@ -204,7 +204,7 @@ def _require_same(found: Trajectory, alone: Trajectory) -> None:
             )
 
 
-def _inputs(run: Variational, t: float, x: Array) -> Slopes | None:
+def _inputs(run: Variational, t: float, x: Array) -> SlopesNow | None:
     return run.inputs(t, x) if run.forcing else None
 
 

@@ -16,7 +16,7 @@ from ..graph.vectors import Vec3
 from ..records import dataclass
 
 
-class Dimension(NamedTuple):
+class SolidSize(NamedTuple):
     """A key of a solid: ``kind`` is ``expression`` (a length) or ``vector`` (three of them)."""
 
     kind: str
@@ -36,7 +36,7 @@ class Solid(ABC):
     lengths: Mapping[str, Vec3]
 
     type_name: ClassVar[str]
-    dimensions: ClassVar[dict[str, Dimension]]
+    dimensions: ClassVar[dict[str, SolidSize]]
     has_axis: ClassVar[bool] = False  #: whether z of its own axes can be laid along an ``axis``
     content_key: ClassVar[str] = "density"  #: the key that gives the mass through :meth:`content`
 

@@ -18,7 +18,7 @@ from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from .cases import Case
 from .rounding_sizes import FOLDED, UNIT, bounded
-from .truth import System, Truth
+from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:
     from ..derivation import Derivation
@@ -45,7 +45,7 @@ class Bench:
         self.kinematics = equations.kinematics
         self.mechanism = equations.kinematics.mechanism
         self.terms: SystemTerms = collect_terms(equations.kinematics, equations.mobility, equations.tree)
-        self.system = System(equations, self.terms)
+        self.system = PreciseSystem(equations, self.terms)
         self._bounds: dict[str, tuple[Array, Array]] = {}
 
     @cached_property

@@ -19,6 +19,7 @@ from ..limits.constraints import ACCEPTED
 from ..limits.verification import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 from ..numeric import algebra
 from ..numeric.scales import Array
+from ..operations import operations_with
 from ..runtime.near_names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
@@ -33,7 +34,6 @@ ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
 #: By how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others.
 SHORT = 0.5
 JUDGED = 3  #: states that single steps are taken from
-KINKED = frozenset({"abs", "sign", "min", "max", "lt", "le", "select"})  #: operations with kinks
 LONG = 2.0  #: length of a run, in times in which the state changes by its own size
 FIRST = 4.0  #: the first step tried, in the same times
 MOST = 3000  #: evaluations of a run that is smooth
@@ -75,7 +75,8 @@ def _kinked(bench: Bench) -> bool:
     """Whether right-hand sides may have kinks, where methods need not keep their order."""
     terms = bench.terms
     nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
-    return any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes)
+    kinked = operations_with(lambda row: row.bends).union(terms.graph.calls)
+    return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
 def _methods(bench: Bench) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Values = dict[str, Number]
 
 
-class System:
+class PreciseSystem:
     """A model's expressions in many digits, and its description: what a :class:`~.truth.Truth` is found from.
 
     Parameters
@@ -50,16 +50,16 @@ class System:
         return {name: number(float(x)) for name, x in zip(names, numbers, strict=True)}
 
 
-class State:
+class PreciseState:
     """One state of a model, and the ways that lead through it.
 
     Parameters
     ----------
-    system : System
+    system : PreciseSystem
     case : Case
     """
 
-    def __init__(self, system: System, case: Case) -> None:
+    def __init__(self, system: PreciseSystem, case: Case) -> None:
         self.system, self.case, self.mp = system, case, system.mp
         self.values = system.values(case)
         self.n = len(system.terms.v)

@@ -14,78 +14,32 @@ from typing import Any
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.elementary import ELEMENTARY, Elementary
-from ..graph.evaluate import FUNCTIONS
 from ..graph.traverse import common_graph, reachable
 from ..limits.rounding import EPS
 from ..limits.verification import NUDGE
 from ..numeric.scales import Array
+from ..operations import OPERATIONS, Operation
 
 #: Relative rounding of one node: at most three roundings to nearest (a reciprocal, a product, a sum), and one unit in
 #: the last place, 2 roundings, of a function; 4 half units each way.
 UNIT = 2.0 * EPS
-TURN = 2.0 * UNIT  #: absolute error of a sine or cosine formed from those of the parts of a sum: two products, a sum
 #: Relative error of constants that are formed in doubles while the graph is made and count as exact in it: turns by
 #: given angles, products of them along fixed parts, inertias in link axes.
 FOLDED = 16.0 * EPS
 
 Pair = tuple[Array, Array]  # value, bound of its error
-Rule = Callable[..., tuple[Any, Any]]
 
 
-def _multiply(a: Pair, b: Pair) -> tuple[Any, Any]:
-    v = a[0] * b[0]
-    return v, abs(a[0]) * b[1] + abs(b[0]) * a[1] + a[1] * b[1] + UNIT * abs(v)
-
-
-def _divide(a: Pair, b: Pair) -> tuple[Any, Any]:
-    v = a[0] / b[0]
-    return v, (a[1] + abs(v) * b[1]) / abs(b[0]) + UNIT * abs(v)
-
-
-def _power(a: Pair, b: Pair) -> tuple[Any, Any]:
-    v = np.power(a[0], b[0])
-    slope = np.where(a[1] > 0.0, abs(b[0] * np.power(a[0], b[0] - 1.0)), 0.0)
-    other = np.where(b[1] > 0.0, abs(v * np.log(abs(a[0]))), 0.0)
-    return v, slope * a[1] + other * b[1] + UNIT * (2.0 + abs(b[0])) * abs(v)  # repeated products where b is whole
-
-
-def _root(a: Pair) -> tuple[Any, Any]:
-    v = np.sqrt(a[0])
-    return v, np.minimum(0.5 * a[1] / v if np.all(v > 0.0) else np.inf, np.sqrt(a[1])) + UNIT * v
-
-
-def _arc(a: Pair, b: Pair) -> tuple[Any, Any]:
-    v, square = np.arctan2(a[0], b[0]), a[0] * a[0] + b[0] * b[0]
-    return v, (abs(b[0]) * a[1] + abs(a[0]) * b[1]) / square + UNIT * abs(v)
-
-
-def _smooth(function: Elementary, floor: float) -> Rule:
-    """A function of one argument by its slope; ``floor`` is an absolute error of its own."""
-
-    def rule(a: Pair) -> tuple[Any, Any]:
-        v = getattr(np, function.array)(a[0])
-        return v, abs(function.rate(a[0], v)) * a[1] + UNIT * abs(v) + floor
-
-    return rule
-
-
-RULES: dict[str, Rule] = {
-    "add": lambda a, b: (a[0] + b[0], a[1] + b[1] + UNIT * abs(a[0] + b[0])),
-    "sub": lambda a, b: (a[0] - b[0], a[1] + b[1] + UNIT * abs(a[0] - b[0])),
-    "mul": _multiply,
-    "div": _divide,
-    "neg": lambda a: (-a[0], a[1]),
-    "pow": _power,
-    "sqrt": _root,
-    **{name: _smooth(f, TURN if name in ("sin", "cos") else 0.0) for name, f in ELEMENTARY.items()},
-    "atan2": _arc,
-    "abs": lambda a: (abs(a[0]), a[1]),
-    "min": lambda a, b: (np.minimum(a[0], b[0]), np.maximum(a[1], b[1])),
-    "max": lambda a, b: (np.maximum(a[0], b[0]), np.maximum(a[1], b[1])),
-    "select": lambda c, a, b: (np.where(c[0] != 0.0, a[0], b[0]), np.where(c[0] != 0.0, a[1], b[1])),
-}
-EXACT = ("sign", "lt", "le", "eq", "not", "and", "or")  #: whose results are whole numbers
+def _apply(row: Operation, given: Sequence[Pair]) -> Pair:
+    """An operation and its bound: of first order where the row does not know better, and its own rounding."""
+    x, e = [a for a, _ in given], [error for _, error in given]
+    y = row.array(*x)
+    if row.error is not None:
+        bound = row.error(y, x, e)
+    else:
+        slopes = zip(row.rates, e, strict=True) if row.rates else ()
+        bound = sum((np.where(error > 0.0, rate(y, *x) * error, 0.0) for rate, error in slopes), np.zeros_like(y))
+    return y, bound if row.exact else bound + UNIT * row.rounding(y, *x)
 
 
 def bounded(outputs: Sequence[Expr], values: Mapping[str, Array], count: int) -> Pair:
@@ -117,10 +71,8 @@ def bounded(outputs: Sequence[Expr], values: Mapping[str, Array], count: int) ->
                 found[i] = np.full(count, float(args[0])), none
             elif operation == "sym":
                 found[i] = np.broadcast_to(np.asarray(values[args[0]], dtype=float), (count,)), none
-            elif operation in EXACT:
-                found[i] = FUNCTIONS[operation][1](*(found[k][0] for k in args)), none
-            elif operation in RULES:
-                found[i] = RULES[operation](*(found[k] for k in args))
+            elif operation in OPERATIONS:
+                found[i] = _apply(OPERATIONS[operation], [found[k] for k in args])
             else:
                 function, orders = graph.calls[operation]
                 found[i] = _called(function.implementation(orders), [found[k] for k in args])

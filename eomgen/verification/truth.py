@@ -14,12 +14,12 @@ from ..frames import GROUND
 from . import bodies
 from .bodies import Matrix, Pose, Rigid, Twist
 from .digits import FIRST, SECOND, Number, Numbers, solve
-from .precise_states import State, System, Values
+from .precise_states import PreciseState, PreciseSystem, Values
 
-__all__ = ["State", "System", "Truth", "Values"]
+__all__ = ["PreciseState", "PreciseSystem", "Truth", "Values"]
 
 
-class Truth(State):
+class Truth(PreciseState):
     """One state of a model; every quantity is found when it is first asked for."""
 
     # -- bodies -------------------------------------------------------------------------------------------------------

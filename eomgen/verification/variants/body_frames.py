@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...describe.description import GROUND_NAME, Description, Entry, items
+from ...describe.description import GROUND_NAME, DescribedEntry, Description, items
 from ...describe.fields import INERTIA
 from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
 from .rewritten_texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
@@ -41,7 +41,7 @@ def values_of(description: Description) -> dict[str, float]:
     }
 
 
-class Placement:
+class MovedBodyFrame:
     """The new frame of one body: new coordinates = turn old + shift."""
 
     def __init__(self, turn: Any, shift: Any, parameters: Mapping[str, float]) -> None:
@@ -74,7 +74,7 @@ class Placement:
 class _Moved(Visitor):
     """References and placements of bodies whose frames have moved."""
 
-    def __init__(self, places: Mapping[str, Placement]) -> None:
+    def __init__(self, places: Mapping[str, MovedBodyFrame]) -> None:
         self.places = places
 
     def scalar(self, value: Any, slot: Slot) -> Any:
@@ -102,7 +102,7 @@ def turn_bodies(description: Description, random: Any) -> Variant:
     _require_bodies(description)
     parameters, size = values_of(description), length_of(description)
     places = {
-        entry.name: Placement(random_turn(random), size * random.uniform(-0.5, 0.5, 3), parameters)
+        entry.name: MovedBodyFrame(random_turn(random), size * random.uniform(-0.5, 0.5, 3), parameters)
         for entry in bodies_of(description)
     }
     made = visit(description, _Moved(places))
@@ -111,7 +111,7 @@ def turn_bodies(description: Description, random: Any) -> Variant:
     return Variant(made)
 
 
-def _turn_body(entry: Entry, place: Placement) -> None:
+def _turn_body(entry: DescribedEntry, place: MovedBodyFrame) -> None:
     values = entry.values
     values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
     solids = "solids" in values or ("points" in values and "mass" not in values)
@@ -176,7 +176,7 @@ def turn_ground(description: Description, random: Any) -> Variant:
     visit(description, Seen())
     angles = any(quantity == "angle" for quantity, _ in texts)
     turn = np.eye(3) if angles else random_turn(random)
-    place = Placement(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
+    place = MovedBodyFrame(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
     made = visit(copied(description), _Ground(place))
     ground = next((entry for entry in made.sections["bodies"] if entry.name == GROUND_NAME), None)
     if ground is not None:
@@ -187,7 +187,7 @@ def turn_ground(description: Description, random: Any) -> Variant:
 class _Ground(_Moved):
     """What refers to ground, or is written in its axes."""
 
-    def __init__(self, place: Placement) -> None:
+    def __init__(self, place: MovedBodyFrame) -> None:
         super().__init__({GROUND_NAME: place})
         self.place = place
 

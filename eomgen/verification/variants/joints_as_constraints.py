@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from .cuts import in_loops
 from .pieces import Frame, frames_of
 from .variant import NotApplicable, References, Variant, coordinates_of, drop, entry_of
@@ -62,7 +62,7 @@ def _closed(description: Description, random: Any, table: dict[str, tuple[str, .
     return Variant(made, joints=gone)
 
 
-def _equations(made: Description, entry: Entry, rod: bool) -> None:
+def _equations(made: Description, entry: DescribedEntry, rod: bool) -> None:
     """The equations between two points that become named markers."""
     labels = [
         _marker(made, frame, f"{entry.name}_{end}") for frame, end in zip(frames_of(made, entry), "ab", strict=True)

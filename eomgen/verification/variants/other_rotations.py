@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from ...joints.joint import SEQUENCES
 from ...numeric import algebra
 from ...rotations import (
@@ -49,7 +49,7 @@ def redescribe(description: Description, random: Any) -> Variant:
     return Variant(made, state)
 
 
-def _change(made: Description, entry: Entry, names: Sequence[str], place: int, random: Any) -> States:
+def _change(made: Description, entry: DescribedEntry, names: Sequence[str], place: int, random: Any) -> States:
     """Change one joint; returns how its coordinates follow."""
     values, joint, own = entry.values, entry.name, names[place:]
     was = values.pop("rotation", "euler_angles")
@@ -89,7 +89,7 @@ def _change(made: Description, entry: Entry, names: Sequence[str], place: int, r
     return follow
 
 
-def _sequence(made: Description, entry: Entry, own: Sequence[str], before: str, random: Any) -> str:
+def _sequence(made: Description, entry: DescribedEntry, own: Sequence[str], before: str, random: Any) -> str:
     """Another sequence, far from its singular position at the initial state."""
     start = made.values.get("guess", {})
     if not all(name in start for name in own):

@@ -12,11 +12,11 @@ from ...describe.names import QUANTITIES
 from ...describe.scope import ENERGIES
 from .dimensions import INERTIA, LENGTH, NONE, SPEED, SPIN, TORQUE, Dimension, dimension_of
 from .rewritten_texts import rewritten, scaled
-from .variant import NotApplicable, Scales, Variant, coordinates_of, kinds_of, velocities_of
+from .variant import NotApplicable, UnitScales, Variant, coordinates_of, kinds_of, velocities_of
 from .visit import Slot, Visitor, visit
 
 #: The engineer's units: millimetre, tonne, millisecond.
-MM_T_MS = Scales(length=1e3, mass=1e-3, time=1e3)
+MM_T_MS = UnitScales(length=1e3, mass=1e-3, time=1e3)
 _MARKER = {0: LENGTH, 1: SPEED, 2: Dimension(1, 0, -2), 3: Dimension(2, 1, -1), 4: INERTIA, 5: Dimension(1, 1, -1)}
 _MARKER |= {6: Dimension(0, 1), 7: SPIN, 8: SPIN, 9: Dimension(0, 0, -2), 10: Dimension(0, 0, -2)}
 #: Local names of laws and profiles -> dimension where the law acts on a length.
@@ -25,7 +25,7 @@ _LOCAL = {"length": LENGTH, "angle": NONE}
 _KEPT = ("outputs", "events", "inputs")
 
 
-def in_units(description: Description, random: Any, scales: Scales = MM_T_MS) -> Variant:
+def in_units(description: Description, random: Any, scales: UnitScales = MM_T_MS) -> Variant:
     """The description in other units.
 
     Raises
@@ -54,7 +54,7 @@ def in_units(description: Description, random: Any, scales: Scales = MM_T_MS) ->
 
 
 class _Scaled(Visitor):
-    def __init__(self, description: Description, scales: Scales) -> None:
+    def __init__(self, description: Description, scales: UnitScales) -> None:
         self.scales = scales
         self.kinds = kinds_of(description)
         self.names: dict[str, tuple[float, str]] = {"t": (scales.time, "")}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from ...describe.placement import TURNS, axis_columns
 from ...numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
 from .body_frames import values_of
@@ -16,7 +16,7 @@ from .rewritten_texts import number_of
 Frame = dict[str, Any]
 
 
-def frames_of(description: Description, entry: Entry) -> tuple[Frame, Frame]:
+def frames_of(description: Description, entry: DescribedEntry) -> tuple[Frame, Frame]:
     """The markers of a joint, its axis as their z axis; each a mapping of body, at, rpy."""
     parameters = values_of(description)
     axis = entry.values.get("axis", "z")
