@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, cos, sin
+from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3
-from ..numeric.rotation_matrices import quarter_turns
+from ..rotations.scalars import matrix_from_roll_pitch_yaw
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -26,14 +26,6 @@ TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
 }
 
 
-def cosine_and_sine(angle: Expr) -> tuple[Expr, Expr]:
-    """cos and sin of an angle; exact 0 and +-1 for numeric multiples of pi/2."""
-    exact = None if angle.value is None else quarter_turns(angle.value)
-    if exact is None:
-        return cos(angle), sin(angle)
-    return angle.graph.constant(exact[0]), angle.graph.constant(exact[1])
-
-
 def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
     """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF.
 
@@ -48,12 +40,7 @@ def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
     Mat3
         Takes marker axes to body axes.
     """
-    (cr, sr), (cp, sp), (cy, sy) = (cosine_and_sine(angle) for angle in rpy)
-    o, i = graph.zero, graph.one
-    about_x: Mat3 = ((i, o, o), (o, cr, -sr), (o, sr, cr))
-    about_y: Mat3 = ((cp, o, sp), (o, i, o), (-sp, o, cp))
-    about_z: Mat3 = ((cy, -sy, o), (sy, cy, o), (o, o, i))
-    return vec.product(about_z, vec.product(about_y, about_x))
+    return vec.matrix(graph, matrix_from_roll_pitch_yaw(rpy))
 
 
 def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:

@@ -10,18 +10,18 @@ import re
 from collections.abc import Sequence
 
 from .selection import Selection
-from .uses import CodeFile, Import, assigned, is_text, is_typing
+from .uses import Import, SourceText, assigned, is_text, is_typing
 
 
 def abridge(selection: Selection, file: str) -> str:
     """The text of a file with what is reached of it."""
-    return _Abridgement(selection, selection.sources[file]).written()
+    return _AbridgedText(selection, selection.sources[file]).written()
 
 
-class _Abridgement:
+class _AbridgedText:
     """The lines of a file, some of which go."""
 
-    def __init__(self, selection: Selection, source: CodeFile) -> None:
+    def __init__(self, selection: Selection, source: SourceText) -> None:
         self.selection, self.source = selection, source
         self.lines: list[str | None] = list(source.text.splitlines())
         self._shorten(source.tree)

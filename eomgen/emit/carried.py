@@ -12,8 +12,8 @@ from importlib.resources import files
 
 #: What runs without models, equations and SymPy: files of the root, and folders.  Imports of anything else are for
 #: modules that know their equations, which those of a package do not.
-ALONE = ("errors", "kernel_table", "texts", "analysis", "api", "ensembles", "files", "limits", "numeric", "operations",
-         "runtime", "simulation", "verification")  # fmt: skip
+ALONE = ("errors", "kernel_table", "texts", "analysis", "api", "ensembles", "files", "limits", "numeric",
+         "operations", "runtime", "simulation", "verification")  # fmt: skip
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
@@ -32,7 +32,7 @@ def carry(package: Mapping[str, str]) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        The ``__init__.py`` of a folder of which only files are imported, no names, keeps its description only.
+        The ``__init__.py`` of a folder keeps its description only: the names that it offers are for eomgen's users.
     """
     found: set[str] = set()
     todo = [home for name, text in package.items() if name.endswith((".py", ".pyi")) for home, _ in _imports("", text)]
@@ -44,7 +44,7 @@ def carry(package: Mapping[str, str]) -> dict[str, str]:
         todo += [home for home, _ in _reached(name)]
     texts = {f"{name}.py": _text(name) for name in sorted(found)}
     folders = sorted({name.partition("/")[0] for name in found if "/" in name})
-    return {f"{name}/__init__.py": describe_folder(name) for name in folders} | texts
+    return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 
 
 def describe_folder(name: str) -> str:
@@ -67,7 +67,7 @@ def _names() -> frozenset[str]:
             found.add(name)
         else:
             found |= {f"{name}/{item.name[:-3]}" for item in root.joinpath(name).iterdir() if item.name.endswith(".py")}
-    return frozenset(found)
+    return frozenset(name for name in found if not name.endswith("/__init__"))
 
 
 @cache
@@ -86,8 +86,7 @@ def _imports(name: str, text: str) -> Iterator[tuple[str, bool]]:
         base = [*up[: len(up) - len(dots) + 1], *module.split(".")] if module else up[: len(up) - len(dots) + 1]
         for imported in re.findall(r"(\w+)(?: as \w+)?", several or one):
             inner = "/".join([*base, imported])
-            home = "/".join(base)
-            yield inner if inner in _names() else home if home in _names() else f"{home}/__init__", not indent
+            yield inner if inner in _names() else "/".join(base), not indent
 
 
 @cache

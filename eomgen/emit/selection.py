@@ -9,10 +9,10 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Iterable, Mapping
 
-from .uses import CodeFile, Import, Uses
+from .uses import Import, SourceText, Uses
 
 
-class CodeFiles(dict[str, CodeFile]):
+class Sources(dict[str, SourceText]):
     """Files without their endings, each read when it is first needed."""
 
     def __init__(self, texts: Mapping[str, str]) -> None:
@@ -22,8 +22,8 @@ class CodeFiles(dict[str, CodeFile]):
     def __contains__(self, name: object) -> bool:
         return name in self.texts
 
-    def __missing__(self, name: str) -> CodeFile:
-        self[name] = found = CodeFile(name, self.texts[name])
+    def __missing__(self, name: str) -> SourceText:
+        self[name] = found = SourceText(name, self.texts[name])
         return found
 
 
@@ -51,7 +51,7 @@ class Selection:
     """
 
     def __init__(self, texts: Mapping[str, str], left_out: Collection[str]) -> None:
-        self.sources = CodeFiles(texts)
+        self.sources = Sources(texts)
         self.left_out = left_out
         self.files: set[str] = set()
         self.kept: set[tuple[str, str]] = set()
@@ -98,7 +98,7 @@ class Selection:
         self.files.add(file)
         self._use(self.sources[file], *self.sources[file].rest)
 
-    def _keep(self, source: CodeFile, name: str) -> None:
+    def _keep(self, source: SourceText, name: str) -> None:
         if (source.name, name) in self.kept:
             return
         if name in source.imports:
@@ -116,8 +116,8 @@ class Selection:
         """Follow an import, and an attribute of it where it is a file."""
         if one.home is None:
             return
-        home, inner = self._homes(one)
-        for file in (home, inner):
+        inner = f"{one.home}/{one.name}" if one.home else one.name
+        for file in (one.home, inner):
             if file in self.left_out:
                 self.refused.add(file)
                 return
@@ -125,16 +125,11 @@ class Selection:
             self._load(inner)
             if attribute is not None:
                 self._keep(self.sources[inner], attribute)
-        elif home in self.sources:
-            self._load(home)
-            self._keep(self.sources[home], one.name)
+        elif one.home in self.sources:
+            self._load(one.home)
+            self._keep(self.sources[one.home], one.name)
 
-    def _homes(self, one: Import) -> tuple[str, str]:
-        """The file that an import is from, and the file that it is if it is one."""
-        home = one.home or ""
-        return (home if home in self.sources else f"{home}/__init__"), (f"{home}/{one.name}" if home else one.name)
-
-    def _look_into(self, source: CodeFile, node: ast.ClassDef) -> None:
+    def _look_into(self, source: SourceText, node: ast.ClassDef) -> None:
         for place, part in enumerate(node.body):
             member = (source.name, node.name, place)
             if member in self.members:
@@ -145,7 +140,7 @@ class Selection:
                 if self._use(source, part).any_own:
                     self.whole.add((source.name, node.name))
 
-    def _use(self, source: CodeFile, *nodes: ast.AST) -> Uses:
+    def _use(self, source: SourceText, *nodes: ast.AST) -> Uses:
         used = Uses(*nodes)
         self.attributes |= used.attributes
         self.annotated |= {(source.name, name) for name in used.annotated}
@@ -159,17 +154,18 @@ class Selection:
                 self._reach(found, attribute)
         return used
 
-    def _is_class(self, source: CodeFile, name: str) -> bool:
+    def _is_class(self, source: SourceText, name: str) -> bool:
         """Whether a name of an annotation is that of a class of another file, which is kept for other reasons only."""
         one = source.imports.get(name) or source.types.get(name)
         if one is None or one.home is None:
             return False
-        home, _ = self._homes(one)
-        return home not in self.sources or isinstance(self.sources[home].definitions.get(one.name), ast.ClassDef)
+        return one.home not in self.sources or isinstance(
+            self.sources[one.home].definitions.get(one.name), ast.ClassDef
+        )
 
     def defined(self, one: Import) -> bool:
         """Whether what is imported is there."""
         if one.home is None:
             return True
-        home, inner = self._homes(one)
-        return inner in self.files or (home, one.name) in self.kept
+        inner = f"{one.home}/{one.name}" if one.home else one.name
+        return inner in self.files or (one.home, one.name) in self.kept

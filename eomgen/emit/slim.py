@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from .abridged import abridge
 from .carried import carry, describe_folder
 from .selection import Selection
-from .uses import CodeFile
+from .uses import SourceText
 
 #: Files that a slim package has not -> what asks for them.
 LEFT_OUT = {
@@ -58,7 +58,7 @@ def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     """
     left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
     own = {name: text for name, text in package.items() if name.endswith(".py")}
-    typed = [CodeFile("", text) for name, text in package.items() if name.endswith(".pyi")]
+    typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
     selection = Selection(carry(package) | own, left_out)
     for name in own:
         selection.begin(name.removesuffix(".py"))
@@ -70,7 +70,7 @@ def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     texts = {f"{file}.py": abridge(selection, file) for file in sorted(selection.files) if f"{file}.py" not in own}
     texts |= {f"{file}.py": _REFUSAL.format(left_out[file]) for file in sorted(selection.refused)}
     folders = sorted({name.partition("/")[0] for name in texts if "/" in name})
-    return {f"{name}/__init__.py": describe_folder(name) for name in folders} | texts
+    return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 
 
 _REFUSAL = '''"""Left out of this package, which was generated slim."""

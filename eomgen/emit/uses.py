@@ -16,7 +16,7 @@ class Import(NamedTuple):
     name: str  #: what it is called there
 
 
-class CodeFile:
+class SourceText:
     """One file.
 
     Parameters

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..graph.vectors import Mat3, Vec3
+from ..rotations.euler import AXES
 from .joint import Closure
-from .rotation_coordinates import AXES
 
 
 def along(position: Vec3, letters: str) -> list[Closure]:

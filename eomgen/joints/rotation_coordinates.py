@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, atan2, cos, sin, sqrt
+from ..graph.core import Expr, Graph, atan2, sqrt
 from ..graph.vectors import Mat3, Vec3
-
-AXES = {"x": 0, "y": 1, "z": 2}
+from ..rotations.euler import AXES, elementary
 
 
 def unit(graph: Graph, axis: int) -> Vec3:
@@ -19,13 +18,7 @@ def unit(graph: Graph, axis: int) -> Vec3:
 
 def about(graph: Graph, axis: int, angle: Expr) -> Mat3:
     """Rotation by ``angle`` about axis 0, 1 or 2; takes turned axes to the original ones."""
-    o, i = graph.zero, graph.one
-    c, s = cos(angle), sin(angle)
-    if axis == 0:
-        return ((i, o, o), (o, c, -s), (o, s, c))
-    if axis == 1:
-        return ((c, o, s), (o, i, o), (-s, o, c))
-    return ((c, -s, o), (s, c, o), (o, o, i))
+    return vec.matrix(graph, elementary(axis, angle))
 
 
 def euler(graph: Graph, sequence: str, angles: Sequence[Expr]) -> Mat3:

@@ -22,7 +22,7 @@ from ..numeric.scales import Array
 from .input_kinds import Expressed
 from .layout import Layout
 from .near_names import unknown
-from .tapes import Tape, bends, jumps_where_equal
+from .tapes import Tape, bends, jumps
 
 
 class Formula(Expressed):
@@ -67,7 +67,7 @@ class Formula(Expressed):
         graph, found = self.expression.graph, []
         for i in reachable(graph, [self.expression.id]):
             node = graph.nodes[i]
-            if jumps_where_equal(node[0]):
+            if jumps(node[0]):
                 found.append(Expr(graph, graph.sub(*node[1:]) if len(node) == 3 else node[1]))
         evaluate, values = compile_evaluator(found, ("t", *self.layout.x, *self.layout.p)), p.tolist()
         return lambda t, x: [float(value) for value in evaluate([t, *np.asarray(x).tolist(), *values])]

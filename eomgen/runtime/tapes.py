@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..numeric.scales import Array
-from ..operations import OPERATIONS, operations_with
+from ..operations.table import OPERATIONS, operations_with
 from .input_kinds import Expressed
 
 #: (operation, operands) one after the other, the numbers among them, and the instructions handed out.
@@ -51,7 +51,7 @@ class DeclaredSignal(Expressed):
     def switches(self, p: Array) -> Callable[[float, Array], list[float]]:
         """What changes its sign where a condition does: a - b of each comparison of a with b, and a of sign(a)."""
         code, numbers, _ = self.tape
-        own = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if jumps_where_equal(op)]
+        own = [(OPERATIONS[op].arity, a, b) for op, a, b, _ in code if jumps(op)]
         added = [("sub", a, b, 0) for arity, a, b in own if arity == 2]
         out = [*range(len(code), len(code) + len(added)), *(a for arity, a, _ in own if arity == 1)]
         return _player(([*code, *added], numbers, out), p)
@@ -73,7 +73,7 @@ def bends(operations: Iterable[str]) -> bool:
     return not operations_with(lambda row: row.bends).isdisjoint(operations)
 
 
-def jumps_where_equal(operation: str) -> bool:
+def jumps(operation: str) -> bool:
     """Whether it jumps where what it compares is equal."""
     return operation in OPERATIONS and OPERATIONS[operation].jumps
 

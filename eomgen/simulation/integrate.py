@@ -17,6 +17,7 @@ from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
 from .events import RunEvent
+from .stalling import Pace
 
 if TYPE_CHECKING:
     from .solver_state import Pause

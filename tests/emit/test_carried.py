@@ -28,7 +28,7 @@ def imports_of(folder: Path, file: Path) -> set[Path]:
             home = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
             for one in node.names:
                 inner = (home / one.name).with_suffix(".py")
-                found |= {inner} if inner.is_file() else {home.with_suffix(".py"), home / "__init__.py"}
+                found.add(inner if inner.is_file() else home.with_suffix(".py"))
     if file == folder / "api/module.py":
         found |= {folder.joinpath(*home.split(".")).with_suffix(".py") for home in CALLS.values()}
     return {one for one in found if one.is_file()}
