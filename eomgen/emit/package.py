@@ -111,7 +111,8 @@ def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str,
     slim = context["slim"]
     names = ("__init__.py", "__init__.pyi", *(() if slim else ("selftest.py",)))
     own = {name: render(f"python/{name}.j2", context) for name in names}
-    found = (carry_slim if slim else carry)({**core, **own})
+    signals = bool(context["metadata"].get("signals"))
+    found = carry_slim({**core, **own}, signals) if slim else carry({**core, **own})
     context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
     about = {name: render(f"python/{name}.j2", context) for name in ("pyproject.toml", "README.md")}
     return {"py.typed": "", **own, **about, **found}

@@ -46,17 +46,20 @@ PUBLIC = (
 CALLS = ("simulate",)
 
 
-def carry_slim(package: Mapping[str, str]) -> dict[str, str]:
+def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     """Files of eomgen for a slim package, by name: what is reached of each, and refusals in place of others.
 
     Parameters
     ----------
     package : mapping of str to str
         Generated files, from which all begins.
+    signals : bool
+        Whether the model declares inputs over time, whose expressions runs in Python have to play.
     """
+    left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
     own = {name: text for name, text in package.items() if name.endswith(".py")}
     typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
-    selection = Selection(carry(package) | own, LEFT_OUT)
+    selection = Selection(carry(package) | own, left_out)
     for name in own:
         selection.begin(name.removesuffix(".py"))
     for one in (one for source in typed for one in source.imports.values()):
@@ -65,7 +68,7 @@ def carry_slim(package: Mapping[str, str]) -> dict[str, str]:
         selection.reach(f"simulation/{name}", name)
     selection.follow(PUBLIC)
     texts = {f"{file}.py": abridge(selection, file) for file in sorted(selection.files) if f"{file}.py" not in own}
-    texts |= {f"{file}.py": _REFUSAL.format(LEFT_OUT[file]) for file in sorted(selection.refused)}
+    texts |= {f"{file}.py": _REFUSAL.format(left_out[file]) for file in sorted(selection.refused)}
     folders = sorted({name.partition("/")[0] for name in texts if "/" in name})
     return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
 

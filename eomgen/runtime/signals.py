@@ -18,7 +18,6 @@ from .input_texts import is_formula, read_formula
 from .layout import Layout
 from .near_names import check_names, require_mapping, require_time_and_state, unknown
 from .room import as_real, read_number, read_numbers
-from .tapes import DeclaredSignal
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
 #: How a table goes on between its times -> the order of its pieces.
@@ -180,6 +179,8 @@ class Forcing:
         values |= {name: value for name, (_, _, value) in self.derived.items()}
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in values:
+                from .tapes import DeclaredSignal
+
                 values[name] = DeclaredSignal(tape, layout.metadata["signal_slopes"][name])
         for name, value in values.items():
             if name not in layout.u:

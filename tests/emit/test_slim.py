@@ -22,7 +22,7 @@ from eomgen.generation import generate
 
 ROOT = Path(eg.__file__).parent
 #: Lines of Python, blank ones, comments and stubs included, setup.py and the numpy target's own equations apart.
-MOST = {"cython": 5740, "numpy": 7320}
+MOST = {"cython": 5360, "numpy": 6940}
 
 
 def bouncing() -> eg.Model:
@@ -223,7 +223,7 @@ def test_what_is_left_out_is_there_and_asked_for(package: Path) -> None:
     assert LEFT_OUT.keys() <= carried_names()
     refusals = {file for file in package.rglob("*.py") if "\nraise left_out(" in file.read_text()}
     asked = {str(file.relative_to(package).with_suffix("")) for file in refusals}
-    assert asked == LEFT_OUT.keys()
+    assert asked == LEFT_OUT.keys() | {"runtime/tapes"}  # the model declares no input over time
     for file in package.rglob("*.py"):
         for home in re.findall(r"^from (\.[\w.]+) import", file.read_text(), re.M):
             up = len(home) - len(home.lstrip("."))
@@ -281,7 +281,7 @@ def test_names_hold_together(package: Path) -> None:
     command = [sys.executable, "-m", "mypy", "--config-file=", package.name]
     done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True, timeout=120)
     assert "checked" in done.stdout
-    refused = [name.replace("/", ".") for name in LEFT_OUT]
+    refused = [name.replace("/", ".") for name in (*LEFT_OUT, "runtime/tapes")]
     for line in done.stdout.splitlines()[:-1]:
         named = re.search(r'Module "slider_crank\.([\w.]+)" has no attribute', line)
         parser = "slider_crank.runtime.formulas" in line or line.endswith("#missing-imports")
