@@ -11,10 +11,11 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
+from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
 from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
-from ..runtime.tapes import Formula
+from ..runtime.tapes import DeclaredSignal
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -141,9 +142,10 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
         raise UsageError(words)
-    if isinstance(value, Formula) or (hasattr(value, "derivative") and value.derivative() is not None):
+    known = isinstance(value, Expressed) or (hasattr(value, "derivative") and value.derivative() is not None)
+    if known and not isinstance(value, DeclaredSignal):
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
-        return float((rate.function(forcing.parameters) if isinstance(rate, Formula) else rate)(t, x))
+        return float((rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate)(t, x))
     f = forcing.varying[index]
     if any(f(t, x + move) != f(t, x) for move in ELSEWHERE * np.eye(len(x))):
         raise UsageError(words)

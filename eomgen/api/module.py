@@ -11,6 +11,7 @@ from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
+from ..errors import left_out
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
 from ..runtime.refusals import require_velocities
@@ -76,9 +77,22 @@ class LateMethod:
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
         if self.function is None:
-            found = CALLS[self.name]
-            self.function = found if callable(found) else getattr(import_module(f"..{found}", __package__), self.name)
+            self.function = self._find()
         return self.function if model is None else MethodType(self.function, model)
+
+    def _find(self) -> Any:
+        found = CALLS[self.name]
+        if callable(found):
+            return found
+        try:
+            function = getattr(import_module(f"..{found}", __package__), self.name, None)
+        except ModuleNotFoundError as error:
+            if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
+                raise  # something else that it needs
+            function = None
+        if function is None:
+            raise left_out(self.name)
+        return function
 
 
 class Module(BoundModel):

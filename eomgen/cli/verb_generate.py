@@ -33,6 +33,9 @@ from .shared_options import (
 @baumgarte_option
 @independent_option
 @target_option("c", "cython", "numpy")
+@click.option(
+    "--slim", is_flag=True, help="Only calls, events and simulate, in a small package; the rest refuses by name."
+)
 @json_option
 @robot_options
 @reports_failures
@@ -44,6 +47,7 @@ def generate(
     baumgarte: tuple[float, float] | None,
     independent: tuple[str, ...],
     target: str,
+    slim: bool,
     as_json: bool,
     robot: dict[str, Any],
 ) -> None:
@@ -52,10 +56,10 @@ def generate(
 
     with blaming_option(independent), stage("generate"):
         described = load_model(model, allow_native, robot)
-        folder = write_out(described, out, method, target, independent or None, baumgarte)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, slim)
     files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
     if as_json:
-        print_json({"name": folder.name, "target": target, "folder": str(folder), "files": files})
+        print_json({"name": folder.name, "target": target, "slim": slim, "folder": str(folder), "files": files})
         return
     say(str(folder))
     for name in files:

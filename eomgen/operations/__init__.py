@@ -6,10 +6,8 @@ and counts are looked up here, also where a generated package runs without the g
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from .row import ARITHMETIC, CHOICE, CONDITION, FUNCTION, Operation, function
-from .table import ROWS
+from .table import OPERATIONS, operations_with
 
 __all__ = [
     "ARITHMETIC",
@@ -22,13 +20,6 @@ __all__ = [
     "operations_with",
     "tape_rows",
 ]
-
-OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
-
-
-def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
-    """Names of the operations that pass a test."""
-    return frozenset(name for name, row in OPERATIONS.items() if test(row))
 
 
 def tape_rows() -> str:

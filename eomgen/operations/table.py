@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -208,3 +209,10 @@ ROWS = (
         sympy=lambda s, c, a, b: s.Piecewise((a, c), (b, True)), word="where",
     ),
 )  # fmt: skip
+
+OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
+
+
+def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
+    """Names of the operations that pass a test."""
+    return frozenset(name for name, row in OPERATIONS.items() if test(row))

@@ -17,13 +17,14 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
+from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
 from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.continuation import follow, follow_time
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
 from ..numeric.space import settle
+from ..numeric.starts import starts
 from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank

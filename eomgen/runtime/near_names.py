@@ -34,8 +34,8 @@ def find_lacking(one: object, kind: str, name: str) -> Any:
     """
     if name.startswith("_"):
         raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
-    if (own := getattr(type(one), name, None)) is not None:
-        return own.__get__(one)
+    if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
+        return own.__get__(one, type(one))
     public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
     raise AttributeError(f"{kind} has no attribute {name!r}; {_hint(name, public, len(public))}", name=name)
 

@@ -19,7 +19,8 @@ from ..analysis.roots import find_root
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
-from .events import RunEvent
+from .events import UNWATCHED, Events, RunEvent
+from .run_arguments import find_span, ordered_times
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -31,6 +32,56 @@ def is_driven(module: BoundModel) -> bool:
     """Whether the positions follow from the time alone."""
     layout = module.layout
     return layout.n_dof == 0 and layout.n_q > 0 and layout.n_h == layout.n_c
+
+
+def follow_drivers(
+    module: BoundModel,
+    span: float | tuple[float, float] | None,
+    initial: Mapping[str, float] | ArrayLike | None,
+    parameters: Any,
+    inputs: Mapping[str, Any] | None,
+    t_eval: ArrayLike | None,
+    events: Any,
+    method: Any,
+    checkpoint: Any,
+    options: Mapping[str, Any],
+) -> KinematicAnalysis | None:
+    """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other.
+
+    Raises
+    ------
+    UsageError
+        Method kinematic for another mechanism, or what only a run that integrates can do.
+    """
+    if not is_driven(module) or _led_by_inputs(module, inputs, method):
+        if method is not None:
+            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+        return None
+    if checkpoint is not None:
+        raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    watched = Events(module.layout, events)
+    if watched.resets:
+        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
+    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    given = {key: value for key, value in options.items() if value is not None}
+    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
+
+
+def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
+    """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
+    led = Forcing(module.layout, inputs).constrained
+    if led and method == "kinematic":
+        names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
+        raise UsageError(
+            f"method 'kinematic' follows drivers that are expressions of t, and inputs ({names}) move {module.name}; "
+            "leave method= out, and it is integrated"
+        )
+    return led
 
 
 def simulate_driven(

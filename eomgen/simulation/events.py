@@ -20,13 +20,14 @@ from ..limits.rounding import TINY
 from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
+from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
 from ..runtime.near_names import check_names, require_time_and_state
-from ..runtime.tapes import Formula, is_formula, record_tape, values_together
 from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.formulas import Formula
     from ..runtime.signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
@@ -126,6 +127,10 @@ class Events:
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
+        if any(event.action == WAIT for event in self.model):  # here, so that a slim package refuses before the run
+            from ..analysis.impact import strike_events
+
+            self._strike = strike_events
 
     def __len__(self) -> int:
         return len(self.names)
@@ -140,9 +145,10 @@ class Events:
         if not self.names:
             return None
         every = [*self.model, *(event for event, _ in self.formulas), *self.functions]
+        texts = [formula for _, formula in self.formulas]
         return {
             "model": len(self.model),
-            "tape": record_tape([formula for _, formula in self.formulas]) if self.formulas else None,
+            "tape": texts[0].tape_with(texts[1:]) if texts else None,
             "outside": [event.function for event in self.functions],
             "direction": [event.direction for event in every],
             "most": [int(event.terminal) for event in every],
@@ -161,7 +167,10 @@ class Events:
             found.append(RunEvent(function, self.names[i], event.terminal, event.direction, event.action))
             found[-1].source = None if event.direction == UNWATCHED else (every, i)
         p = module.p
-        texts = Together(values_together([f for _, f in self.formulas], p)) if len(self.formulas) > 1 else None
+        texts = None
+        if len(self.formulas) > 1:
+            first, *others = (formula for _, formula in self.formulas)
+            texts = Together(first.function_with(others, p))
         for i, (event, formula) in enumerate(self.formulas):
             found.append(RunEvent(formula.function(p), event.name, event.terminal, event.direction))
             found[-1].source = None if texts is None else (texts, i)
@@ -179,9 +188,7 @@ class Events:
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
-            from ..analysis.impact import strike_events
-
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+            after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:
@@ -224,7 +231,7 @@ def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | Non
     if direction not in (-1, 0, 1):
         raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
     event = RunEvent(_only_in_c, name or text, options.get("terminal"), direction)
-    return event, Formula(layout, text, f"event {name or text!r}", beside)
+    return event, read_formula(layout, text, f"event {name or text!r}", beside)
 
 
 def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.input_kinds import Tabulated
 from ..runtime.layout import Layout
-from ..runtime.signal_rates import TableRate, rate_places
-from ..runtime.signals import Forcing, Signal
+from ..runtime.signal_rates import rate_places
+from ..runtime.signals import Forcing
 
 
 class SlopesNow(NamedTuple):
@@ -41,12 +42,12 @@ class InputSlopes:
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
         self.forcing = forcing
         self.rates = rate_places(layout)
-        self.tables: dict[int, TableRate] = {}
+        self.tables: dict[int, Tabulated] = {}
         self.functions: set[int] = set()
         for i, signal in forcing.varying.items():
             if i in self.formulas:
                 continue
-            if isinstance(signal, Signal | TableRate):
+            if isinstance(signal, Tabulated):
                 self.tables[i] = signal.derivative()
             else:
                 self.functions.add(i)

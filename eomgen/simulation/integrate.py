@@ -21,6 +21,7 @@ from .stalling import Pace
 
 if TYPE_CHECKING:
     from .solver_state import Pause
+    from .stalling import Pace
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -130,7 +131,7 @@ def integrate(
     events: Sequence[RunEvent],
     dense: bool,
     options: dict[str, Any],
-    pace: Pace,
+    pace: Pace | None,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
     pause: Pause | None = None,
@@ -167,7 +168,7 @@ class _Journey:
 
     def __init__(
         self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
-        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace,
+        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace | None,
     ) -> None:  # fmt: skip
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
         self.options, self.pace = options, pace
@@ -225,7 +226,8 @@ class _Journey:
                         return
                     stop = self._settle(solver)
                     if stop is None and solver.status == "running":
-                        self.pace.look(self.t, self.x)
+                        if self.pace is not None:
+                            self.pace.look(self.t, self.x)
                         if pause is not None and perf_counter() >= pause.due:
                             pause.save(self, k, solver)
             finally:

@@ -21,7 +21,8 @@ from .events import Events
 from .integrate import choose_solver
 from .run_arguments import check_method, declare, own_step
 from .simulate import simulate
-from .stalling import Crawling, Pace
+from .stalled import Crawling
+from .stalling import Pace
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:

@@ -32,7 +32,8 @@ from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
 from .simulate import simulate
-from .stalling import Crawling, Pace, describe_crawl
+from .stalled import Crawling
+from .stalling import Pace, describe_crawl
 from .tolerances import check_tolerances
 from .variational import Variational
 

@@ -92,8 +92,8 @@ def test_derive_needs_no_parameter_values(call: Call, model_file: Callable[[str]
 
 def test_generate_json(call: Call, tmp_path: Path) -> None:
     written = call("generate", EXAMPLES / "pendulum.yaml", "--out", tmp_path / "out", "--json").json
-    assert set(written) == {"name", "target", "folder", "files"}
-    assert written["target"] == "cython"
+    assert set(written) == {"name", "target", "slim", "folder", "files"}
+    assert (written["target"], written["slim"]) == ("cython", False)
     assert Path(written["folder"]) == tmp_path / "out" / "pendulum"
     assert {"model.json", "pyproject.toml", "README.md"} <= set(written["files"])
     assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
