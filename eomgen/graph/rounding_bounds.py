@@ -14,6 +14,7 @@ import numpy as np
 
 from ..limits.rounding import ROUNDED
 from ..operations import OPERATIONS, operations_with
+from ..operations.table import unit
 from .core import Expr, Graph
 from .differentiate import gradient
 from .evaluate import Evaluator
@@ -69,7 +70,7 @@ def _spread(
                     x = [found[k] for k in operands]
                     for rate, k in zip(row.rates, operands, strict=True):
                         if bounds[k]:
-                            bound += rate(y, *x) * bounds[k]
+                            bound += bounds[k] if rate is unit else rate(y, *x) * bounds[k]
                 except (ValueError, ArithmeticError):
                     bound = math.inf
             bounds[i] = float(bound)

@@ -21,7 +21,7 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
-from ..operations import FUNCTION, OPERATIONS
+from ..operations import OPERATIONS
 from .core import Expr, Graph
 from .shown import is_tower, parts_of, shortened
 
@@ -313,9 +313,8 @@ def _all(g: Graph, ids: Sequence[int]) -> int:
 
 
 def _known() -> str:
-    functions = " ".join(row.name for row in OPERATIONS.values() if row.kind == FUNCTION and row.sympy_class)
-    others = "sec csc cot sech csch coth, Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
-    return f"numbers, + - * / **, {functions}, {others}"
+    classes = " ".join(row.sympy_class for row in OPERATIONS.values() if row.sympy_class)
+    return f"numbers, + - * / **, {classes}, sec csc cot sech csch coth Heaviside, Piecewise, relations"
 
 
 def _operation(name: str, g: Graph, ids: Sequence[int]) -> int:

@@ -44,7 +44,8 @@ def _one(g: Any, *ids: int) -> int:
     return int(g.one.id)
 
 
-def _unit(y: Any, *x: Any) -> float:
+def unit(y: Any, *x: Any) -> float:
+    """The rate 1."""
     return 1.0
 
 
@@ -59,12 +60,12 @@ def _sign(a: float) -> float:
 
 ROWS = (
     Operation(
-        "add", ARITHMETIC, operator.add, np.add, "{} + {}", "{} + {}", 2, (_one, _one), (_unit, _unit),
+        "add", ARITHMETIC, operator.add, np.add, "{} + {}", "{} + {}", 2, (_one, _one), (unit, unit),
         rule=lambda g, a, b: g.add(a, b), sympy=lambda s, a, b: a + b, commutative=True, analytic=True,
     ),
     Operation(
         "sub", ARITHMETIC, operator.sub, np.subtract, "{} - {}", "{} - {}", 2,
-        (_one, lambda g, y, a, b: g.neg(g.one.id)), (_unit, _unit),
+        (_one, lambda g, y, a, b: g.neg(g.one.id)), (unit, unit),
         rule=lambda g, a, b: g.sub(a, b), sympy=lambda s, a, b: a - b, analytic=True,
     ),
     Operation(
@@ -80,11 +81,11 @@ ROWS = (
         rule=lambda g, a, b: g.div(a, b), sympy=lambda s, a, b: a / b, analytic=True, fragile=True,
     ),
     Operation(
-        "neg", ARITHMETIC, operator.neg, np.negative, "-{}", "-{}", 1, (lambda g, y, a: g.neg(g.one.id),), (_unit,),
+        "neg", ARITHMETIC, operator.neg, np.negative, "-{}", "-{}", 1, (lambda g, y, a: g.neg(g.one.id),), (unit,),
         rule=lambda g, a: g.neg(a), sympy=lambda s, a: -a, exact=True, analytic=True,
     ),
     choice(
-        "abs", abs, np.abs, "abs_of({})", slopes=(lambda g, y, a: g.make("sign", a),), rates=(_unit,),
+        "abs", abs, np.abs, "abs_of({})", slopes=(lambda g, y, a: g.make("sign", a),), rates=(unit,),
         sympy="Abs", sympy_class="Abs", parity=EVEN,
     ),
     choice(
