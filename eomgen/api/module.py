@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from ..analysis.workspace import workspace as _workspace
     from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..runtime.canonical import Canonical
+    from ..runtime.drawing import draw as _draw
+    from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.minimal import Minimal
     from ..runtime.report import report as _report
     from ..simulation.dae_solution import Dae
@@ -63,6 +65,8 @@ CALLS = {
     "motion_range": "analysis.reaching",
     "workspace": "analysis.workspace",
     "report": "runtime.report",
+    "draw": "runtime.drawing",
+    "draw_branches": "runtime.drawing",
 }
 
 
@@ -154,6 +158,8 @@ class Module(BoundModel):
         motion_range = _motion_range
         workspace = _workspace
         report = _report
+        draw = _draw
+        draw_branches = _draw_branches
 
     @cached_property
     def minimal(self) -> Minimal:

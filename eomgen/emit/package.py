@@ -44,7 +44,8 @@ VERIFICATION = (
 FACADE = ("__init__.py", "module.py")
 #: Files of the other folders that no package needs: of eomgen's own cache, and of files of robots.
 ELSEWHERE = frozenset({"files/kept.py", "files/locks.py", "limits/files.py"})
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
+PICTURES = ("draw", "draw_branches")
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
 
 
 def emit_package(program: Program, target: str) -> SourceSet:

@@ -16,10 +16,11 @@ from .solids import Mesh, Triangles, box, rounded, solid, sphere, turned
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
 OF_LINK = 0.16  #: and of the middle link's length, at most
 BAR = 0.55  #: radius of a bar in sizes of a symbol
+OFF = 0.3  #: of a link's length: a centre of mass so far beside it belongs to its outline
 NEAR = 1e-9  #: of the extent: points that are one
 
 #: Order in which roles lie over each other.
-ROLES = ("hatch", "rail", "shape", "link", "wheel", "force", "block", "com", "joint", "frame", "trace")
+ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace")
 
 
 class Item(NamedTuple):
@@ -236,6 +237,8 @@ def link_items(data: PictureData, points: list[Array], symbol: float, extent: fl
         if data.mass[k] > 0.0 and len(own) == 1 and np.linalg.norm(com - own[0]) > 0.5 * symbol:
             own = np.vstack([own, com])
             items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))  # the mass at the end of a rod
+        if len(own) >= 2 and data.mass[k] > 0.0 and _off(com, own) > OFF * np.linalg.norm(np.ptp(own, axis=0)):
+            own = np.vstack([own, com])  # most of the body is there
         if len(own) >= 2:
             bar = rounded(own, BAR * symbol)
             if bar is not None:
@@ -249,6 +252,17 @@ def link_items(data: PictureData, points: list[Array], symbol: float, extent: fl
         if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(own) >= 2:
             items.append(Item("com", name, k, *_moved(sphere(0.3 * symbol), com)))
     return items
+
+
+def _off(point: Array, others: Array) -> float:
+    """Distance of a point from the line through the first and the last of others, or from their middle."""
+    along = others[-1] - others[0]
+    length = float(np.linalg.norm(along))
+    reach = point - others[0]
+    if length == 0.0:
+        return float(np.linalg.norm(reach))
+    part = float(np.clip(reach @ along / length**2, 0.0, 1.0))
+    return float(np.linalg.norm(reach - part * along))
 
 
 def _moved(mesh: Mesh, by: Array) -> Mesh:
