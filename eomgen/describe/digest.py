@@ -21,7 +21,19 @@ if TYPE_CHECKING:
 
 #: Attributes that nothing is computed from.
 ASIDE = frozenset(
-    {"doc", "docs", "lines", "notes", "place", "graph", "functions", "file", "named_markers", "body_shapes", "added_bodies"}
+    {
+        "doc",
+        "docs",
+        "lines",
+        "notes",
+        "place",
+        "graph",
+        "functions",
+        "file",
+        "named_markers",
+        "body_shapes",
+        "added_bodies",
+    }
 )
 
 

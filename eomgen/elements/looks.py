@@ -153,7 +153,10 @@ RUBBER: tuple[Points, ...] = (
 #: a spiral spring about an axis
 SPIRAL: tuple[Points, ...] = (
     tuple(
-        (round((1.3 + 0.025 * k) * math.cos(k * math.pi / 10), 3), round((1.3 + 0.025 * k) * math.sin(k * math.pi / 10), 3))
+        (
+            round((1.3 + 0.025 * k) * math.cos(k * math.pi / 10), 3),
+            round((1.3 + 0.025 * k) * math.sin(k * math.pi / 10), 3),
+        )
         for k in range(51)
     ),
 )

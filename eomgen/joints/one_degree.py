@@ -80,9 +80,7 @@ class Screw(Joint):
     """
 
     type_name: ClassVar[str] = "screw"
-    look: ClassVar[JointLook] = JointLook(
-        (Piece("cylinder", (1.2, 0.6)), Piece("cylinder", (0.8, 2.4))), slides=True
-    )
+    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (1.2, 0.6)), Piece("cylinder", (0.8, 2.4))), slides=True)
     options: ClassVar[Fields] = {
         "pitch": Field(
             "expression",

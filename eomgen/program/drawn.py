@@ -67,17 +67,22 @@ def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
     n = _Numbers(mechanism)
     joints = [_joint(n, spec) for spec in mechanism.joints]
     owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
+    things = [(f.name, f.drawn()) for f in mechanism.forces] + [(c.name, c.drawn()) for c in mechanism.constraints]
     elements = [
-        {"name": element.name, **found}
-        for element in (*mechanism.forces, *mechanism.constraints)
-        for seen in element.drawn()
+        {"name": name, **found}
+        for name, every in things
+        for seen in every
         if (found := _element(n, seen, owners)) is not None
     ]
     gravity = n.numbers(mechanism.gravity) if n.known(mechanism.gravity) else [0.0, 0.0, 0.0]
     data = {
         "gravity": gravity,
         "bodies": [
-            {"com": n.numbers(b.com), "mass": n.number(b.mass), "inertia": [n.number(b.inertia[k][k]) for k in range(3)]}
+            {
+                "com": n.numbers(b.com),
+                "mass": n.number(b.mass),
+                "inertia": [n.number(b.inertia[k][k]) for k in range(3)],
+            }
             for b in mechanism.bodies
         ],
         "shapes": [

@@ -1,4 +1,4 @@
-"""Stage runtime, pictures: calls of a module and of a trajectory that draw -> :mod:`eomgen.show`, loaded when asked for.
+"""Stage runtime, pictures: calls of a module that draw -> :mod:`eomgen.show`, loaded when asked for.
 
 A generated package has no copy of that: its pictures need eomgen beside it.
 """

@@ -63,9 +63,7 @@ def position(trajectory: Trajectory, name: str, model: BoundModel | None = None)
     return every[module.body_names.index(name), :3, 3]
 
 
-def animate(
-    trajectory: Trajectory, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]
-) -> Any:
+def animate(trajectory: Trajectory, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
     slopes = getattr(trajectory.columns, "slopes", None) if not trajectory.has_dense_output else None

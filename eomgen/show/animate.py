@@ -79,7 +79,9 @@ def require_kind(path: Path) -> None:
         return
     matplotlib("figure", "an animation")
     if kind == ".mp4" and not matplotlib("animation", "an animation").writers.is_available("ffmpeg"):
-        raise MissingDependencyError("an animation as .mp4 needs ffmpeg (Debian: apt install ffmpeg); .gif needs nothing more")
+        raise MissingDependencyError(
+            "an animation as .mp4 needs ffmpeg (Debian: apt install ffmpeg); .gif needs nothing more"
+        )
 
 
 class Frames:

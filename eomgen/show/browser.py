@@ -42,7 +42,10 @@ def scene_plot(scene: Scene, motion: Motion | None = None, height: int = 600) ->
     for item in scene.items:
         plot += _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
     for label in scene.labels:
-        places = [scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3] for k in range(len(times))]
+        places = [
+            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
+            for k in range(len(times))
+        ]
         plot += viewer.text(
             label.text,
             position=_over_time(times, places),
@@ -95,9 +98,9 @@ def _solid(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
 def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     width = (0.12 if item.role in ("trace", "hatch") else 0.2) * scene.symbol
     look = {"color": _number(color_of(item)), "shader": "mesh", "width": width, "name": f"{item.role} {item.name}"}
-    there = np.isfinite(item.points).all(axis=1)
+    there = np.asarray(np.isfinite(item.points).all(axis=1))
     places = np.cumsum(there) - 1
-    pairs = [(places[k], places[k + 1]) for k in range(len(there) - 1) if there[k] and there[k + 1]]
+    pairs = [(places[k], places[k + 1]) for k in range(len(item.points) - 1) if there[k] and there[k + 1]]
     look |= {"indices": np.array(pairs, dtype=np.uint32), "indices_type": "segment"}
     if item.follow is not None:
         points = [item.follow(scene.frames[k])[there] for k in range(len(times))]

@@ -67,7 +67,9 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
     """
     data = metadata.get("picture")
     if data is None:
-        why = "it is given by equations without bodies" if "picture" in metadata else "it was made by an earlier version"
+        why = (
+            "it is given by equations without bodies" if "picture" in metadata else "it was made by an earlier version"
+        )
         raise UsageError(f"there is nothing to draw of model {metadata['name']!r}: {why}")
     code, numbers, out = data["tape"]
     graph = Graph()
@@ -115,11 +117,14 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
         guide = one.get("guide")
         joints.append(
             JointData(
-                *(one[key] for key in ("name", "type")),
+                one["name"],
+                one["type"],
                 frame(one["P"]),
                 frame(one["S"]),
                 [(shape, sizes, axis, on) for shape, sizes, axis, on in one["pieces"]],
-                *(one[key] for key in ("slides", "bar", "coordinates")),
+                one["slides"],
+                one["bar"],
+                one["coordinates"],
                 None if guide is None else along(guide["point"]),
                 0 if guide is None else guide["running"],
             )

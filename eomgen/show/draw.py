@@ -50,6 +50,20 @@ def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
     return artist.ax
 
 
+def figure_of(scene: Scene) -> Any:
+    """A figure without a window, with empty axes for a scene."""
+    figure = matplotlib("figure", "draw").Figure
+    if scene.view is None:
+        made = figure(figsize=(7.0, 6.4), layout="constrained")
+        made.add_subplot(projection="3d")
+        return made
+    from .flat import figure_size
+
+    made = figure(figsize=figure_size(scene), layout="constrained")
+    made.add_subplot()
+    return made
+
+
 def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
     """Flat or Space, on the given axes or a new figure.
 
@@ -75,7 +89,9 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
     return Space(scene, ax)
 
 
-def draw_branches(module: Any, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None) -> Any:
+def draw_branches(
+    module: Any, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+) -> Any:
     """See :func:`eomgen.runtime.drawing.draw_branches`."""
     pyplot = matplotlib("pyplot", "draw_branches")
     found: Sequence[Array] = module.branches(values or {}, t=t)

@@ -1,4 +1,4 @@
-"""Stage show, elements: springs, dampers, cylinders and ropes between markers, spirals at joints, wheels, gears, cams."""
+"""Stage show, elements: springs, dampers, cylinders and ropes, spirals at joints, wheels, gears and cams."""
 
 from __future__ import annotations
 
@@ -67,7 +67,9 @@ def _turns(data: PictureData, element: dict[str, Any]) -> bool:
     return len(element["stops"]) == 1
 
 
-def _lines(data: PictureData, element: dict[str, Any], view: Array | None, symbol: float, aside: float, poses: Array) -> list[Item]:
+def _lines(
+    data: PictureData, element: dict[str, Any], view: Array | None, symbol: float, aside: float, poses: Array
+) -> list[Item]:
     name, frames = element["name"], _frames(data, element)
     if _turns(data, element):
         if not frames or not element["about"]:
@@ -155,7 +157,7 @@ def _wound(poses: Array, frame: Frame, r: float, sense: int, a: Array, b: Array)
     closest = abs(p[0] * q[1] - p[1] * q[0]) / max(float(np.hypot(*direct)), 1e-300)
     ahead = -p[:2] @ direct > 0.0 and q[:2] @ direct > 0.0
     left = sense * (p[0] * q[1] - p[1] * q[0]) > 0.0
-    if angle > np.pi and not (ahead and closest < r) or not left and not (ahead and closest < r) and angle > np.pi:
+    if (angle > np.pi and not (ahead and closest < r)) or (not left and not (ahead and closest < r) and angle > np.pi):
         return straight
     angles = begin + sense * angle * part[:, 0]
     steps = (across[0] + across[1] * part[:, 0]) / across.sum()

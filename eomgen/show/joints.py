@@ -7,13 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from .data import GROUND, Array, Frame, JointData, PictureData
-from .scene import BAR, Item, _is_block, attached, move, placed, symbol_mesh
-from .solids import Mesh, cone, hull, rounded, turned
+from .scene import BAR, Item, _is_block, attached, placed, symbol_mesh
+from .solids import Mesh, cone, turned
 
 GAP = np.full((1, 3), np.nan)
 
 
-def joint_items(data: PictureData, view: Array | None, up: Array, symbol: float, frames: Array, q: dict[str, Array]) -> list[Item]:
+def joint_items(
+    data: PictureData, view: Array | None, up: Array, symbol: float, frames: Array, q: dict[str, Array]
+) -> list[Item]:
     """Items of all joints over the frames (k, n_bodies + 1, 4, 4); q has coordinates (k,) by name."""
     items: list[Item] = []
     for joint in data.joints:
@@ -86,7 +88,9 @@ def _support(name: str, frame: Frame, view: Array | None, up: Array, symbol: flo
         turn = _upright(up)
         return [Item("hatch", name, GROUND, (vertices - [0, 0, 2.6 * symbol]) @ turn.T + origin, faces)]
     right = view[0]
-    corners = np.array([origin, origin - 2.4 * symbol * up - 1.5 * symbol * right, origin - 2.4 * symbol * up + 1.5 * symbol * right])
+    corners = np.array(
+        [origin, origin - 2.4 * symbol * up - 1.5 * symbol * right, origin - 2.4 * symbol * up + 1.5 * symbol * right]
+    )
     foot = origin - 2.4 * symbol * up
     hatch = _hatching(name, foot - 2.4 * symbol * right, foot + 2.4 * symbol * right, -up, symbol)
     return [Item("hatch", name, GROUND, corners[[0, 1, 2, 0]]), hatch]
@@ -141,7 +145,9 @@ def _rod(line: Array, radius: float) -> Mesh:
     return vertices @ _upright(along / length).T + line[0], faces
 
 
-def between(start: Callable[[Array], Array], end: Callable[[Array], Array], radius: float, part: tuple[float, float]) -> Callable[[Array], Array]:
+def between(
+    start: Callable[[Array], Array], end: Callable[[Array], Array], radius: float, part: tuple[float, float]
+) -> Callable[[Array], Array]:
     """Vertices of a round bar over a part of the way between two points that move."""
 
     def points(poses: Array) -> Array:
@@ -187,7 +193,9 @@ def _guide(joint: JointData, symbol: float, q: dict[str, Array]) -> list[Item]:
         lines = [joint.guide(spans[0])]
     else:
         u, v = spans
-        lines = [joint.guide(np.full_like(v, x), v) for x in u[::20]] + [joint.guide(u, np.full_like(u, x)) for x in v[::20]]
+        lines = [joint.guide(np.full_like(v, x), v) for x in u[::20]] + [
+            joint.guide(u, np.full_like(u, x)) for x in v[::20]
+        ]
     points = np.vstack([part for line in lines for part in (move_frame(joint.P, line), GAP)])
     return [Item("rail", joint.name, joint.P.body, points)]
 

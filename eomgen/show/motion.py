@@ -42,8 +42,10 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
         if value is not None and not (isinstance(value, int | float) and 0.0 < value < np.inf):
             raise UsageError(f"{name} must be a number greater than 0, not {value!r}")
     t = trajectory.t
-    if len(t) < 2 or t[0] == t[-1]:
-        raise UsageError("the run has no duration; draw its state with module.draw(x)")
+    if len(t) < 2:
+        raise UsageError("the run has one point only; draw its state with module.draw(x)")
+    if t[0] == t[-1]:  # a range of coordinates at one time
+        return Motion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST))
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:
@@ -80,8 +82,6 @@ def _states(trajectory: Any, module: Any, slopes: Array | None, times: Array) ->
     return states, u
 
 
-def moving_scene(
-    module: Any, motion: Motion, names: bool | None, axes: bool, trace: Sequence[str]
-) -> Scene:
+def moving_scene(module: Any, motion: Motion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
     """The scene over all frames."""
     return build_scene(module, motion.x[: module.n_q], motion.t, motion.u, names, axes, trace)

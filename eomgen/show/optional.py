@@ -30,7 +30,9 @@ def k3d(purpose: str) -> Any:
     found = _load("k3d", "k3d>=3.2", purpose)
     version = tuple(int(x) for x in str(found.__version__).split(".")[:2] if x.isdigit())
     if version < K3D:
-        raise MissingDependencyError(f'{purpose} needs k3d 3.2 or later, not {found.__version__}: pip install "k3d>=3.2"')
+        raise MissingDependencyError(
+            f'{purpose} needs k3d 3.2 or later, not {found.__version__}: pip install "k3d>=3.2"'
+        )
     return found
 
 

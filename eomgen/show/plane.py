@@ -1,4 +1,4 @@
-"""Stage show, plane: poses of a mechanism -> the plane in which it moves, if there is one, and how a page lies in it."""
+"""Stage show, plane: poses of a mechanism -> the plane in which it moves, and how a page lies in it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravi
     strength = float(np.linalg.norm(gravity))
     if strength:  # a page on which things fall is better than one on which they do not
         candidates.sort(key=lambda n: abs(float(n @ gravity)) > ROUNDING * strength)
-    _, values, axes = np.linalg.svd(stacked, full_matrices=True)
+    _, _, axes = np.linalg.svd(stacked, full_matrices=True)
     candidates.append(axes[2])
     for n in candidates:
         if float(np.abs(stacked @ n).max(initial=0.0)) <= 1e3 * ROUNDING:

@@ -148,9 +148,7 @@ def symbol_size(data: PictureData, points: list[Array], poses: Array) -> tuple[f
             extent = max(extent, float(np.abs(shape["sizes"]).max()))
     if extent == 0.0:
         extent = _own_size(data) or 1.0
-    lengths = sorted(
-        length for k, p in enumerate(points[:-1]) if (length := _length(data, k, p)) > NEAR * extent
-    )
+    lengths = sorted(length for k, p in enumerate(points[:-1]) if (length := _length(data, k, p)) > NEAR * extent)
     middle = lengths[len(lengths) // 2] if lengths else extent
     return min(SYMBOL * extent, OF_LINK * middle), extent
 
@@ -178,7 +176,7 @@ def equivalent_solid(data: PictureData, k: int, least: float) -> tuple[Mesh, flo
         length = float(np.sqrt(max(12.0 * small / data.mass[k] - 3.0 * radius**2, 0.0)))
         mesh = disc(radius, max(length, least))
         return (mesh[0] @ TO_AXIS["xyz"[order[2]]].T, mesh[1]), 2.0 * radius
-    return box(np.maximum(edges, least)), float(edges.max())
+    return box(np.maximum(edges, least).tolist()), float(edges.max())
 
 
 def equivalent_box(data: PictureData, k: int) -> Array:

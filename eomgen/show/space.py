@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from .colors import color_of, style_of
-from .data import Array
 from .scene import Item, Scene
+from .solids import Triangles
 
 ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
 COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
@@ -28,7 +28,7 @@ class Space:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
         self.scene, self.ax = scene, ax
-        self.artists: list[tuple[Item, Any, Array | None]] = []
+        self.artists: list[tuple[Item, Any, Triangles | None]] = []
         light = np.array([0.4, -0.5, 0.77])
         for item in scene.items:
             style, color = style_of(item.role), color_of(item)
