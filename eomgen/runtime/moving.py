@@ -14,10 +14,9 @@ from .names import unknown
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
-    from .trajectory import Trajectory
 
 
-def module_of(trajectory: Trajectory, model: BoundModel | None, purpose: str) -> BoundModel:
+def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundModel:
     """The module of a run with its parameters bound.
 
     Raises
@@ -38,7 +37,7 @@ def module_of(trajectory: Trajectory, model: BoundModel | None, purpose: str) ->
     return found
 
 
-def poses(trajectory: Trajectory, model: BoundModel | None = None) -> Array:
+def poses(trajectory: Any, model: BoundModel | None = None) -> Array:
     """See :meth:`.trajectory.Trajectory.poses`."""
     module = module_of(trajectory, model, "poses")
     names = module.u_names
@@ -46,7 +45,7 @@ def poses(trajectory: Trajectory, model: BoundModel | None = None) -> Array:
     return module.poses(trajectory.q, t=trajectory.t, u=u)
 
 
-def position(trajectory: Trajectory, name: str, model: BoundModel | None = None) -> Array:
+def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Array:
     """See :meth:`.trajectory.Trajectory.position`."""
     module = module_of(trajectory, model, "position")
     data = load_show("data", "position").read_picture(module.metadata, module.p)
@@ -63,7 +62,7 @@ def position(trajectory: Trajectory, name: str, model: BoundModel | None = None)
     return every[module.body_names.index(name), :3, 3]
 
 
-def animate(trajectory: Trajectory, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
+def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
     slopes = getattr(trajectory.columns, "slopes", None) if not trajectory.has_dense_output else None

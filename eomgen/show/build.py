@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -79,14 +80,14 @@ def build_scene(
 
 def _tracked(data: PictureData, name: str) -> Frame:
     """The frame of a marker or a body."""
-    from ..describe.names import nearest
-
     if name in data.markers:
         return data.markers[name]
     if name in data.bodies:
         return Frame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
-    raise UsageError(f"no marker or body {name!r} to trace; {nearest(str(name), known, 'markers and bodies')}")
+    near = get_close_matches(str(name), known, 1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+    raise UsageError(f"no marker or body {name!r} to trace; {hint}")
 
 
 def _with_ground(poses: Array) -> Array:
