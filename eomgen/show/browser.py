@@ -47,7 +47,8 @@ def scene_plot(scene: Scene, motion: Motion | None = None, height: int = 600) ->
             for k in range(len(times))
         ]
         plot += viewer.text(
-            label.text,
+            escape(label.text),
+            is_html=True,  # else underscores would be read as TeX
             position=_over_time(times, places),
             color=_number("#444444" if label.role == "joint" else color_of(label)),
             size=0.7,

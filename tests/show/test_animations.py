@@ -33,7 +33,8 @@ def run(module: Any) -> Any:
 def test_positions_of_markers_are_those_of_outputs(run: Any, module: Any) -> None:
     tip = run.position("rod.tip")
     assert tip[0] == pytest.approx(run["pin_x"], abs=1e-12)
-    assert run.q.shape == (module.n_q, len(run)) and run.v.shape == (module.n_v, len(run))
+    assert run.q.shape == (module.n_q, len(run))
+    assert run.v.shape == (module.n_v, len(run))
     assert run.poses().shape == (module.n_bodies, 4, 4, len(run))
     assert run.position("slider") == pytest.approx(tip, abs=1e-6)
     with pytest.raises(UsageError, match="no marker or body 'rod.tap'; did you mean rod.tip"):
