@@ -65,7 +65,7 @@ class Derivation:
     def accelerations(self) -> tuple[str, ...]:
         """Names of the accelerations that ``mass_matrix`` and ``force`` are for."""
         k = self.kinematics
-        return tuple(acceleration_name(k.velocity_names[k.freedoms.index(n)]) for n in self.independent)
+        return tuple(acceleration_name(k.velocity_names[k.velocity_labels.index(n)]) for n in self.independent)
 
     @cached_property
     def report(self) -> MechanismReport:

@@ -27,7 +27,7 @@ class Marker:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class WrapCylinder:
     """A smooth cylinder of the radius (m) about the z axis of a marker; ``sense`` is the turn of the path about it.
 
     The path runs from start to end round the axis counterclockwise (1) or clockwise (-1), seen against z.

@@ -10,8 +10,9 @@ import numpy as np
 
 from .emit import emit_package
 from .emit.write import write_package
-from .files.paths import as_path
+from .files.path_names import as_path
 from .pipeline import build, derive
+from .targets import TARGETS
 from .verification.record import record
 from .verification.recorded import FILE
 
@@ -27,10 +28,21 @@ def generate(
     target: str = "cython",
     independent: Sequence[str] | None = None,
     baumgarte: tuple[float, float] | None = None,
+    slim: bool = False,
 ) -> Path:
     """Write a package that stands alone into ``directory/<name>/`` and return that path.
 
     Files of an earlier generation that are no longer needed are removed; those of others are left alone.
+
+    Parameters
+    ----------
+    model : Builder
+    directory : Path or str
+    method, independent, baumgarte : optional
+        As for ``Model.compile``.
+    target : {'cython', 'numpy', 'c'}
+    slim : bool, optional
+        Write calls, events and ``simulate`` only, in a tenth of the Python text; what else is called refuses by name.
 
     Raises
     ------
@@ -40,7 +52,7 @@ def generate(
     folder = as_path("directory", directory)
     equations = derive(model, method, independent, baumgarte)
     program = build(equations, target)
-    sources = dict(emit_package(program, target))
-    if target != "c":
+    sources = dict(emit_package(program, target, slim))
+    if TARGETS[target].module and not slim:
         sources[FILE] = record(program)
     return write_package(sources, folder / equations.name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from .limits.in_c import definitions
+from .operations import tape_rows
 from .shipped import shipped
 
 #: Parts of the steppers' source, in order: a part may use what stands in those before it.
@@ -51,6 +52,7 @@ LAYER = {
 def read_layer() -> dict[str, str]:
     """The texts of the layer by file name."""
     texts = {name: "\n".join(map(_read, parts)) for name, parts in LAYER.items()}
+    texts["eomgen_steppers.c"] = tape_rows() + texts["eomgen_steppers.c"]
     return {name: definitions(text) + text if name.endswith((".c", ".h")) else text for name, text in texts.items()}
 
 

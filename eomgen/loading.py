@@ -9,8 +9,8 @@ from typing import Any
 from .api.model import Model
 from .describe import describe_yaml_file
 from .errors import ModelError, UsageError
-from .files.paths import as_name
-from .numeric.inertia import CHECKS, word_of_check
+from .files.path_names import as_name
+from .numeric.rigid_inertia import CHECKS, word_of_check
 
 #: Suffix of a file -> what it is; the table of what can be loaded.
 SUFFIXES = {".yaml": "a model file (YAML 1.2)", ".yml": "a model file (YAML 1.2)"}
@@ -34,7 +34,7 @@ def load(
         True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
     **robot
         For robots: ``floating``, ``lock``, ``mimic``, ``limits`` and the other fields of
-        :class:`eomgen.robots.Options`.
+        :class:`eomgen.robots.RobotOptions`.
 
     Returns
     -------

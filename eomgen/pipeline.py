@@ -24,6 +24,7 @@ from .kinematics import Kinematics, analyse
 from .kinematics.loads import drives_cut_joint
 from .kinematics.mobility import Mobility, judge
 from .kinematics.report import MechanismReport, report
+from .targets import TARGETS, find_target
 
 if TYPE_CHECKING:
     from .describe.builder import Builder
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from .program.program import Program
     from .runtime.protocols import Core
 
-TARGETS = ("cython", "numpy", "c")
 OF_LAGRANGIANS = ("lagrange", "hamilton", "augmented")  #: methods that take a bare Lagrangian
 
 
@@ -179,11 +179,10 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
     """The functions to generate for a target."""
     from .describe.digest import model_digest
     from .program import Limits
-    from .program.build import build_program
+    from .program.build_program import build_program
     from .program.collect import collect_metadata, collect_terms
 
-    if target not in TARGETS:
-        raise UsageError(f"no target {target!r}; there are: {', '.join(TARGETS)}")
+    row = find_target(target)
     kinematics, mobility, tree = equations.fresh()
     kinematics.mechanism.require_values()
     idle = require_inertia(kinematics, mobility, tree)
@@ -192,7 +191,7 @@ def build(equations: Derivation, target: str = "cython", kernels: Sequence[str] 
         tree = tree.without_accelerations()  # which divide by pivots before they are looked at
     made = {"target": target, "model_digest": model_digest(kinematics.mechanism), "eomgen": __version__}
     metadata = collect_metadata(kinematics, mobility, tree) | made
-    limits = Limits(unrolled_loops=0) if target == "numpy" else None  # NumPy does better on arrays
+    limits = Limits(unrolled_loops=0) if row.arrays else None
     if idle:
         metadata["no_inertia"] = idle
     if kinematics.mechanism.negative:
@@ -210,8 +209,10 @@ def compile_core(
     from .program import KERNELS
     from .runtime.late import LateCore
 
-    if target == "c":
-        raise UsageError("target 'c' makes a C library, not a Python module; use generate, or target cython or numpy")
+    if not find_target(target).module:
+        modules = " or ".join(name for name, row in TARGETS.items() if row.module)
+        about = f"target {target!r} makes a {TARGETS[target].about}, not a Python module"
+        raise UsageError(f"{about}; use generate, or target {modules}")
     if kernels is not None:
         return _load(equations, build(equations, target, kernels), target, options)
     with _timed(equations.seconds, "program"):

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from eomgen.graph.evaluate import FUNCTIONS
+from eomgen.operations import OPERATIONS
 
 TEMPLATES = Path(__file__).parents[1] / "templates" / "c"
 SOURCE = """
@@ -43,9 +43,9 @@ def circular_functions(target: str) -> Iterator[None]:
     if target == "numpy":
         yield
         return
-    before = {name: FUNCTIONS[name] for name in ("sin", "cos")}
+    before = {name: OPERATIONS[name] for name in ("sin", "cos")}
     try:
-        FUNCTIONS.update({name: (function, before[name][1]) for name, function in compiled().items()})
+        OPERATIONS.update({name: before[name]._replace(value=function) for name, function in compiled().items()})
         yield
     finally:
-        FUNCTIONS.update(before)
+        OPERATIONS.update(before)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from eomgen.graph.core import Expr
-from eomgen.graph.evaluate import FUNCTIONS
 from eomgen.graph.traverse import LEAVES, reachable
+from eomgen.operations import OPERATIONS
 
 
 def largest_terms(outputs: Sequence[Expr], values: Mapping[str, float]) -> np.ndarray:
@@ -31,7 +31,7 @@ def largest_terms(outputs: Sequence[Expr], values: Mapping[str, float]) -> np.nd
         a = [value[k] for k in operands]
         m = [size[k] for k in operands]
         with np.errstate(all="ignore"):
-            value[i] = (a[1] if a[0] else a[2]) if operation == "select" else FUNCTIONS[operation][0](*a)
+            value[i] = OPERATIONS[operation].value(*a)
         if operation in ("add", "sub"):
             size[i] = max(m)
         elif operation == "mul":

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..limits.constraints import STATE
 from ..limits.rounding import TINY
+from ..limits.statics import DISPLACED
 from ..numeric import algebra
 from ..numeric.partitions import Partition, partition
 from ..numeric.ranks import rank
@@ -98,7 +99,7 @@ def unit_rows(rows: Array) -> Array:
     return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), TINY))
 
 
-class Slopes(NamedTuple):
+class BalanceSlopes(NamedTuple):
     """How the accelerations of the tree at rest change, and the velocities that constraints enforce."""
 
     Z: Array  #: (n_v, n_z) independent displacements
@@ -116,7 +117,7 @@ def slopes(
     held_by: Array,
     parameters: Sequence[int],
     inputs: Sequence[int],
-) -> Slopes:
+) -> BalanceSlopes:
     """Exact derivatives of the accelerations and velocities at rest by displacements, parameters and inputs.
 
     Parameters
@@ -148,7 +149,7 @@ def slopes(
         motion[:, : len(parameters)] = scales.q[:, None] * step
         by_unknown = by_unknown + (J[:, :n_q] @ scales.rates(x[:n_q], motion))[n_q:]
     along = tangent.T[:, : tangent.Z.shape[1]]
-    return Slopes(tangent.Z, (J @ along)[n_q:], along[n_q:], by_unknown, motion)
+    return BalanceSlopes(tangent.Z, (J @ along)[n_q:], along[n_q:], by_unknown, motion)
 
 
 def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
@@ -157,7 +158,7 @@ def assembly_jacobian(module: BoundModel, t: float, x: Array) -> Array:
 
 
 def force_slopes(
-    module: BoundModel, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = 1e-5
+    module: BoundModel, t: float, here: Balance, gradients: Callable[[Array], Array], step: float = DISPLACED
 ) -> tuple[Array, Array]:
     """Changes of the forces (n_dof - k, n_z) and of the enforced velocities (n_v, n_z) along the columns of Z.
 

@@ -9,14 +9,14 @@ import numpy as np
 from ..errors import EquilibriumError
 from ..limits.statics import MOVING
 from ..numeric.scales import Array
-from .creeping import creep
 from .newton import marquardt, newton
-from .search import Point, Search
+from .search import Search, SearchPoint
+from .viscous_descent import creep
 
 REACH = 2.0  #: scaled distance from the guess at which a balance is not near it
 
 
-def find_balance(search: Search, q: Array) -> tuple[Point, int]:
+def find_balance(search: Search, q: Array) -> tuple[SearchPoint, int]:
     """From a position: each way in turn until one leads to balance.
 
     Newton's iteration finds what is near; where it stalls or leads far away, the motion of a very damped mechanism
@@ -31,7 +31,7 @@ def find_balance(search: Search, q: Array) -> tuple[Point, int]:
     first, steps, found = newton(search, start, reach=REACH)
     if found:
         return first, steps
-    ways: list[Callable[[], tuple[Point, int, bool]]] = [
+    ways: list[Callable[[], tuple[SearchPoint, int, bool]]] = [
         lambda: newton(search, start),
         lambda: newton(search, start, plain=True),
         lambda: marquardt(search, start),
@@ -51,9 +51,9 @@ def find_balance(search: Search, q: Array) -> tuple[Point, int]:
     raise _failure(search, min(ends, key=lambda end: float(np.abs(search.residual(end.here, end.here)).max())))
 
 
-def _failure(search: Search, point: Point) -> EquilibriumError:
+def _failure(search: Search, point: SearchPoint) -> EquilibriumError:
     here, layout = point.here, search.layout
-    names = [layout.freedoms[k] for k in here.velocities]
+    names = [layout.velocity_labels[k] for k in here.velocities]
     left = dict(zip(names, here.forces.tolist(), strict=True))
     where = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, point.q, strict=True))
     head = f"no equilibrium of {layout.name!r} found from this guess: "
@@ -61,8 +61,8 @@ def _failure(search: Search, point: Point) -> EquilibriumError:
     if rates.size and rates.max() > MOVING:
         worst = int(here.surplus[rates.argmax()])
         return EquilibriumError(
-            f"{head}nonholonomic constraints move {layout.freedoms[worst]} at a rate of {here.v[worst]:.6g} even "
-            f"where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
+            f"{head}nonholonomic constraints move {layout.velocity_labels[worst]} at a rate of {here.v[worst]:.6g} "
+            f"even where the independent velocities are 0, at {where}; give another guess, or let their right-hand "
             "side vanish somewhere",
             left,
         )

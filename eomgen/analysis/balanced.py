@@ -11,11 +11,11 @@ from ..limits.statics import DIFFERENCES
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import Balance, force_slopes, weigh
+from .eigenvalue_rounding import judge
 from .linear import linearize
 from .linearization import Linearization
-from .rounding import judge
 from .stability import SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
@@ -94,7 +94,7 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
     found: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
         "unknowns": dict(zip(search.names, unknowns.tolist(), strict=True)),
-        "forces": {layout.freedoms[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
+        "forces": {layout.velocity_labels[k]: float(f) for k, f in zip(here.velocities, here.forces, strict=True)},
         "supports": {},
         "linear": None,
         "steps": steps,

@@ -23,7 +23,7 @@ from ..numeric.gram import gram_solver, least
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import read_names
+from ..runtime.near_names import read_names
 from ..runtime.room import read_number, read_numbers
 from ..texts import shown
 
@@ -102,7 +102,7 @@ def consistent(
 
 def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held: Sequence[str]) -> None:
     given = () if weights is None or isinstance(weights, str) else read_names("weights", weights)
-    allowed = tuple(dict.fromkeys((*layout.freedoms, *layout.v)))
+    allowed = tuple(dict.fromkeys((*layout.velocity_labels, *layout.v)))
     for what, names in (("weights", given), ("hold", held)):
         for name in names:
             if name not in allowed:
@@ -130,7 +130,7 @@ def _metric(
             ) from None
     factors = np.ones(layout.n_v)
     if isinstance(weights, Mapping):
-        for i, (freedom, name) in enumerate(zip(layout.freedoms, names, strict=True)):
+        for i, (freedom, name) in enumerate(zip(layout.velocity_labels, names, strict=True)):
             factors[i] = weights.get(name, weights.get(freedom, 1.0))
     return np.diag(np.sqrt(factors) / layout.scales.q)
 
@@ -154,11 +154,11 @@ def _positions(
     """
     layout = module.layout
     start = start if layout.space is None else layout.space.normalised(start)
-    free = np.array([name not in held for name in layout.freedoms])
+    free = np.array([name not in held for name in layout.velocity_labels])
     n_h = layout.n_h
     if not n_h:
         return start
-    L = _metric(module, start, t, weights, layout.freedoms)[np.ix_(free, free)]
+    L = _metric(module, start, t, weights, layout.velocity_labels)[np.ix_(free, free)]
     scales = layout.scales
 
     def rows(q: Array) -> tuple[Array, Array]:

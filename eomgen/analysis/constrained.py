@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 
-class States(NamedTuple):
+class ProjectedStates(NamedTuple):
     """Projected states and times, k of them, and what they are evaluated with."""
 
     module: BoundModel
@@ -72,7 +72,7 @@ def _all_rows(module: BoundModel) -> Any:
     return module.kernels.constraint_jacobian.every
 
 
-def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> States:
+def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: Any = None) -> ProjectedStates:
     """Check and project states.
 
     Raises
@@ -104,7 +104,7 @@ def prepare(module: BoundModel, t: ArrayLike, x: ArrayLike, p: Any = None, u: An
     times = np.ascontiguousarray(np.broadcast_to(time, columns.shape[1:]))
     options = {"p": p, "u": u}
     projected = module.project(np.ascontiguousarray(columns), t=times, **options)
-    return States(module, times, np.asarray(projected), options, single)
+    return ProjectedStates(module, times, np.asarray(projected), options, single)
 
 
 def solve_multipliers(C_q: Array, force: Array, scales: Scales) -> Array:
@@ -153,7 +153,7 @@ def multipliers(
         each other, the smallest multipliers, each times the scale of its row.
     """
 
-    def find(states: States) -> Array:
+    def find(states: ProjectedStates) -> Array:
         force = states.residual(states.accelerations())
         return solve_multipliers(states.jacobian(), force, module.layout.scales)
 
@@ -161,7 +161,7 @@ def multipliers(
 
 
 def evaluate(
-    find: Callable[[States], Array],
+    find: Callable[[ProjectedStates], Array],
     module: BoundModel,
     t: ArrayLike,
     x: ArrayLike,

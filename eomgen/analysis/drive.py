@@ -19,14 +19,14 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import STATE as RANK
 from ..limits.rounding import TINY
-from ..limits.statics import AFFINE, REACHED, REMAINDER
+from ..limits.statics import AFFINE, REACHED, REMAINDER, WELL_ABOVE
 from ..numeric import algebra
 from ..numeric.partitions import partition
 from ..numeric.scales import Array
 from ..runtime.layout import Layout
-from ..runtime.names import read_names
+from ..runtime.near_names import read_names
 from ..runtime.room import read_numbers
-from .constrained import States, free_motions, prepare, solve_multipliers
+from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
 if TYPE_CHECKING:
@@ -161,13 +161,13 @@ def _solve(A: Array, want: Array, weights: Array) -> Array:
     m, n = A.shape
     if m == n and m:
         rows = np.abs(A * (1.0 / weights)).max(axis=1, keepdims=True)
-        if rows.all() and algebra.cond(A / weights / rows) < 1e-2 / RANK:
+        if rows.all() and algebra.cond(A / weights / rows) < WELL_ABOVE / RANK:
             return np.asarray(algebra.solve(A / rows, want / rows[:, 0]))
     return np.asarray(algebra.lstsq(A / weights, want, rcond=RANK) / weights)
 
 
 def _check_inputs(
-    states: States, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
+    states: ProjectedStates, names: Sequence[str], a: Array, forces: Array, bases: Sequence[Array], S: Array
 ) -> None:
     """The forces found, applied all at once, must make the motion: inputs may multiply each other.
 
@@ -198,8 +198,8 @@ def _check_inputs(
 
 def _size(layout: Layout, name: str) -> float:
     """What a force is multiplied by before forces of different kinds are compared: a length of the model for N."""
-    if name in layout.freedoms:
-        return float(layout.scales.q[layout.freedoms.index(name)])
+    if name in layout.velocity_labels:
+        return float(layout.scales.q[layout.velocity_labels.index(name)])
     return float(layout.loop_scales[layout.loops.index(name)]) if name in layout.loops else 1.0
 
 
@@ -211,9 +211,9 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     UsageError
     """
     if actuated is None:
-        return tuple(layout.freedoms[i] for i in layout.independent)
+        return tuple(layout.velocity_labels[i] for i in layout.independent)
     names = read_names("actuated", actuated)
-    allowed = [*layout.freedoms, *layout.loops, *layout.u]
+    allowed = [*layout.velocity_labels, *layout.loops, *layout.u]
     for name in names:
         if name not in allowed:
             near = get_close_matches(name, allowed, 1)
@@ -236,7 +236,7 @@ def _basis(J: Array, layout: Layout) -> Array:
     return free_motions(J, s)
 
 
-def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Array:
+def _complete(states: ProjectedStates, bases: Sequence[Array], free: Array, a: Any) -> Array:
     """Accelerations that the constraints allow, (n_v, k).
 
     Raises
@@ -248,7 +248,7 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
     count = free.shape[1]
     if a is None or isinstance(a, Mapping):
         given: Mapping[str, Any] = {} if a is None else a
-        rows = {layout.freedoms[i]: int(i) for i in layout.independent}
+        rows = {layout.velocity_labels[i]: int(i) for i in layout.independent}
         keys = rows | {layout.a[i]: i for i in rows.values()}
         for name in given:
             if name not in keys:
@@ -292,15 +292,15 @@ def _complete(states: States, bases: Sequence[Array], free: Array, a: Any) -> Ar
     return result
 
 
-def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
+def _effects(states: ProjectedStates, names: Sequence[str]) -> tuple[Array, Array]:
     """Generalized forces (n_v, n, k) of a unit of each drive, and what each drive has already (n,)."""
     module, layout = states.module, states.module.layout
     count = len(states.t)
     S, base = np.zeros((layout.n_v, len(names), count)), np.zeros(len(names))
     loops = None
     for i, name in enumerate(names):
-        if name in layout.freedoms:
-            S[layout.freedoms.index(name), i] = 1.0
+        if name in layout.velocity_labels:
+            S[layout.velocity_labels.index(name), i] = 1.0
         elif name in layout.loops:
             if loops is None:
                 loops = states.evaluate(module.kernels.state("loop_coordinate_jacobian"), states.q)
@@ -312,7 +312,7 @@ def _effects(states: States, names: Sequence[str]) -> tuple[Array, Array]:
     return S, base
 
 
-def _input_effect(states: States, j: int) -> Array:
+def _input_effect(states: ProjectedStates, j: int) -> Array:
     """Generalized forces (n_v, k) of a unit of an input, in which forces must be linear."""
     module = states.module
     h = []
@@ -331,22 +331,22 @@ def _out_of_reach(layout: Layout, names: Sequence[str], B: Array, A: Array, t: f
     U, sizes, _ = algebra.svd(A)
     rank = int((sizes > RANK * max(sizes.max(initial=0.0), TINY)).sum())
     motion = np.abs((B @ U[:, rank:]) / layout.scales.q[:, None]).max(axis=1, initial=0.0)
-    moved = [layout.freedoms[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
+    moved = [layout.velocity_labels[i] for i in np.argsort(-motion) if motion[i] > 0.3 * motion.max(initial=0.0)]
     need = "1 degree of freedom needs" if layout.n_dof == 1 else f"{layout.n_dof} degrees of freedom need"
     where = f"t = {t:g}" + (f" (state {k})" if k is not None else "")
     return (
         f"drives on {', '.join(names)} cannot make this motion at {where}: nothing drives a motion of "
         f"{', '.join(moved[:4])}; {need} as many drives, "
-        f"such as {', '.join(layout.freedoms[i] for i in layout.independent)}"
+        f"such as {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
     )
 
 
-def _with_drives(states: States, names: Sequence[str], a: Array, multipliers: Array, forces: Array) -> Array:
+def _with_drives(states: ProjectedStates, names: Sequence[str], a: Array, multipliers: Array, forces: Array) -> Array:
     """Reactions of all joints while the drives act."""
     from .reactions import find_reactions
 
     module, layout = states.module, states.module.layout
-    inputs = [i for i, name in enumerate(names) if name in layout.u and name not in layout.freedoms]
+    inputs = [i for i, name in enumerate(names) if name in layout.u and name not in layout.velocity_labels]
     loops = [i for i, name in enumerate(names) if name in layout.loops]
     cut = {layout.loops.index(names[i]): forces[i] for i in loops}
     if not inputs:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import AssemblyError, UsageError
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
-from ..runtime.names import read_names, unknown
+from ..runtime.near_names import read_names, unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number, read_numbers
 from .balance_search import find_balance

@@ -22,7 +22,7 @@ from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.room import read_flag, read_number, read_numbers
 from ..runtime.signal_rates import drift, moving_inputs
-from .constrained import States, conditioned_motions, prepare, solve_multipliers
+from .constrained import ProjectedStates, conditioned_motions, prepare, solve_multipliers
 from .impact_gaps import Gaps, allowance, by_velocity, check_gaps
 from .impact_law import collide
 from .tables import as_text
@@ -207,14 +207,14 @@ def strike_events(
     return _apply(states, rows, rates, np.array([*gaps.values()]), names).x
 
 
-def _one_state(module: BoundModel, t: float, x: ArrayLike) -> States:
+def _one_state(module: BoundModel, t: float, x: ArrayLike) -> ProjectedStates:
     states = prepare(module, t, x)
     if not states.single:
         raise UsageError(f"x must be one state ({module.layout.n_x},)")
     return states
 
 
-def _require_closed(gaps: Gaps, states: States) -> None:
+def _require_closed(gaps: Gaps, states: ProjectedStates) -> None:
     values = gaps.values(float(states.t[0]), states.x[:, 0])
     for name, value, limit in zip(gaps.names, values, allowance(gaps.layout, gaps.names, MEASURED), strict=True):
         if abs(value) > limit:
@@ -227,7 +227,7 @@ def _require_closed(gaps: Gaps, states: States) -> None:
 
 
 def _strike_gaps(
-    states: States, gaps: Gaps, rows: Array, restitutions: Mapping[str, float], locked: tuple[str, ...]
+    states: ProjectedStates, gaps: Gaps, rows: Array, restitutions: Mapping[str, float], locked: tuple[str, ...]
 ) -> Impact:
     rates = gaps.rates(float(states.t[0]), states.x[:, 0], rows)
     if locked:
@@ -236,19 +236,19 @@ def _strike_gaps(
     return _apply(states, rows, rates, np.array([*restitutions.values()]), (*gaps.names, *locked))
 
 
-def _locks(states: States, names: Sequence[str]) -> Array:
+def _locks(states: ProjectedStates, names: Sequence[str]) -> Array:
     layout = states.module.layout
     rows = np.zeros((len(names), layout.n_v))
     for i, name in enumerate(names):
-        if name in layout.freedoms:
-            rows[i, layout.freedoms.index(name)] = 1.0
+        if name in layout.velocity_labels:
+            rows[i, layout.velocity_labels.index(name)] = 1.0
         else:
             every = states.evaluate(states.module.kernels.state("loop_coordinate_jacobian"), states.q)
             rows[i] = every[layout.loops.index(name), :, 0]
     return rows
 
 
-def _apply(states: States, rows: Array, rates: Array, e: Array, names: Sequence[str]) -> Impact:
+def _apply(states: ProjectedStates, rows: Array, rates: Array, e: Array, names: Sequence[str]) -> Impact:
     layout, v = states.module.layout, states.v[:, 0]
     C_q = states.jacobian()
     M = states.evaluate(states.module.mass_matrix, states.q)[..., 0]

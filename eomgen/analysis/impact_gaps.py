@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.impacts import ELSEWHERE
 from ..numeric.scales import Array
+from ..runtime.input_kinds import Expressed
 from ..runtime.layout import Layout
 from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
-from ..runtime.tapes import Formula
+from ..runtime.tapes import DeclaredSignal
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -80,7 +82,7 @@ class Gaps:
         q, v = np.ascontiguousarray(x[: layout.n_q]), np.ascontiguousarray(x[layout.n_q :])
         rows = np.zeros((len(self.names), layout.n_v))
         for i, _ in self.tree:
-            rows[i, layout.freedoms.index(self.names[i])] = 1.0
+            rows[i, layout.velocity_labels.index(self.names[i])] = 1.0
         if self.loops:
             every = self.module.kernels.state("loop_coordinate_jacobian")(q, t=t, u=u)
             for i, j in self.loops:
@@ -140,11 +142,12 @@ def _rate_of_input(forcing: Forcing, index: int, t: float, x: Array) -> float:
     words = f"input {name} depends on the state, and so does its rate, which an impact changes"
     if getattr(value, "depends_on_state", False):
         raise UsageError(words)
-    if isinstance(value, Formula) or (hasattr(value, "derivative") and value.derivative() is not None):
+    known = isinstance(value, Expressed) or (hasattr(value, "derivative") and value.derivative() is not None)
+    if known and not isinstance(value, DeclaredSignal):
         rate = derive(name, dict(rate_pairs(forcing.layout)).get(name, f"d/dt {name}"), value)
-        return float((rate.function(forcing.parameters) if isinstance(rate, Formula) else rate)(t, x))
+        return float((rate.function(forcing.parameters) if isinstance(rate, Expressed) else rate)(t, x))
     f = forcing.varying[index]
-    if any(f(t, x + move) != f(t, x) for move in 1e-3 * np.eye(len(x))):
+    if any(f(t, x + move) != f(t, x) for move in ELSEWHERE * np.eye(len(x))):
         raise UsageError(words)
     return float(drift(lambda time: np.array([f(time, x)]), t)[0])
 
@@ -188,7 +191,7 @@ def check_gaps(
         raise UsageError("an impact needs gaps={name: restitution} or lock=[coordinates]")
     if layout.given_rates:
         raise UsageError("impacts need q' = v; the rates of this model's coordinates are given")
-    coordinates = [*layout.freedoms, *layout.loops]
+    coordinates = [*layout.velocity_labels, *layout.loops]
     placed = [name for name in coordinates if name in layout.q + layout.loops]
     for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
         for name in names:

@@ -10,7 +10,7 @@ from ..errors import UsageError
 from ..limits.constraints import UNMOVED
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .constrained import States
+from .constrained import ProjectedStates
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -47,7 +47,7 @@ def joint_table(module: BoundModel) -> dict[str, Any]:
     return table
 
 
-def place(states: States) -> Geometry:
+def place(states: ProjectedStates) -> Geometry:
     """Evaluate the geometry."""
     module, table = states.module, joint_table(states.module)
     k, n_c, n_b = len(states.t), module.n_rows, module.n_bodies

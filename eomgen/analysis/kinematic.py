@@ -17,17 +17,17 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_flag, read_number, read_numbers, require_room
 from ..texts import shown
-from .following import Follower
-from .gaps import describe_gap
-from .ground import Ground
-from .motions import KinematicAnalysis, keep
+from .driven_coordinates import DrivenCoordinates
+from .followed_path import FollowedPath
+from .kinematic_motion import KinematicAnalysis, keep
+from .known_range import KnownRange
+from .open_joint import describe_gap
+from .path_following import StraightPath
 from .singular import Singular
-from .tracks import Track
-from .walking import Path
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -150,7 +150,7 @@ def kinematic_analysis(
 def analyse(
     module: BoundModel, asked: Range, initial: Mapping[str, float] | ArrayLike | None, partial: bool
 ) -> KinematicAnalysis:
-    """Walk the range from the initial position."""
+    """Follow the range from the initial position."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
     partial = read_flag("partial", partial)
@@ -164,11 +164,11 @@ def analyse(
         # the declared position is a dead centre of theirs: begin at the first point, on whichever branch is next to it
         start_t, q = start_from(module, dict(zip(asked.names, y0.tolist(), strict=True)), t0)
         names = complete(module, q, start_t, asked.names)
-    follower = Follower(module, names)
-    further = follower.led_values(q, start_t)[len(asked.names) :]
-    start_y = follower.led_values(q, start_t)
+    driven = DrivenCoordinates(module, names)
+    further = driven.led_values(q, start_t)[len(asked.names) :]
+    start_y = driven.led_values(q, start_t)
     led = len(asked.names)
-    for k in np.flatnonzero(follower.wraps[:led]):  # the same angle, counted as asked for
+    for k in np.flatnonzero(driven.wraps[:led]):  # the same angle, counted as asked for
         start_y[k] += 2 * np.pi * np.round((y0[k] - start_y[k]) / (2 * np.pi))
     rest = np.repeat(further[:, None], len(asked.t), axis=1)
     still = np.zeros_like(rest)
@@ -179,9 +179,9 @@ def analyse(
         np.concatenate([asked.y1, still]),
         np.concatenate([asked.y2, still]),
     )
-    _refuse_long_ways(follower, names, np.column_stack([start_y, asked.y]))
-    q = walk_in(follower, q, (start_t, start_y), (t0, asked.y[:, 0]))
-    return walk_range(follower, asked, q, partial, led)
+    _refuse_long_ways(driven, names, np.column_stack([start_y, asked.y]))
+    q = follow_to_start(driven, q, (start_t, start_y), (t0, asked.y[:, 0]))
+    return follow_range(driven, asked, q, partial, led)
 
 
 def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | None, t0: float) -> tuple[float, Array]:
@@ -227,7 +227,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     initial: Initial = Initial(module.kernels, t)
     if len(names) > layout.n_dof:
         raise UsageError(f"{', '.join(names)} cannot {'all ' * (len(names) > 1)}be led: {_freedom(module, q, t)}")
-    free = [layout.freedoms[i] for i in layout.independent if layout.freedoms[i] in layout.q]
+    free = [layout.velocity_labels[i] for i in layout.independent if layout.velocity_labels[i] in layout.q]
     others = [name for name in [*free, *layout.q] if name not in names]
     values = dict.fromkeys(list(dict.fromkeys(others)), 0.0)
     fine = initial.compatible(q, (), dict.fromkeys(names, 0.0))
@@ -248,7 +248,7 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
             f"{layout.n_dof} degree{plural} of freedom, and too few coordinates to lead them at this position"
         )
     result = (*names, *held)
-    Q = Follower(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
+    Q = DrivenCoordinates(module, result).tangent(t, q, 0.0, np.zeros(len(result))).quality
     if Q < SINGULAR:
         place = ", ".join(f"{n} = {x:.6g}" for n, x in zip(layout.q, q, strict=True))
         raise PartitionError(
@@ -257,9 +257,9 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
     return result
 
 
-def _refuse_long_ways(follower: Follower, names: Sequence[str], y: Array) -> None:
+def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
     """Ways of more than LONGEST are not walked: they take hours, and positions repeat."""
-    ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / follower.led_scales
+    ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / driven.led_scales
     k = int(ways.argmax()) if ways.size else 0
     if ways.size and ways[k] > LONGEST:
         raise UsageError(
@@ -282,7 +282,9 @@ def _freedom(module: BoundModel, q: Array, t: float) -> str:
     )
 
 
-def walk_in(follower: Follower, q: Array, start: tuple[float, Array], first: tuple[float, Array]) -> Array:
+def follow_to_start(
+    driven: DrivenCoordinates, q: Array, start: tuple[float, Array], first: tuple[float, Array]
+) -> Array:
     """From the initial position to the first point of the range.
 
     Raises
@@ -291,54 +293,54 @@ def walk_in(follower: Follower, q: Array, start: tuple[float, Array], first: tup
         The way is blocked.
     """
     (t, y), (t0, y0) = start, first
-    length = largest(np.concatenate([(y0 - y) / follower.led_scales, [t0 - t]]))
+    length = largest(np.concatenate([(y0 - y) / driven.led_scales, [t0 - t]]))
     if length <= UNMOVED:
         return q
-    track = Track(follower, Path(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
-    if track.stop is not None:
+    followed = FollowedPath(driven, StraightPath(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
+    if followed.stop is not None:
         raise PartitionError(
-            f"the way from the initial position to the first point is blocked: {track.stop}; give initial={{...}} "
+            f"the way from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
             "nearer to the first point",
             t0,
             q,
         )
-    return track.position(length)
+    return followed.position(length)
 
 
-def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
+def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: bool, led: int) -> KinematicAnalysis:
     """Straight pieces one after the other."""
     n = len(asked.t)
-    pieces = _pieces(follower, asked)
+    pieces = _pieces(driven, asked)
     columns: list[tuple[Array, Array, Array]] = []
     found: list[Singular] = []
     stop: Singular | None = None
-    ground = Ground(asked.t, asked.y)
-    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / follower.led_scales)
+    known_range = KnownRange(asked.t, asked.y)
+    extents = float(np.ptp(asked.t)), largest(np.ptp(asked.y, axis=1) / driven.led_scales)
     count = 0
     for first, last in pieces:
         t, y = float(asked.t[first]), asked.y[:, first]
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
-        length = abs(float(dt[-1])) or largest(dy[:, -1] / follower.led_scales)
-        path = Path(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
-        along = np.abs(dt) if dt[-1] else np.abs(dy / follower.led_scales[:, None]).max(axis=0, initial=0.0)
+        length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
+        path = StraightPath(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
+        along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
         extent = extents[0] if dt[-1] else extents[1]
-        track = Track(follower, path, q, length, ground.known(first, last) * length, extent)
-        ground.walked(first, last, track.smooth)
+        followed = FollowedPath(driven, path, q, length, known_range.known(first, last) * length, extent)
+        known_range.walked(first, last, followed.smooth)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
-        reach = np.array([track.holds(s) for s in along])
+        reach = np.array([followed.holds(s) for s in along])
         taken = np.arange(len(along))[new][reach[new]]
         index = first + taken
-        columns.append(track.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
+        columns.append(followed.motion(along[taken], (asked.y1[:, index], asked.y2[:, index])))
         count += len(taken)
-        found += track.singular
-        if track.stop is not None:
-            stop = track.stop
-            found.append(track.stop)
+        found += followed.singular
+        if followed.stop is not None:
+            stop = followed.stop
+            found.append(followed.stop)
             break
         q = columns[-1][0][:, -1] if len(taken) else q
-    result = keep(follower, asked.t[:count], columns, found, stop, n, asked.names[:led])
+    result = keep(driven, asked.t[:count], columns, found, stop, n, asked.names[:led])
     if count < n and not partial:
-        gap = "" if stop is None else describe_gap(follower, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
+        gap = "" if stop is None else describe_gap(driven, float(asked.t[count]), asked.y[:, count], stop.q) + "; "
         error = PartitionError(
             f"the range cannot be followed to its end: {stop}; {gap}partial=True gives the part that can be reached, "
             f"{count} of {n} points",
@@ -350,9 +352,9 @@ def walk_range(follower: Follower, asked: Range, q: Array, partial: bool, led: i
     return result
 
 
-def _pieces(follower: Follower, asked: Range) -> list[tuple[int, int]]:
+def _pieces(driven: DrivenCoordinates, asked: Range) -> list[tuple[int, int]]:
     """First and last indices of straight pieces of the range."""
-    scaled = np.concatenate([asked.t[None, :], asked.y / follower.led_scales[:, None]])
+    scaled = np.concatenate([asked.t[None, :], asked.y / driven.led_scales[:, None]])
     steps = np.diff(scaled, axis=1)
     sizes = np.abs(steps).max(axis=0) if steps.size else np.empty(0)
     pieces: list[tuple[int, int]] = []

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.room import read_number, read_numbers
+from .eigenvalue_rounding import own_accelerations
 from .linear_given import find_given_tangent, refuse_inputs
 from .linearization import Linearization
-from .rounding import own_accelerations
 from .tangent import displacement_names, displacement_rates, find_tangent, projected_directions
 
 if TYPE_CHECKING:

@@ -17,16 +17,16 @@ from ..numeric.partitions import partition
 from ..numeric.projection import minimum_norm
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import assembly_jacobian
-from .tangent import Tangent
+from .tangent import TangentSpace
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
 
 
-def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequence[str] | None) -> Tangent:
+def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequence[str] | None) -> TangentSpace:
     """The independent directions at a state on the constraints.
 
     Parameters
@@ -40,7 +40,7 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
 
     Returns
     -------
-    Tangent
+    TangentSpace
         ``positions`` are indices of coordinates; Z is (n_q, n_z).
 
     Raises
@@ -66,7 +66,7 @@ def find_given_tangent(module: BoundModel, t: float, x: Array, independent: Sequ
     B, moving = _basis(layout.scales.jacobian(C_q), layout.rank, preferred, layout.scales.q)
     dv = -minimum_norm(C_q, at_rest @ Z, layout.scales) if n_c else np.zeros((layout.n_v, Z.shape[1]))
     dv = dv - B @ dv[moving]  # the independent velocities stay
-    return Tangent(positions, moving, Z, B, np.block([[Z, np.zeros((n_q, B.shape[1]))], [dv, B]]))
+    return TangentSpace(positions, moving, Z, B, np.block([[Z, np.zeros((n_q, B.shape[1]))], [dv, B]]))
 
 
 def _chosen(among: Sequence[str], names: Sequence[str], count: int) -> tuple[Indices, bool] | None:

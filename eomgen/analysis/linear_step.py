@@ -11,12 +11,12 @@ from ..limits.statics import ARRIVED, CLOSE
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .rounding import BALANCED
+from .eigenvalue_rounding import BALANCED
 
 RANK = 500.0 * EPS  #: part of the terms of its rows below which a singular value of exact derivatives is rounding
 
 
-class Linear(NamedTuple):
+class LinearizedResidual(NamedTuple):
     """Equations near an iterate: J by scaled variables, which move the tree and change unknowns."""
 
     J: Array  #: (m, k)
@@ -30,7 +30,7 @@ class Linear(NamedTuple):
 class Solver:
     """Solutions of least norm with one J, rows divided by the sizes of their terms."""
 
-    def __init__(self, linear: Linear) -> None:
+    def __init__(self, linear: LinearizedResidual) -> None:
         self.linear = linear
         self.sizes = np.where(linear.sizes > 0.0, linear.sizes, 1.0)
         self.J = linear.J / self.sizes[:, None]

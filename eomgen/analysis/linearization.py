@@ -11,14 +11,14 @@ from ..errors import UsageError
 from ..limits.statics import COUPLED, STILL
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.names import unknown
-from .rounding import BALANCED
+from ..runtime.near_names import unknown
+from .eigenvalue_rounding import BALANCED
 from .stability import MARGIN, SecondOrder, stiffness_errors, verdict
 from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.layout import Layout
-    from .tangent import Tangent
+    from .tangent import TangentSpace
 
 
 class Linearization:
@@ -58,7 +58,7 @@ class Linearization:
         states: tuple[str, ...],
         drift: Array,
         second: tuple[Array, Array, Array] | None = None,
-        tangent: Tangent | None = None,
+        tangent: TangentSpace | None = None,
         own: Array | None = None,
     ) -> None:
         self.own = own  # accelerations of the model's own forces, scaled (1/s^2)
@@ -248,7 +248,7 @@ class Linearization:
         MissingDependencyError
             SciPy is not installed.
         """
-        from ..runtime.names import require
+        from ..runtime.near_names import require
 
         signal = require("scipy.signal", "scipy", "state_space")
         if not self.inputs or not self.outputs:

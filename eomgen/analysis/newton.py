@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..limits.rounding import TINY
-from ..limits.statics import ARRIVED, SHORTEST
+from ..limits.statics import ARRIVED, DAMPING, GAINED, SHORTEST
 from ..numeric import algebra
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .linear_step import Solver
 
 if TYPE_CHECKING:
-    from .search import Point, Search
+    from .search import Search, SearchPoint
 
 STEPS = 200  #: at most
 LONGEST = 0.5  #: largest scaled step of a coordinate
@@ -28,7 +28,9 @@ POLISHED = 8  #: most steps after the correction has reached rounding
 CONTRACTS = 0.5  #: part of a correction that the next one may be
 
 
-def newton(search: Search, point: Point, plain: bool = False, reach: float = np.inf) -> tuple[Point, int, bool]:
+def newton(
+    search: Search, point: SearchPoint, plain: bool = False, reach: float = np.inf
+) -> tuple[SearchPoint, int, bool]:
     """The last iterate, the number of steps, and whether it is balanced.
 
     plain: whole steps, whatever they lead to; reach: largest scaled distance from the start.
@@ -79,7 +81,7 @@ def newton(search: Search, point: Point, plain: bool = False, reach: float = np.
     return point, STEPS, False
 
 
-def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Point:
+def _polished(search: Search, point: SearchPoint, solver: Solver, change: Array) -> SearchPoint:
     """The iterate of whole steps from here, as long as each halves the residual.
 
     Where stiff forces stand beside soft ones, a correction within rounding of the stiff ones may leave more than that
@@ -104,13 +106,13 @@ def _polished(search: Search, point: Point, solver: Solver, change: Array) -> Po
     return point
 
 
-def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
+def marquardt(search: Search, point: SearchPoint) -> tuple[SearchPoint, int, bool]:
     """Down the residual: Levenberg and Marquardt's steps, with columns scaled by the largest norms that they have had.
 
     J. J. More, The Levenberg-Marquardt algorithm, Lecture Notes in Mathematics 630 (1978), 105-116; the damping follows
     the gain (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05).
     """
-    damping, growth, columns = 1e-3, 2.0, np.zeros(0)
+    damping, growth, columns = DAMPING, 2.0, np.zeros(0)
     start = Solver(search.linearize(point)).sizes
     for step in range(STEPS):
         solver, here = Solver(search.linearize(point)), point.here
@@ -133,7 +135,7 @@ def marquardt(search: Search, point: Point) -> tuple[Point, int, bool]:
             if there is not None:
                 lower = float(r @ r) - float(np.sum((search.residual(there.here, here) / sizes) ** 2))
                 gain = lower / max(float(change @ (damping * scale**2 * change - J.T @ r)), TINY)
-            if gain > 1e-4:
+            if gain > GAINED:
                 damping, growth = damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), 2.0
                 break
             there, damping, growth = None, damping * growth, 2.0 * growth

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
-from .constrained import States, evaluate, prepare, solve_multipliers
+from .constrained import ProjectedStates, evaluate, prepare, solve_multipliers
 from .joint_wrenches import GROUND, along_free, free_of, joint_table, on_successor, place, shift, transmitted
 from .self_stress import remove_self_stress
 
@@ -25,7 +25,7 @@ CHUNK = 4_000_000  #: numbers held at once
 
 
 def find_reactions(
-    states: States,
+    states: ProjectedStates,
     a: Array | None = None,
     multipliers: Array | None = None,
     drives: Mapping[int, Array] | None = None,
@@ -48,7 +48,9 @@ def find_reactions(
     return np.concatenate([r for r, _ in parts], axis=-1), np.concatenate([m for _, m in parts], axis=-1)
 
 
-def _reactions(states: States, a: Array, multipliers: Array, drives: Mapping[int, Array]) -> tuple[Array, Array]:
+def _reactions(
+    states: ProjectedStates, a: Array, multipliers: Array, drives: Mapping[int, Array]
+) -> tuple[Array, Array]:
     module = states.module
     table, geometry = joint_table(module), place(states)
     flat = states.evaluate(module.kernels.motion("needed_wrenches"), states.q, states.v, a)

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import AssemblyError, EvaluationError, PartitionError, UsageError
-from ..limits.statics import DIFFERENCES
+from ..limits.statics import DIFFERENCES, LEAST_UNKNOWN
 from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
-from .linear_step import RANK, Linear
-from .rounding import own_accelerations
+from .eigenvalue_rounding import own_accelerations
+from .linear_step import RANK, LinearizedResidual
 from .tangent import displacement_names
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 
-class Point(NamedTuple):
+class SearchPoint(NamedTuple):
     """One iterate."""
 
     q: Array
@@ -85,7 +85,7 @@ class Search:
         rows = [held.gradient for held in self.held_rows(module, q)]
         return np.array(rows).reshape(len(rows), self.layout.n_v)
 
-    def at(self, q: Array, values: Array, preferred: Indices | None = None) -> Point:
+    def at(self, q: Array, values: Array, preferred: Indices | None = None) -> SearchPoint:
         """The iterate near q on the constraints."""
         module = self.bound(values)
         initial = Initial(module.kernels, self.t)
@@ -94,7 +94,7 @@ class Search:
         elif self.held:
             q = initial.with_values(q, self.held)
         held = self.gradients(module, q) if self.supported else None
-        return Point(q, values, module, weigh(module, self.t, q, held, preferred))
+        return SearchPoint(q, values, module, weigh(module, self.t, q, held, preferred))
 
     def residual(self, here: Balance, like: Balance) -> Array:
         """What must vanish, at the independent velocities and surplus displacements of another place."""
@@ -102,7 +102,7 @@ class Search:
         forces = s[here.velocities] * here.forces if self.supported else (here.a / s)[like.velocities]
         return np.concatenate([forces, (here.v / s)[like.surplus]])
 
-    def linearize(self, point: Point) -> Linear:
+    def linearize(self, point: SearchPoint) -> LinearizedResidual:
         """The equations near an iterate, by displacements of length 1 that are at right angles (scaled)."""
         here, s = point.here, self.layout.scales.q
         if self.supported:
@@ -112,7 +112,9 @@ class Search:
             sizes = np.abs(here.B * s[here.velocities]).T @ np.abs(point.module.bias(self.t, here.x))
             sizes = np.concatenate([sizes, np.zeros(len(here.surplus))])
             flow: Array | None = None if len(here.surplus) else basis @ (inverse.T @ K @ inverse)
-            return Linear(J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow)
+            return LinearizedResidual(
+                J, basis, np.zeros((0, J.shape[1])), sizes + np.abs(J).sum(axis=1), DIFFERENCES, flow
+            )
         held = self.gradients(point.module, point.q)
         held_by = self._held_by_parameters(point.module, here.x)
         found = slopes(point.module, self.t, here.x, held, held_by, self.parameters, self.inputs)
@@ -121,7 +123,8 @@ class Search:
             split = algebra.svd(held * s @ basis)
             free = split[2][len(held) :].T
             basis, inverse = basis @ free, inverse @ free
-        weights = np.maximum(np.abs(point.unknowns), 1e-3 * np.maximum(1.0, np.abs(point.unknowns).max(initial=0.0)))
+        sizes = np.abs(point.unknowns)
+        weights = np.maximum(sizes, LEAST_UNKNOWN * max(1.0, float(sizes.max(initial=0.0))))
         unknown_rates = np.zeros((len(s), len(weights)))
         J = np.vstack([
             (np.hstack([found.by_position @ inverse, found.by_unknown * weights]) / s[:, None])[here.velocities],
@@ -130,9 +133,9 @@ class Search:
         moved = np.hstack([basis, found.motion * weights / s[:, None]])
         changed = np.hstack([np.zeros((len(weights), basis.shape[1])), np.diag(weights)])
         flow = (found.by_position + found.rates) @ inverse / s[:, None]
-        return Linear(J, moved, changed, self._sizes(point, J), RANK, flow)
+        return LinearizedResidual(J, moved, changed, self._sizes(point, J), RANK, flow)
 
-    def _sizes(self, point: Point, J: Array) -> Array:
+    def _sizes(self, point: SearchPoint, J: Array) -> Array:
         """Sizes of the terms in each row: a unit displacement, and the forces of the model, each without the others."""
         here, n = point.here, len(point.here.velocities)
         if not n:
@@ -161,25 +164,25 @@ class Search:
         s = self.layout.scales.q
         return np.asarray(s * here.tree if self.supported else (here.a + here.v) / s)
 
-    def metric(self, point: Point, basis: Array) -> Array:
+    def metric(self, point: SearchPoint, basis: Array) -> Array:
         """The metric in which the drive is the gradient of a potential, if there is one."""
         if self.supported:
             return np.eye(basis.shape[1])
         s = self.layout.scales.q
         return np.asarray(basis.T @ (s[:, None] * point.module.mass_matrix(point.q, t=self.t) * s) @ basis)
 
-    def mass(self, point: Point) -> Array:
+    def mass(self, point: SearchPoint) -> Array:
         """Mass matrix of the independent velocities."""
         B = point.here.B
         return np.asarray(B.T @ point.module.mass_matrix(point.q, t=self.t) @ B)
 
-    def rounded(self, point: Point) -> float:
+    def rounded(self, point: SearchPoint) -> float:
         """Scaled size of the numbers that the position is made of, at least 1."""
         s, q = self.layout.scales, self.layout.space
         sizes = np.abs(point.q) / s.q if q is None else np.abs(point.q[q.plain_q]) / s.q[q.plain_v]
         return max(1.0, float(sizes.max(initial=0.0)))
 
-    def step(self, point: Point, displacement: Array, change: Array) -> Point | None:
+    def step(self, point: SearchPoint, displacement: Array, change: Array) -> SearchPoint | None:
         """The iterate a scaled displacement (n_v,) and a change of the unknowns away; None where there is none."""
         try:
             q = self.layout.scales.move(point.q, displacement)

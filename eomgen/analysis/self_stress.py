@@ -17,7 +17,7 @@ from ..limits.constraints import BALANCE as RANK
 from ..limits.statics import SEEN
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .constrained import States
+from .constrained import ProjectedStates
 from .joint_wrenches import GROUND, Geometry, along_free, free_of, shift, transmitted
 
 
@@ -49,7 +49,7 @@ def _per(length: float) -> Array:
     return np.array([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length])
 
 
-def element_wrenches(states: States, table: dict[str, Any], geometry: Geometry) -> Array:
+def element_wrenches(states: ProjectedStates, table: dict[str, Any], geometry: Geometry) -> Array:
     """What unit multipliers of constraint elements exert on each body, along coordinates of the tree too.
 
     Returns
@@ -84,7 +84,7 @@ def _driving(free: Array, forces: Array) -> Array:
 
 
 def remove_self_stress(
-    states: States, table: dict[str, Any], geometry: Geometry, reactions: Array, multipliers: Array
+    states: ProjectedStates, table: dict[str, Any], geometry: Geometry, reactions: Array, multipliers: Array
 ) -> tuple[Array, Array]:
     """The smallest reactions, and which components a self-stress changes.
 

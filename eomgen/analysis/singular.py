@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.motions import BLOCKED, LEAPS, SINGULAR, UNJUDGED
+from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .bridging import Bridge, build_bridge
-from .following import Follower, Tangent
+from .change_point_interpolant import ChangePointInterpolant, build_interpolant
+from .driven_coordinates import DrivenCoordinates, Tangent
+from .path_following import Continuation, Point
 from .roots import find_root
-from .walking import Point, Walk
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
@@ -59,58 +59,58 @@ class Singular(NamedTuple):
         return f"{self.kind} at {place}: {what}; {', '.join(self.moving)} can still move{joints}"
 
 
-def name_singular(follower: Follower, kind: str, t: float, q: Array, tangent: Tangent) -> Singular:
+def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tangent: Tangent) -> Singular:
     """Put names to a singular position."""
-    layout = follower.layout
+    layout = driven.layout
     free = np.abs(tangent.free)
-    moving = tuple(layout.freedoms[i] for i in np.flatnonzero(free >= SHARE * free.max()))
+    moving = tuple(layout.velocity_labels[i] for i in np.flatnonzero(free >= SHARE * free.max()))
     held = np.abs(tangent.rows[: layout.n_c])
     labels = [layout.constraint_labels[i] for i in np.flatnonzero(held >= SHARE * np.abs(tangent.rows).max())]
     joints = tuple(dict.fromkeys(label.partition(".")[0] for label in labels))
-    values = dict(zip(follower.led, follower.led_values(q, t).tolist(), strict=True))
+    values = dict(zip(driven.led, driven.led_values(q, t).tolist(), strict=True))
     return Singular(kind, t, values, q, moving, joints)
 
 
-def cross(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | None:
-    """The bridge over a change of sign between two points, and where det K = 0 on it; None if there is none."""
-    follower, scales = walk.follower, walk.follower.scales
+def cross(continuation: Continuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
+    """The interpolant over a change of sign between two points, and where det K = 0 on it; None if there is none."""
+    driven, scales = continuation.driven, continuation.driven.scales
     for _ in range(60):
         if largest(scales.distance(after.q, before.q)) <= NARROW:
             break
         middle = 0.5 * (before.s + after.s)
-        found = walk.solve(middle, Bridge([before, after], scales).at(middle)[0])
+        found = continuation.solve(middle, ChangePointInterpolant([before, after], scales).at(middle)[0])
         if found is None or found.tangent.quality < SINGULAR:
             break
         before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
-    rough = Bridge([before, after], scales)
-    middle = _root(walk, rough, before.s, after.s)
-    bridge = build_bridge(walk, before, after, middle)
-    if bridge is None:
+    rough = ChangePointInterpolant([before, after], scales)
+    middle = _root(continuation, rough, before.s, after.s)
+    interpolant = build_interpolant(continuation, before, after, middle)
+    if interpolant is None:
         return None
-    low, high = bridge.piers[1].s, bridge.piers[2].s
-    middle = _root(walk, bridge, low, high)
-    t = walk.path.at(middle)[0]
-    quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
-    return (bridge, middle) if quality < SINGULAR else None
+    low, high = interpolant.supports[1].s, interpolant.supports[2].s
+    middle = _root(continuation, interpolant, low, high)
+    t = continuation.path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, continuation.path.y1).quality
+    return (interpolant, middle) if quality < SINGULAR else None
 
 
-def _root(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
-    """Where det K changes its sign on a bridge; where it does not, the nearest to singular."""
+def _root(continuation: Continuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+    """Where det K changes its sign on an interpolant; where it does not, the nearest to singular."""
 
     def value(s: float) -> float:
-        return walk.follower.determinant(walk.path.at(s)[0], bridge.at(s)[0])
+        return continuation.driven.determinant(continuation.path.at(s)[0], interpolant.at(s)[0])
 
     f_low, f_high = value(low), value(high)
     if not f_low * f_high < 0.0:
-        return _worst(walk, bridge, low, high)
+        return _worst(continuation, interpolant, low, high)
     return find_root(value, low, high, f_low, f_high)
 
 
-def _worst(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
-    """Where a bridge is nearest to singular, by golden section."""
+def _worst(continuation: Continuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+    """Where an interpolant is nearest to singular, by golden section."""
 
     def quality(s: float) -> float:
-        return walk.tangent(s, bridge.at(s)[0]).quality
+        return continuation.tangent(s, interpolant.at(s)[0]).quality
 
     part = 0.5 * (5.0**0.5 - 1.0)
     for _ in range(60):
@@ -119,30 +119,30 @@ def _worst(walk: Walk, bridge: Bridge, low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def find_stop(walk: Walk, last: Point) -> tuple[float, Point]:
-    """The stop of a blocked walk, s and the position there, to full precision where one coordinate is led.
+def find_stop(continuation: Continuation, last: Point) -> tuple[float, Point]:
+    """The stop of a blocked continuation, s and the position there, to full precision where one coordinate is led.
 
     There the path is followed by the coordinate that still moves, w: s(w) has its extreme at the stop.
     """
-    follower, scales = walk.follower, walk.follower.scales
-    y1, t1 = walk.path.y1, walk.path.t1
+    driven, scales = continuation.driven, continuation.driven.scales
+    y1, t1 = continuation.path.y1, continuation.path.t1
     tangent = last.tangent
     if t1 or np.count_nonzero(y1) != 1:
         return last.s, last
     k = int(np.flatnonzero(y1)[0])
     free = tangent.free
-    order = [int(i) for i in np.argsort(-np.abs(free)) if follower.layout.freedoms[i] in follower.layout.q]
+    order = [int(i) for i in np.argsort(-np.abs(free)) if driven.layout.velocity_labels[i] in driven.layout.q]
     for i in order[:1]:
-        name = follower.layout.freedoms[i]
-        if name in follower.led:
+        name = driven.layout.velocity_labels[i]
+        if name in driven.led:
             break
-        led = (*follower.led[:k], name, *follower.led[k + 1 :])
-        other = Follower(follower.module, led)
-        t = walk.path.t
+        led = (*driven.led[:k], name, *driven.led[k + 1 :])
+        other = DrivenCoordinates(driven.module, led)
+        t = continuation.path.t
         q = last.q
         for _ in range(30):  # dy/dw = 0 by secant steps, w the scaled value of the free coordinate
             y = other.led_values(q, t)
-            step = _to_extreme(other, follower, k, t, q)
+            step = _to_extreme(other, driven, k, t, q)
             if step is None or not abs(step) < 1.0:
                 return last.s, last
             y[k] += step * other.led_scales[k]
@@ -152,24 +152,24 @@ def find_stop(walk: Walk, last: Point) -> tuple[float, Point]:
             q = found
             if abs(step) < BLOCKED:
                 break
-        s = float((follower.led_values(q, t)[k] - walk.path.y[k]) / y1[k])
-        if abs(s - last.s) * abs(y1[k]) / follower.led_scales[k] < UNJUDGED:
-            return s, Point(s, q, follower.tangent(t, q, 0.0, y1))
+        s = float((driven.led_values(q, t)[k] - continuation.path.y[k]) / y1[k])
+        if abs(s - last.s) * abs(y1[k]) / driven.led_scales[k] < UNJUDGED:
+            return s, Point(s, q, driven.tangent(t, q, 0.0, y1))
     return last.s, last
 
 
-def _along(other: Follower, k: int, t: float, q: Array) -> Array:
+def _along(other: DrivenCoordinates, k: int, t: float, q: Array) -> Array:
     unit = np.zeros(len(other.led))
     unit[k] = other.led_scales[k]
     return other.tangent(t, q, 0.0, unit).rate / other.scales.q
 
 
-def _to_extreme(other: Follower, follower: Follower, k: int, t: float, q: Array) -> float | None:
+def _to_extreme(other: DrivenCoordinates, driven: DrivenCoordinates, k: int, t: float, q: Array) -> float | None:
     """Newton's step in w to where dy_k/dw = 0, by a central difference of dy_k/dw."""
-    h = 1e-4
+    h = EXTREME
 
     def slope(q: Array) -> float:
-        row = follower.matrix(q, t)[follower.layout.n_c + k]
+        row = driven.matrix(q, t)[driven.layout.n_c + k]
         return float(row @ _along(other, k, t, q))
 
     y = other.led_values(q, t)
@@ -185,46 +185,50 @@ def _to_extreme(other: Follower, follower: Follower, k: int, t: float, q: Array)
     return -slope(q) / curvature if curvature else None
 
 
-def touch(walk: Walk, before: Point, after: Point) -> tuple[Bridge, float] | None:
+def touch(continuation: Continuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
     """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
-    follower, scales = walk.follower, walk.follower.scales
+    driven, scales = continuation.driven, continuation.driven.scales
     for _ in range(60):
         if largest(scales.distance(after.q, before.q)) <= NARROW:
             break
-        rough = Bridge([before, after], scales)
+        rough = ChangePointInterpolant([before, after], scales)
         third = (after.s - before.s) / 3.0
-        found = [walk.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
+        found = [continuation.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
         one, other = found
         if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
             break
         before, after = (before, other) if one.tangent.quality < other.tangent.quality else (one, after)
-    bridge = build_bridge(walk, before, after, 0.5 * (before.s + after.s))
-    if bridge is None:
+    interpolant = build_interpolant(continuation, before, after, 0.5 * (before.s + after.s))
+    if interpolant is None:
         return None
-    middle = _worst(walk, bridge, bridge.piers[1].s, bridge.piers[2].s)
-    t = walk.path.at(middle)[0]
-    quality = follower.tangent(t, bridge.at(middle)[0], 0.0, walk.path.y1).quality
-    return (bridge, middle) if quality < SINGULAR else None
+    middle = _worst(continuation, interpolant, interpolant.supports[1].s, interpolant.supports[2].s)
+    t = continuation.path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, continuation.path.y1).quality
+    return (interpolant, middle) if quality < SINGULAR else None
 
 
-def judge_walk(walk: Walk) -> tuple[list[tuple[Bridge, float]], list[Singular]]:
-    """Bridges over the change points of a walk, and the change points themselves, in order."""
-    leapt = {id(before) for before, _ in walk.leaps}
-    points = walk.points
-    crossings: list[tuple[Bridge, float]] = []
+def find_change_points(continuation: Continuation) -> tuple[list[tuple[ChangePointInterpolant, float]], list[Singular]]:
+    """Interpolants over the change points of a continuation, and the change points themselves, in order."""
+    leapt = {id(before) for before, _ in continuation.leaps}
+    points = continuation.points
+    crossings: list[tuple[ChangePointInterpolant, float]] = []
     for k in range(len(points) - 1):
         before, after = points[k], points[k + 1]
         here = None
         if id(before) in leapt or before.tangent.sign != after.tangent.sign:
-            here = cross(walk, _good(points, before, after) if id(before) in leapt else before, after)
+            here = cross(continuation, _good(points, before, after) if id(before) in leapt else before, after)
         elif k + 2 < len(points) and _dips(points[k : k + 3]):
-            here = touch(walk, before, points[k + 2])
+            here = touch(continuation, before, points[k + 2])
         if here is not None:
             crossings.append(here)
     found = []
-    for bridge, middle in crossings:
-        q = bridge.at(middle)[0]
-        found.append(name_singular(walk.follower, "change point", walk.path.at(middle)[0], q, walk.tangent(middle, q)))
+    for interpolant, middle in crossings:
+        q = interpolant.at(middle)[0]
+        found.append(
+            name_singular(
+                continuation.driven, "change point", continuation.path.at(middle)[0], q, continuation.tangent(middle, q)
+            )
+        )
     return crossings, found
 
 
@@ -239,6 +243,6 @@ def _good(points: Sequence[Point], before: Point, after: Point) -> Point:
     """The last point before a leap that is not too near to the singular position."""
     width = after.s - before.s
     return next(
-        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > LEAPS[0] * 1e-2),
+        (p for p in reversed(points) if p.s <= before.s - 0.5 * width and p.tangent.quality > 0.01 * LEAPS[0]),
         points[0],
     )

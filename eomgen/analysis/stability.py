@@ -16,7 +16,7 @@ import numpy as np
 from ..limits.rounding import EPS
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .rounding import ROUNDING, graded_modes, judge
+from .eigenvalue_rounding import ROUNDING, graded_modes, judge
 
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
 
@@ -88,7 +88,7 @@ def verdict(
         The same equations of second order, where they have that form: displacements z, then velocities z'.
     A : (n, n) array
     own, error, errors
-        As for :func:`~.rounding.judge`, which decides where the signs of K and C do not.
+        As for :func:`~.eigenvalue_rounding.judge`, which decides where the signs of K and C do not.
     """
     if second is None or not A.size or not _is_dissipative(second):
         return judge(A, own, error, errors)

@@ -17,14 +17,14 @@ from ..numeric.partitions import partition
 from ..numeric.projection import tangent_projector
 from ..numeric.ranks import rank
 from ..numeric.scales import Array, Indices, Scales
-from ..runtime.names import read_names, unknown
+from ..runtime.near_names import read_names, unknown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
 
 
-class Tangent(NamedTuple):
+class TangentSpace(NamedTuple):
     """Directions of a state x = [q; v] on the constraints; n_z displacements, n_dof velocities."""
 
     positions: Indices  #: (n_z,) independent displacements, as indices of velocities
@@ -36,12 +36,12 @@ class Tangent(NamedTuple):
 
 def displacement_names(layout: Layout) -> tuple[str, ...]:
     """What the displacement of each velocity is called: its coordinate, or ``<joint>_rx`` for an angular velocity."""
-    return tuple(f"{n[:-2]}r{n[-1]}" if n == layout.v[k] else n for k, n in enumerate(layout.freedoms))
+    return tuple(f"{n[:-2]}r{n[-1]}" if n == layout.v[k] else n for k, n in enumerate(layout.velocity_labels))
 
 
 def find_tangent(
     module: BoundModel, t: float, x: Array, jacobian: Array, independent: Sequence[str] | None = None
-) -> Tangent:
+) -> TangentSpace:
     """The independent directions at a state on the constraints.
 
     Parameters
@@ -77,17 +77,17 @@ def find_tangent(
     dv = _velocity_change(layout, x, jacobian[:n_q, :n_q] @ dq, dq)
     dv = dv - B @ dv[velocities]  # the independent velocities stay
     T = np.block([[dq, np.zeros((n_q, B.shape[1]))], [dv, B]])
-    return Tangent(positions, velocities, Z, B, T)
+    return TangentSpace(positions, velocities, Z, B, T)
 
 
 def choose_velocities(layout: Layout, names: Sequence[str]) -> Indices:
     """Indices of n_dof velocities from their names or those of their coordinates."""
-    allowed = dict.fromkeys((*layout.freedoms, *layout.v))
+    allowed = dict.fromkeys((*layout.velocity_labels, *layout.v))
     chosen, names = [], read_names("independent", names)
     for name in names:
         if name not in allowed:
             raise unknown("coordinate of the tree", name, allowed)
-        chosen.append((layout.freedoms if name in layout.freedoms else layout.v).index(name))
+        chosen.append((layout.velocity_labels if name in layout.velocity_labels else layout.v).index(name))
     if len(set(chosen)) != layout.n_dof or len(chosen) != layout.n_dof:
         raise UsageError(f"independent must name {layout.n_dof} different coordinates, not {', '.join(names)}")
     return np.array(chosen, dtype=np.intp)
@@ -118,7 +118,7 @@ def displacement_rates(layout: Layout, x: Array, rates: Array, displacements: Ar
     if space is None:
         return rates
     result = space.velocities(x[: layout.n_q], rates)
-    for _, j in space.balls:
+    for _, j in space.quaternion_slots:
         w = x[layout.n_q + j : layout.n_q + j + 3]
         result[j : j + 3] += 0.5 * np.cross(displacements[j : j + 3], w, axisa=0, axisb=0, axisc=0)
     return result

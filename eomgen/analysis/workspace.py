@@ -14,12 +14,12 @@ from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
+from ..runtime.near_names import require, unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
-from .workspace_conditions import Conditions, Reader, WorkspaceSingular, judge
+from .workspace_conditions import ConditionReader, Conditions, WorkspaceSingular, judge
 from .workspace_grid import Grid, read_grid
 from .workspace_walk import OUT, REACHED, Flood, Stage, flood
 
@@ -299,7 +299,7 @@ def workspace(
     with np.errstate(all="ignore"):
         grid = read_grid(module, over, of, limits, points)
         stage = Stage(module, grid, initial, read_number("t", t))
-        reader = Reader(stage)
+        reader = ConditionReader(stage)
         reader.require_positions(stage.q, stage.t)
         filled = flood(stage)
         return Workspace(module, grid, filled, judge(stage, reader, filled))

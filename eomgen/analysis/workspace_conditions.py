@@ -63,7 +63,7 @@ class Conditions(NamedTuple):
     found: list[WorkspaceSingular]
 
 
-class Reader:
+class ConditionReader:
     """Outputs and their Jacobian at single positions.
 
     Parameters
@@ -72,7 +72,7 @@ class Reader:
     """
 
     def __init__(self, stage: Stage) -> None:
-        self.stage, self.follower = stage, stage.follower
+        self.stage, self.driven = stage, stage.driven
         module, self.layout = stage.module, stage.module.layout
         of, layout = stage.grid.of, self.layout
         self.outputs = [name in layout.y and name not in layout.q + layout.loops for name in of]
@@ -102,16 +102,16 @@ class Reader:
 
     def motion(self, q: Array, t: float) -> tuple[Array, float]:
         """Velocities (n_v, n_over) along each axis of the grid, and the quality of the position."""
-        K = self.follower.matrix(q, t)
+        K = self.driven.matrix(q, t)
         U, S, W = algebra.svd(K, full_matrices=False)
-        R = np.array([self.follower.right(q, t, *self.stage.along(k)) for k in range(len(self.stage.grid.names))]).T
+        R = np.array([self.driven.right(q, t, *self.stage.along(k)) for k in range(len(self.stage.grid.names))]).T
         V = W.T @ np.divide(U.T @ R, S[:, None], out=np.zeros((len(S), R.shape[1])), where=S[:, None] > NULL * S[0])
-        return self.follower.scales.q[:, None] * V, float(S[-1] / S[0])
+        return self.driven.scales.q[:, None] * V, float(S[-1] / S[0])
 
     def jacobian(self, q: Array, t: float, V: Array) -> Array:
         """J (n_of, n_over) from the velocities along the axes."""
         layout, zero = self.layout, self._still
-        Q = np.array([self.follower.scales.rates(q, v) for v in V.T]).T
+        Q = np.array([self.driven.scales.rates(q, v) for v in V.T]).T
         Y = self._slopes(q, zero, zero, t=t) if any(self.outputs) else np.empty((0, 0))
         L = self._loop_q(q, t=t) if self._loop_q is not None else np.empty((0, 0))
         rows = []
@@ -142,7 +142,7 @@ class Reader:
                 raise UsageError(f"output {name!r} depends on velocities or accelerations; a workspace has positions")
 
 
-def judge(stage: Stage, reader: Reader, filled: Flood) -> Conditions:
+def judge(stage: Stage, reader: ConditionReader, filled: Flood) -> Conditions:
     """Outputs, Jacobians and singular positions of all reached points."""
     grid = stage.grid
     n_y, n_x = len(grid.of), len(grid.names)
@@ -191,7 +191,7 @@ def _lost(stage: Stage, index: Index, place: tuple[float, Array], q: Array, dire
 
 
 def _crossings(
-    stage: Stage, reader: Reader, filled: Flood, J: Array, lost: np.ndarray[Any, Any]
+    stage: Stage, reader: ConditionReader, filled: Flood, J: Array, lost: np.ndarray[Any, Any]
 ) -> list[tuple[Index, Index, WorkspaceSingular]]:
     """Where det J changes its sign between two neighbours; ``lost`` are points known to be singular themselves."""
     with np.errstate(invalid="ignore"):
@@ -211,15 +211,15 @@ def _crossings(
     return found
 
 
-def _locate(stage: Stage, reader: Reader, filled: Flood, one: Index, other: Index) -> WorkspaceSingular | None:
+def _locate(stage: Stage, reader: ConditionReader, filled: Flood, one: Index, other: Index) -> WorkspaceSingular | None:
     """The zero of det J between two neighbours; None if they do not lie on one branch."""
-    follower = stage.follower
+    driven = stage.driven
     q = filled.q[one]
     path, length = stage.path(stage.at(one), stage.at(other))
-    gap = follower.scales.distance(filled.q[other], q)
+    gap = driven.scales.distance(filled.q[other], q)
 
     def position(s: float) -> Array | None:
-        return follower.position(*path.at(s), follower.scales.move(q, gap * s / length))
+        return driven.position(*path.at(s), driven.scales.move(q, gap * s / length))
 
     def value(s: float) -> float:
         here = position(s)

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.counts import as_count, read_count
 from ..numeric.scales import Array
-from ..runtime.names import read_names, unknown
+from ..runtime.near_names import read_names, unknown
 from ..runtime.room import as_real, read_number, read_numbers
 from ..texts import shown
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import UsageError
-from ..runtime.names import require
+from ..runtime.near_names import require
 
 MARKS = {"stop": ("x", "tab:red"), "change point": ("^", "tab:orange"), "outputs": (".", "black")}
 

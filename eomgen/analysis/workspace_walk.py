@@ -3,7 +3,7 @@
 The walk begins at the grid point next to the initial position and floods the grid, so every position hangs together
 with it by a continuous motion: the assembly mode stays.  A step from one point to the next counts only if position and
 direction come out as foretold; else it is halved; near singular positions it is walked in the small steps of
-:mod:`.walking`, over change points too.
+:mod:`.path_following`, over change points too.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..errors import AssemblyError, PartitionError
 from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .following import Follower
+from .driven_coordinates import DrivenCoordinates
+from .followed_path import FollowedPath
 from .kinematic import complete, start_from
+from .path_following import Continuation, StraightPath
 from .singular import LOW, Singular
-from .tracks import Track
-from .walking import Path, Walk
 from .workspace_grid import Grid, Index
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Flood(NamedTuple):
 
 
 class Stage:
-    """A module led over a grid: values of the grid -> time and led values of a follower.
+    """A module led over a grid: values of the grid -> time and led values.
 
     Parameters
     ----------
@@ -92,10 +92,10 @@ class Stage:
             except (AssemblyError, PartitionError):
                 raise error from None
         self.q = q
-        self.follower = Follower(module, led)
-        self.y = self.follower.led_values(q, self.t)
+        self.driven = DrivenCoordinates(module, led)
+        self.y = self.driven.led_values(q, self.t)
         for k, name in enumerate(names):  # the same angle, counted as the grid counts
-            if self.follower.wraps[k]:
+            if self.driven.wraps[k]:
                 centre = middle[grid.names.index(name)]
                 self.y[k] += 2 * np.pi * np.round((centre - self.y[k]) / (2 * np.pi))
         self.rows = [layout.q.index(name) for name in led if name in layout.q]
@@ -119,20 +119,20 @@ class Stage:
             y1[column] = 1.0
         return float(column < 0), y1
 
-    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[Path, float]:
+    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[StraightPath, float]:
         """The straight path between two places, and its length."""
         (t, y), (t1, y1) = start, end
-        length = largest(np.concatenate([(y1 - y) / self.follower.led_scales, [t1 - t]]))
-        return Path(t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
+        length = largest(np.concatenate([(y1 - y) / self.driven.led_scales, [t1 - t]]))
+        return StraightPath(t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
 
     def step(self, q: Array, start: Index, end: Index) -> tuple[Array | None, list[Singular]]:
         """The position at a neighbour, None if the way is blocked, and what is singular on the way."""
         path, length = self.path(self.at(start), self.at(end))
-        if not self.module.layout.n_c and all(self.follower.in_tree):  # an open chain goes where it is led
+        if not self.module.layout.n_c and all(self.driven.in_tree):  # an open chain goes where it is led
             moved = q.copy()
             moved[self.rows] = path.at(length)[1]
             return moved, []
-        walk = Walk(self.follower, path, q)
+        walk = Continuation(self.driven, path, q)
         h = length
         while walk.points[-1].tangent.quality > LOW and h > FINEST * length:
             here = walk.points[-1]
@@ -147,9 +147,9 @@ class Stage:
                 return found.q, []
         here = walk.points[-1]  # near a singular position, or one is in between
         rest = length - here.s
-        track = Track(self.follower, Path(*path.at(here.s), path.t1, path.y1), here.q, rest)
-        stop = [] if track.stop is None else [track.stop]
-        return (None if stop else track.position(rest)), track.singular + stop
+        followed = FollowedPath(self.driven, StraightPath(*path.at(here.s), path.t1, path.y1), here.q, rest)
+        stop = [] if followed.stop is None else [followed.stop]
+        return (None if stop else followed.position(rest)), followed.singular + stop
 
     def allowed(self, q: Array, t: float) -> bool:
         """Whether all limits are kept."""
@@ -173,7 +173,7 @@ class Stage:
 
 
 def flood(stage: Stage) -> Flood:
-    """Walk over the whole grid.
+    """Continuation over the whole grid.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def flood(stage: Stage) -> Flood:
 
 def _first(stage: Stage) -> tuple[Index, Array]:
     """The nearest grid point that a straight way leads to."""
-    grid, scales = stage.grid, np.append(stage.follower.led_scales, 1.0)
+    grid, scales = stage.grid, np.append(stage.driven.led_scales, 1.0)
     start = np.append(stage.y, stage.t)[stage.columns]
     parts = [((axis - s) / scales[c]) ** 2 for axis, s, c in zip(grid.axes, start, stage.columns, strict=True)]
     far = sum(np.ix_(*parts), np.zeros(grid.shape))
@@ -221,9 +221,9 @@ def _first(stage: Stage) -> tuple[Index, Array]:
         path, length = stage.path((stage.t, stage.y), stage.at(index))
         q: Array | None = stage.q
         if length > 0.0:
-            track = Track(stage.follower, path, stage.q, length)
-            q = track.position(length) if track.stop is None else None
-            blocked = track.stop or blocked
+            followed = FollowedPath(stage.driven, path, stage.q, length)
+            q = followed.position(length) if followed.stop is None else None
+            blocked = followed.stop or blocked
         if q is not None and stage.allowed(q, stage.at(index)[0]):
             return index, q
     why = "all near it lie beyond the limits" if blocked is None else str(blocked)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import pipeline
 from ..derivation import Derivation
-from ..runtime.names import find_lacking
+from ..runtime.near_names import find_lacking
 from .module import Module
 
 if TYPE_CHECKING:

@@ -5,25 +5,27 @@ Analyses and runs call each other's functions: a subclass that overrides a metho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
+from ..errors import left_out
 from ..runtime.bound_model import BoundModel
-from ..runtime.names import find_lacking
+from ..runtime.near_names import find_lacking
 from ..runtime.refusals import require_velocities
 
 if TYPE_CHECKING:
     from ..analysis.consistent import consistent as _consistent
     from ..analysis.constrained import multipliers as _multipliers
+    from ..analysis.coordinate_range import motion_range as _motion_range
     from ..analysis.drive import actuator_forces as _actuator_forces
     from ..analysis.equilibrium import equilibrium as _equilibrium
     from ..analysis.impact import impact as _impact
     from ..analysis.kinematic import kinematic_analysis as _kinematic_analysis
     from ..analysis.linear import linearize as _linearize
     from ..analysis.modes import modes as _modes
-    from ..analysis.reaching import motion_range as _motion_range
     from ..analysis.reactions import driving_forces as _driving_forces
     from ..analysis.reactions import reactions as _reactions
     from ..analysis.reactions import undetermined_reactions as _undetermined_reactions
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.minimal import Minimal
-    from ..runtime.report import report as _report
+    from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
     from ..simulation.impact_run import simulate_impacts as _simulate_impacts
     from ..simulation.integrator import integrator as _integrator
@@ -42,8 +44,8 @@ if TYPE_CHECKING:
     from ..simulation.steppers import step as _step
     from ..verification.verify import verify as _verify
 
-#: Method -> where the function is, whose first argument is the model; method and function are of one name.
-CALLS = {
+#: Method -> the function, whose first argument is the model, or the file in which it is under the method's name.
+CALLS: dict[str, str | Callable[..., Any]] = {
     "simulate": "simulation.simulate",
     "simulate_many": "ensembles.simulate_many",
     "integrator": "simulation.integrator",
@@ -62,15 +64,15 @@ CALLS = {
     "simulate_impacts": "simulation.impact_run",
     "consistent": "analysis.consistent",
     "kinematic_analysis": "analysis.kinematic",
-    "motion_range": "analysis.reaching",
+    "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
-    "report": "runtime.report",
+    "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
 }
 
 
-class Call:
+class LateMethod:
     """A function of another part of the package as a method, which is loaded when it is asked for."""
 
     def __init__(self, name: str) -> None:
@@ -79,8 +81,22 @@ class Call:
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
         if self.function is None:
-            self.function = getattr(import_module(f"..{CALLS[self.name]}", __package__), self.name)
+            self.function = self._find()
         return self.function if model is None else MethodType(self.function, model)
+
+    def _find(self) -> Any:
+        found = CALLS[self.name]
+        if callable(found):
+            return found
+        try:
+            function = getattr(import_module(f"..{found}", __package__), self.name, None)
+        except ModuleNotFoundError as error:
+            if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
+                raise  # something else that it needs
+            function = None
+        if function is None:
+            raise left_out(self.name)
+        return function
 
 
 class Module(BoundModel):
@@ -188,18 +204,23 @@ class Module(BoundModel):
             from ..simulation.steppers import find_solver
 
             return find_solver(self, name)
+        if name in CALLS:  # an analysis of a user's own
+            return LateMethod(name).__get__(self, type(self))
         return find_lacking(self, "a Module", name)
 
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *CALLS})
+
     def __repr__(self) -> str:
-        from ..runtime.report import line
+        from ..runtime.summary import line
 
         return line(self)
 
     def _repr_html_(self) -> str:
-        from ..runtime.report import html
+        from ..runtime.summary import html
 
         return html(self)
 
 
 for _name in CALLS:
-    setattr(Module, _name, Call(_name))
+    setattr(Module, _name, LateMethod(_name))

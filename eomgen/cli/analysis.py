@@ -11,7 +11,8 @@ import click
 
 from ..runtime.origin import origin
 from .failures import reports_failures
-from .options import (
+from .screen import stage
+from .shared_options import (
     blaming_option,
     independent_option,
     json_option,
@@ -23,8 +24,7 @@ from .options import (
     robot_options,
     target_option,
 )
-from .run import complete_parameters, sort_settings
-from .screen import stage
+from .verb_run import complete_parameters, sort_settings
 
 if TYPE_CHECKING:
     from ..api.equations import Equations

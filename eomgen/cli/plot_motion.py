@@ -12,7 +12,7 @@ from ..texts import visible
 from .plot import BELOW, BESIDE
 
 if TYPE_CHECKING:
-    from ..analysis.motions import KinematicAnalysis
+    from ..analysis.kinematic_motion import KinematicAnalysis
 
 
 def plot_motion(motion: KinematicAnalysis, paths: list[tuple[str, str]], file: Path) -> None:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ToolchainError
-from ..files.entry import MANIFEST, digest, read_entry, read_manifest, sealed
+from ..files.build_folder import MANIFEST, digest, read_entry, read_manifest, sealed
 from ..files.kept import Kept
 from ..files.locks import hold, locked
 from ..files.ownership import OTHERS_WRITE, make_private, require_trusted

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ToolchainError
-from ..files.entry import read_manifest
+from ..files.build_folder import read_manifest
 from .build import compile_and_link
 from .cache import Cache, CacheEntry, compute_key
 from .compiler import CompilerInfo, find_compiler

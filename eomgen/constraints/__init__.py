@@ -2,8 +2,8 @@
 
 from ..elements.element_type import Types
 from . import cams, couplings, drivers, gears, planetary, rolling
-from .base import Condition, Constraint, View
 from .cams import CamLift, FlatContact, FlatSupport, KnifeContact, RollerContact
+from .constraint import Condition, Constraint, ConstraintView
 from .couplings import Equation, Linear
 from .drivers import AngleDriver, CoordinateDriver, DistanceDriver, Driver, PlaceDriver
 from .gears import Belt, Gear, Rack
@@ -21,6 +21,7 @@ __all__ = [
     "CamLift",
     "Condition",
     "Constraint",
+    "ConstraintView",
     "CoordinateDriver",
     "DistanceDriver",
     "Driver",
@@ -37,5 +38,4 @@ __all__ = [
     "RollerContact",
     "RollingDisc",
     "RollingSphere",
-    "View",
 ]

@@ -19,7 +19,7 @@ from ..elements.looks import Contour, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, cos, sin, sqrt
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, ConstraintView
 from .profiles import Profile
 
 #: The name that stands for the angle in profiles of cams.
@@ -44,7 +44,7 @@ class CamLift(Constraint):
     phase: Expr
     kind: str
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("lift", self.follower - self.lift.at(self.cam - self.phase), self.kind)]
 
 
@@ -60,7 +60,7 @@ class KnifeContact(Constraint):
     def drawn(self) -> list[Seen]:
         return [_polar(self.cam, self.contour)]
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         x, y, _ = view.relative(self.cam, self.follower).position
         return [Condition("contact", sqrt(x * x + y * y) - self.contour.toward(x, y), "length")]
 
@@ -85,7 +85,7 @@ class FlatSupport(Constraint):
         x, y = h * cos(a) - slope * sin(a), h * sin(a) + slope * cos(a)
         return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi)]
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         face = view.relative(self.cam, self.follower)
         n_x, n_y = face.rotation[0][2], face.rotation[1][2]
         x, y, _ = face.position
@@ -108,12 +108,12 @@ class _Contact(Constraint):
     def drawn(self) -> list[Seen]:
         return [_polar(self.cam, self.contour)]
 
-    def polar(self, view: View) -> tuple[Expr, Expr, Frame]:
+    def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
         """r, r' and the follower's marker in the axes (e_r, e_theta, axis) of the contact point."""
         r, slope = self.contour.at(self.angle), self.contour.slope(self.angle)
         return r, slope, view.relative(self.point, self.follower)
 
-    def hints(self, view: View) -> list[tuple[Expr, Expr]]:
+    def hints(self, view: ConstraintView) -> list[tuple[Expr, Expr]]:
         x, y = self.toward(view.relative(self.cam, self.follower))
         return [(self.angle, atan2(y, x))]
 
@@ -135,7 +135,7 @@ class RollerContact(_Contact):
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.position[0], follower.position[1]
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         r, slope, follower = self.polar(view)
         x, y, _ = follower.position
         reach = self.radius / sqrt(r * r + slope * slope)
@@ -158,7 +158,7 @@ class FlatContact(_Contact):
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.rotation[0][2], follower.rotation[1][2]
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         r, slope, face = self.polar(view)
         n_r, n_theta = face.rotation[0][2], face.rotation[1][2]
         x, y, _ = face.position
@@ -167,7 +167,7 @@ class FlatContact(_Contact):
             Condition("tangent", n_r * slope + n_theta * r, "length"),
         ]
 
-    def aligned(self, view: View) -> list[Expr]:
+    def aligned(self, view: ConstraintView) -> list[Expr]:
         r, slope, face = self.polar(view)
         return [r * face.rotation[0][2] - slope * face.rotation[1][2]]
 

@@ -11,7 +11,7 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import symbols_of
 from ..records import dataclass
-from .base import POSITION, VELOCITY, Condition, Constraint, View
+from .constraint import POSITION, VELOCITY, Condition, Constraint, ConstraintView
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Linear(Constraint):
     offset: Expr
     kind: str
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         total = -self.offset
         for coordinate, factor in self.terms:
             total = total + factor * coordinate
@@ -41,7 +41,7 @@ class Equation(Constraint):
     kind: str
     level: str
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("equation", self.expression, self.kind, self.level)]
 
 

@@ -20,7 +20,7 @@ from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Condition, Constraint, View, on_two_bodies
+from .constraint import Condition, Constraint, ConstraintView, on_two_bodies
 
 #: Kinds of tables whose second derivative jumps between points.
 ROUGH = ("monotone",)
@@ -33,10 +33,10 @@ class Driver(Constraint):
     value: Expr
 
     @abstractmethod
-    def measure(self, view: View) -> tuple[Expr, str]:
+    def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         """What is driven, and its kind: 'length' or 'angle'."""
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         measure, kind = self.measure(view)
         return [Condition("motion", measure - self.value, kind)]
 
@@ -53,10 +53,10 @@ class CoordinateDriver(Driver):
         name = self.coordinate.node
         return [Drawn((), str(name[1]), about=ROUND_ARROW)] if name[0] == "sym" else []
 
-    def measure(self, view: View) -> tuple[Expr, str]:
+    def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         return self.coordinate, self.kind
 
-    def hints(self, view: View) -> list[tuple[Expr, Expr]]:
+    def hints(self, view: ConstraintView) -> list[tuple[Expr, Expr]]:
         return [(self.coordinate, self.value)]
 
 
@@ -68,7 +68,7 @@ class DistanceDriver(Driver):
     start: Marker
     end: Marker
 
-    def measure(self, view: View) -> tuple[Expr, str]:
+    def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         d = view.relative(self.start, self.end).position
         return sqrt(vec.dot(d, d)), "length"
 
@@ -82,7 +82,7 @@ class PlaceDriver(Driver):
     axis: Vec3
     on: Marker
 
-    def measure(self, view: View) -> tuple[Expr, str]:
+    def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         return vec.dot(self.axis, view.relative(self.on, self.marker).position), "length"
 
 
@@ -94,10 +94,10 @@ class AngleDriver(Driver):
     start: Marker
     end: Marker
 
-    def measure(self, view: View) -> tuple[Expr, str]:
+    def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         return view.turn(self.start, self.end)[0], "angle"
 
-    def is_defined(self, view: View) -> bool:
+    def is_defined(self, view: ConstraintView) -> bool:
         return view.turn(self.start, self.end)[2]
 
 

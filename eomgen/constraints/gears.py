@@ -10,7 +10,7 @@ from ..elements.field import Field
 from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr, sin
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, ConstraintView
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Pair(Constraint):
     ratio: Expr
     phase: Expr
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("ratio", self.a + self.ratio * self.b - self.phase, "angle")]
 
 
@@ -63,7 +63,7 @@ class Rack(Constraint):
     radius: Expr
     offset: Expr
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("travel", self.rack - self.radius * self.pinion - self.offset, "length")]
 
 

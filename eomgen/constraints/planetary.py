@@ -12,7 +12,7 @@ from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr
 from ..limits.descriptions import TENSOR
 from ..records import dataclass
-from .base import Condition, Constraint, View
+from .constraint import Condition, Constraint, ConstraintView
 
 #: The gears of a planetary set.
 WHEELS = ("sun", "planet", "ring")
@@ -61,7 +61,7 @@ class Planetary(Constraint):
             r_p = 0.5 * (r_r - r_s)
         return r_s, r_r, r_p
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
         rows: list[Condition] = []
         if self.planet is None:

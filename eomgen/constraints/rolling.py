@@ -18,7 +18,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import VELOCITY, Condition, Constraint, View, on_two_bodies
+from .constraint import VELOCITY, Condition, Constraint, ConstraintView, on_two_bodies
 
 #: What is wrong where the lowest point of a disc is not defined.
 LYING = "the disc lies flat (axle along the plane's normal)"
@@ -36,14 +36,14 @@ class _Rolling(Constraint):
         return [Wheel(self.wheel, self.radius)]
 
     @abstractmethod
-    def height(self, view: View) -> Expr:
+    def height(self, view: ConstraintView) -> Expr:
         """Distance of the lowest point from the plane (m)."""
 
     @abstractmethod
-    def contact(self, view: View) -> Vec3:
+    def contact(self, view: ConstraintView) -> Vec3:
         """From the centre to the lowest point, ground axes (m)."""
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         arm = self.contact(view)
         point = vec.add(view.position(self.wheel), arm)
         v = vec.add(view.velocity(self.wheel), vec.cross(view.angular_velocity(self.wheel), arm))
@@ -57,7 +57,7 @@ class _Rolling(Constraint):
         ]
 
 
-def _normal(view: View, plane: Marker) -> Vec3:
+def _normal(view: ConstraintView, plane: Marker) -> Vec3:
     return vec.transpose(view.rotation(plane))[2]
 
 
@@ -72,23 +72,23 @@ class RollingDisc(_Rolling):
     type_name: ClassVar[str] = "rolling_disc"
     tube: Expr
 
-    def _lean(self, view: View) -> tuple[Vec3, Vec3, Expr]:
+    def _lean(self, view: ConstraintView) -> tuple[Vec3, Vec3, Expr]:
         """Normal, its part across the axle, and the length of that part."""
         n = _normal(view, self.plane)
         axle = vec.transpose(view.rotation(self.wheel))[2]
         along = view.relative(self.plane, self.wheel).rotation[2][2]
         return n, vec.sub(n, vec.scale(along, axle)), sqrt(1.0 - along * along)
 
-    def lies_flat(self, view: View) -> bool:
+    def lies_flat(self, view: ConstraintView) -> bool:
         """Whether the axle is along the normal at every position."""
         return self._lean(view)[2].is_zero
 
-    def height(self, view: View) -> Expr:
+    def height(self, view: ConstraintView) -> Expr:
         _, _, s = self._lean(view)
         above = view.relative(self.plane, self.wheel).position[2]
         return above - (self.radius - self.tube) * s - self.tube
 
-    def contact(self, view: View) -> Vec3:
+    def contact(self, view: ConstraintView) -> Vec3:
         n, across, s = self._lean(view)
         rim = vec.scale((self.tube - self.radius) / s, across)
         return vec.sub(rim, vec.scale(self.tube, n))
@@ -101,13 +101,13 @@ class RollingSphere(_Rolling):
     type_name: ClassVar[str] = "rolling_sphere"
     no_spin: bool = False
 
-    def height(self, view: View) -> Expr:
+    def height(self, view: ConstraintView) -> Expr:
         return view.relative(self.plane, self.wheel).position[2] - self.radius
 
-    def contact(self, view: View) -> Vec3:
+    def contact(self, view: ConstraintView) -> Vec3:
         return vec.scale(-self.radius, _normal(view, self.plane))
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         rows = super().conditions(view)
         if self.no_spin:
             turning = vec.sub(view.angular_velocity(self.wheel), view.angular_velocity(self.plane))
@@ -127,7 +127,7 @@ class KnifeEdge(Constraint):
     axis: Vec3  #: unit vector, marker axes
     on: Marker
 
-    def conditions(self, view: View) -> list[Condition]:
+    def conditions(self, view: ConstraintView) -> list[Condition]:
         sideways = vec.times(view.rotation(self.marker), self.axis)
         apart = vec.sub(view.position(self.marker), view.position(self.on))
         under = vec.add(view.velocity(self.on), vec.cross(view.angular_velocity(self.on), apart))

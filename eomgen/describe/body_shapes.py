@@ -12,7 +12,7 @@ from ..solids import SOLIDS
 from .description import items
 from .mechanism import BodyShape
 from .placement import TURNS, turn_matrix
-from .reading import Reader
+from .values import Reader
 
 #: Sizes of the shapes of ``display``, in the order of a BodyShape's.
 SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"), "sphere": ("radius",)}

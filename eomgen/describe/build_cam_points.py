@@ -8,10 +8,10 @@ from typing import Any
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..joints import JOINTS
-from .description import Entry
+from .description import DescribedEntry
 from .mechanism import Body, JointSpec
-from .reading import Reader
 from .sympy_face import name_of
+from .values import Reader
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Contacts:
     bodies: list[Body] = field(default_factory=list)
     joints: list[JointSpec] = field(default_factory=list)
 
-    def place(self, reader: Reader, entry: Entry, cam: Marker, index: int) -> Marker | None:
+    def place(self, reader: Reader, entry: DescribedEntry, cam: Marker, index: int) -> Marker | None:
         """A marker at a cam's axis on a new body ``index`` without mass, whose x axis points to the contact point."""
         graph, name = reader.graph, f"{entry.name}_contact"
         if name in reader.bodies:
@@ -44,7 +44,7 @@ def needs_point(values: dict[str, Any]) -> bool:
     )
 
 
-def declare_contacts(reader: Reader, entries: list[Entry]) -> Contacts:
+def declare_contacts(reader: Reader, entries: list[DescribedEntry]) -> Contacts:
     """Take the polar angles of all contact points into the namespace."""
     contacts = Contacts()
     for entry in entries:

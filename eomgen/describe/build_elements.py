@@ -6,11 +6,11 @@ from typing import Any
 
 from ..elements.element_type import Types
 from .checks import check_names
-from .description import Entry
+from .description import DescribedEntry
 from .element_entry import ElementEntry, Surroundings
 
 
-def build_elements(around: Surroundings, what: str, entries: list[Entry], types: Types) -> tuple[Any, ...]:
+def build_elements(around: Surroundings, what: str, entries: list[DescribedEntry], types: Types) -> tuple[Any, ...]:
     """Elements of all entries without faults; the faults are noted."""
     made = [_build(ElementEntry(around, e), what, types) for e in check_names(entries, what, around.reader.faults)]
     return tuple(element for element in made if element is not None)

@@ -17,9 +17,9 @@ from .description import Faults, items
 from .fields import EQUATIONS, MOTION
 from .mechanism import GivenEquations, Output
 from .names import fault_of_name, nearest
-from .reading import Reader
 from .scope import ENERGIES
 from .sympy_face import name_of
+from .values import Reader
 
 PATH = "equations"
 LINEAR = "write it as a sum of terms a(q, t)*v and b(q, t), each velocity to the first power"

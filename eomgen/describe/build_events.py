@@ -9,24 +9,24 @@ from ..graph.core import Expr
 from ..graph.shown import shown
 from ..graph.substitute import symbols_of
 from .checks import check_keys
-from .description import Entry
+from .description import DescribedEntry
 from .fields import EVENT, OUTPUT
 from .mechanism import Event
 from .names import QUANTITIES, nearest
-from .reading import Reader, is_number
 from .scope import quantity_of
 from .sympy_face import in_order
+from .values import Reader, is_number
 
 _LATE = {"acceleration": "acceleration", "rate of rate": "second rate", "multiplier": "multiplier"}
 _ACCELERATIONS = (2, 9, 10)  #: levels of QUANTITIES
 
 
-def build_events(reader: Reader, entries: list[Entry]) -> tuple[Event, ...]:
+def build_events(reader: Reader, entries: list[DescribedEntry]) -> tuple[Event, ...]:
     """Events in the order of their declaration; faults are noted."""
     return tuple(_event(reader, entry) for entry in entries)
 
 
-def _event(reader: Reader, entry: Entry) -> Event:
+def _event(reader: Reader, entry: DescribedEntry) -> Event:
     path, values = entry.path, entry.values
     reader.names.declare("event", entry.name, path)
     check_keys(path, values, EVENT, reader.faults)

@@ -8,21 +8,21 @@ import numpy as np
 
 from ..graph.functions import Function
 from ..limits.descriptions import APART, PERIODIC
-from ..numeric.functions import Curve, Surface, Twin
 from ..numeric.splines import curve_coefficients, slopes, surface_nodes
+from ..numeric.user_functions import Curve, Surface, Twin
 from .build_native import build_native
 from .checks import check_keys
-from .description import Entry, items
+from .description import DescribedEntry, items
 from .fields import FUNCTION, function_fields
 from .names import QUANTITIES, nearest
-from .reading import Reader, is_number
+from .values import Reader, is_number
 
 POINTS = 20_000  #: of a table, those of a grid together
 
 Array = np.ndarray
 
 
-def build_functions(reader: Reader, entries: list[Entry]) -> None:
+def build_functions(reader: Reader, entries: list[DescribedEntry]) -> None:
     """Declare the functions of all entries; one at fault gets a stand-in, so that its calls are not at fault too."""
     for entry in entries:
         if isinstance(entry.name, str) and entry.name in QUANTITIES:
@@ -36,12 +36,12 @@ def build_functions(reader: Reader, entries: list[Entry]) -> None:
             reader.graph.declare(function)
 
 
-def _arity_meant(entry: Entry) -> int:
+def _arity_meant(entry: DescribedEntry) -> int:
     given = entry.values.get("arguments") or len(items(entry.values.get("derivatives")) or ())
     return given if isinstance(given, int) and 1 <= given <= 16 else 2 if "z" in entry.values else 1
 
 
-def _build(reader: Reader, entry: Entry) -> Function | None:
+def _build(reader: Reader, entry: DescribedEntry) -> Function | None:
     faults, path = reader.faults, entry.path
     given = entry.values.get("type")
     if not isinstance(given, str) or given not in FUNCTION:
@@ -54,7 +54,7 @@ def _build(reader: Reader, entry: Entry) -> Function | None:
     return build_native(reader, entry) if given == "native" else _table(reader, entry)
 
 
-def _table(reader: Reader, entry: Entry) -> Function | None:
+def _table(reader: Reader, entry: DescribedEntry) -> Function | None:
     faults, path, values = reader.faults, entry.path, entry.values
     fields = FUNCTION["table"]
     kind = reader.choice(f"{path}.kind", values.get("kind", fields["kind"].default), fields["kind"])

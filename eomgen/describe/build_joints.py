@@ -14,21 +14,21 @@ from ..graph.vectors import Mat3
 from ..joints import JOINTS, Joint, Shape
 from ..records import dataclass
 from .checks import check_names, unknown_key
-from .description import Entry, items
+from .description import DescribedEntry, items
 from .fields import KINDS, Field, joint_fields
 from .joint_data import read_armature, read_dry_friction, read_limits
 from .mechanism import JointSpec
 from .names import nearest
 from .placement import TURNS, turn_matrix
-from .reading import Reader
 from .sympy_face import name_of
+from .values import Reader
 
 
 @dataclass(frozen=True)
 class Declared:
     """A joint whose type and coordinates are known, before its markers and expressions are looked up."""
 
-    entry: Entry
+    entry: DescribedEntry
     joint: Joint
     coordinates: tuple[str, ...]
     named: bool
@@ -54,7 +54,7 @@ def sketch(type_name: str, values: Mapping[str, Any]) -> Joint:
     return kind(**{key: None for key, field in kind.options.items() if field.required} | given)
 
 
-def declare_coordinates(reader: Reader, entries: list[Entry]) -> list[Declared]:
+def declare_coordinates(reader: Reader, entries: list[DescribedEntry]) -> list[Declared]:
     """Check types, keys and coordinates of all joints and take the coordinates into the namespace."""
     result = []
     for entry in check_names(entries, "joint", reader.faults):
@@ -127,7 +127,7 @@ def _turned(marker: Marker, turn: Mat3) -> Marker:
     return Marker(marker.body, Frame(vec.product(marker.frame.rotation, turn), marker.frame.position), marker.label)
 
 
-def _type(reader: Reader, entry: Entry) -> str | None:
+def _type(reader: Reader, entry: DescribedEntry) -> str | None:
     path, given = f"{entry.path}.type", entry.values.get("type")
     if reader.faults.under(entry.path):
         return None
@@ -140,7 +140,7 @@ def _type(reader: Reader, entry: Entry) -> str | None:
     return None
 
 
-def _joint(reader: Reader, entry: Entry, type_name: str) -> Joint:
+def _joint(reader: Reader, entry: DescribedEntry, type_name: str) -> Joint:
     """The joint itself, with its options; keys are checked."""
     fields = joint_fields(type_name)
     for key in entry.values:

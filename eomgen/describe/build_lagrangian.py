@@ -14,8 +14,8 @@ from .description import items
 from .fields import LAGRANGIAN, MOTION
 from .mechanism import Lagrangian
 from .names import nearest
-from .reading import Reader
 from .sympy_face import in_order, name_of
+from .values import Reader
 
 
 def declare_lagrangian(reader: Reader, given: Any, has_bodies: bool) -> dict[str, Any] | None:

@@ -15,12 +15,12 @@ from typing import Any
 from ..errors import UsageError
 from ..files.reading import open_plain
 from ..graph.functions import Function, NativeCode
-from ..numeric.functions import Orders, Twin, up_to
+from ..numeric.user_functions import Orders, Twin, up_to
 from ..records import dataclass
-from .description import Entry, items
+from .description import DescribedEntry, items
 from .names import fault_of_name
 from .native_signature import find_signature
-from .reading import Reader
+from .values import Reader
 
 ARGUMENTS = 16  #: of one function
 SIZE = 1_000_000  #: bytes of one source file
@@ -35,7 +35,7 @@ class PythonTwin:
     second_derivatives: Sequence[Any] = ()
 
 
-def build_native(reader: Reader, entry: Entry) -> Function | None:
+def build_native(reader: Reader, entry: DescribedEntry) -> Function | None:
     """The function of an entry whose keys are checked; None if it is at fault, which is noted."""
     faults, path, values = reader.faults, entry.path, entry.values
     if not entry.trusted:
@@ -87,7 +87,7 @@ def _arity(reader: Reader, path: str, values: dict[str, Any]) -> int | None:
     return given
 
 
-def _names(reader: Reader, entry: Entry, arity: int) -> list[tuple[Orders, str]] | None:
+def _names(reader: Reader, entry: DescribedEntry, arity: int) -> list[tuple[Orders, str]] | None:
     """Names of the C functions by order of derivative."""
     path, values = entry.path, entry.values
     wanted: list[tuple[str, Orders, Any]] = [(f"{path}.function", (0,) * arity, values.get("function", entry.name))]
@@ -143,7 +143,9 @@ def _read(reader: Reader, path: str, given: Any, folder: str) -> tuple[str, str]
     return None
 
 
-def _twin(reader: Reader, entry: Entry, arity: int, names: Sequence[tuple[Orders, str]]) -> tuple[Twin | None, str]:
+def _twin(
+    reader: Reader, entry: DescribedEntry, arity: int, names: Sequence[tuple[Orders, str]]
+) -> tuple[Twin | None, str]:
     """The Python twin and, if it is a file, its text."""
     given, path = entry.values.get("python"), f"{entry.path}.python"
     if given is None:

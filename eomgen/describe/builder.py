@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..constraints import CONSTRAINTS
 from ..forces import FORCES
 from ..joints import JOINTS
-from .build import build
+from .build_mechanism import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings

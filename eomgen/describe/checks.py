@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..frames import GROUND
-from .description import Entry, Faults
+from .description import DescribedEntry, Faults
 from .fields import KINDS, Fields
 from .mechanism import Body, JointSpec
 from .names import fault_of_name, nearest
@@ -30,9 +30,11 @@ def unknown_key(key: object, fields: Iterable[str]) -> str:
     return remedy
 
 
-def check_names(entries: Sequence[Entry], what: str, faults: Faults, reserved: Sequence[str] = ()) -> list[Entry]:
+def check_names(
+    entries: Sequence[DescribedEntry], what: str, faults: Faults, reserved: Sequence[str] = ()
+) -> list[DescribedEntry]:
     """Note names that are no identifiers, reserved or used twice; returns the entries whose names can be used."""
-    usable: list[Entry] = []
+    usable: list[DescribedEntry] = []
     seen: set[Any] = set()
     for entry in entries:
         fault = fault_of_name(entry.name)

@@ -8,7 +8,7 @@ from ..errors import ExpressionError, ModelError, Problem
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
 from ..graph.evaluate import evaluate
-from ..graph.rounding import with_bounds
+from ..graph.rounding_bounds import with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..limits.constraints import GIVEN as SMALL
 from ..limits.rounding import ROUNDED

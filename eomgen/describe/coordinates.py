@@ -9,8 +9,8 @@ from ..elements.entry import Found
 from ..graph.shown import quoted, shown
 from .build_joints import Declared
 from .names import nearest
-from .reading import Reader
 from .sympy_face import name_of
+from .values import Reader
 
 
 def find_coordinate(reader: Reader, joints: Sequence[Declared], path: str, value: Any) -> Found | None:

@@ -1,7 +1,8 @@
 """Stage describe, raw data: what Python calls and model files both fill, in the layout of the model file.
 
 A :class:`Description` is plain data: sections of named entries whose values are numbers, texts, sequences, mappings or
-SymPy expressions as the user gave them.  Nothing is looked up or judged here; :mod:`~eomgen.describe.build` does that.
+SymPy expressions as the user gave them.  Nothing is looked up or judged here; that is done by
+:mod:`~eomgen.describe.build_mechanism`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Values = dict[str, Any]
 
 
 @dataclass
-class Entry:
+class DescribedEntry:
     """One named thing of a section; ``path`` is its dotted place.
 
     ``trusted`` tells whether it may bring code of its own, ``folder`` where its relative file names start.
@@ -45,7 +46,7 @@ class Description:
     values : dict
         What stands outside the sections: name, doc, gravity, independent, initial,
         guess, simulation, lagrangian.
-    sections : dict of list of Entry
+    sections : dict of list of DescribedEntry
         One list for each of :data:`SECTIONS`, in the order of the description; names may still repeat.
     motions : dict
         Label of an unnamed marker whose motion was asked for -> its reference (a mapping of body, at, rpy).
@@ -60,16 +61,16 @@ class Description:
     """
 
     values: Values = field(default_factory=dict)
-    sections: dict[str, list[Entry]] = field(default_factory=lambda: {name: [] for name in SECTIONS})
+    sections: dict[str, list[DescribedEntry]] = field(default_factory=lambda: {name: [] for name in SECTIONS})
     motions: dict[str, Values] = field(default_factory=dict)
     lines: dict[str, tuple[str, int]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     renamed: dict[str, dict[str, str]] = field(default_factory=dict)
 
-    def add(self, section: str, name: Any, values: Values) -> Entry:
+    def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
         """Append an entry to a section."""
-        entry = Entry(name, values, f"{section}.{shortened(name)}")
+        entry = DescribedEntry(name, values, f"{section}.{shortened(name)}")
         self.sections[section].append(entry)
         return entry
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..graph.core import Expr, Graph
-from ..graph.operations import COMMUTATIVE
 from ..graph.traverse import LEAVES, reachable
+from ..operations import OPERATIONS
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
@@ -63,7 +63,8 @@ def _spell_node(x: Expr, known: dict[int, str]) -> str:
                 continue
             parts = [known[k] for k in rest]
             meaning = _spell(graph.calls.get(operation, operation), graph, known)
-            known[i] = _hash(repr((meaning, sorted(parts) if operation in COMMUTATIVE else parts)))
+            row = OPERATIONS.get(operation)
+            known[i] = _hash(repr((meaning, sorted(parts) if row is not None and row.commutative else parts)))
     return known[x.id]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..graph.shown import shown
 from ..texts import html_text
-from .description import Description, Entry, items, label_of, text_of
+from .description import DescribedEntry, Description, items, label_of, text_of
 
 
 def reference_text(value: Any) -> str:
@@ -18,7 +18,7 @@ def reference_text(value: Any) -> str:
     return text_of(value) if listed is None else " to ".join(reference_text(x) for x in listed)
 
 
-def _summary(entry: Entry) -> str:
+def _summary(entry: DescribedEntry) -> str:
     parts = []
     for key, value in entry.values.items():
         if key == "markers":

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from ..elements.element_type import ElementType, Types
 from ..elements.entry import Found, Meaning
 from ..elements.field import Fields
-from ..frames import Cylinder, Marker
+from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.shown import quoted, shown
 from ..graph.vectors import Vec3
@@ -16,12 +16,12 @@ from .build_cam_points import Contacts
 from .build_joints import Declared
 from .checks import check_keys
 from .coordinates import find_coordinate
-from .description import Entry, items
+from .description import DescribedEntry, items
 from .fields import CYLINDER
 from .mechanism import Body, JointSpec
 from .names import nearest
-from .reading import Reader
 from .scope import ENERGIES, RATES
+from .values import Reader
 
 _LEVELS = ("coordinate", "velocity", "acceleration")  #: kinds of names of motions
 _A = {"length": "a length", "angle": "an angle"}
@@ -40,7 +40,7 @@ class Surroundings(NamedTuple):
 class ElementEntry:
     """The reader of :class:`~..elements.entry.Entry`, which says what its methods do."""
 
-    def __init__(self, around: Surroundings, entry: Entry) -> None:
+    def __init__(self, around: Surroundings, entry: DescribedEntry) -> None:
         self.around, self.entry, self.reader = around, entry, around.reader
         self.name, self.path, self.values = str(entry.name), entry.path, entry.values
         self.graph, self.stand_in = self.reader.graph, self.reader.stand_in
@@ -189,22 +189,22 @@ class ElementEntry:
         x, y, z = (self.graph.constant(value) for value in columns[2])
         return x, y, z
 
-    def via(self, key: str = "via") -> Sequence[Marker | Cylinder] | None:
+    def via(self, key: str = "via") -> Sequence[Marker | WrapCylinder] | None:
         value = self.values.get(key, ())
-        listed, found = items(value), list[Marker | Cylinder]()
+        listed, found = items(value), list[Marker | WrapCylinder]()
         if listed is None:
             self.reader.wrong(self._at(key), value, "via")
             return None
         for k, item in enumerate(listed):
             stop = self._stop(f"{self._at(key)}[{k}]", item)
-            if isinstance(stop, Cylinder) and found and isinstance(found[-1], Cylinder):
+            if isinstance(stop, WrapCylinder) and found and isinstance(found[-1], WrapCylinder):
                 remedy = "put a marker that the path slides through between them"
                 self.fault(f"{key}[{k}]", "follows another cylinder", remedy)
             if stop is not None:
                 found.append(stop)
         return None if self.at_fault(key) else found
 
-    def _stop(self, path: str, value: Any) -> Marker | Cylinder | None:
+    def _stop(self, path: str, value: Any) -> Marker | WrapCylinder | None:
         reader = self.reader
         if not (isinstance(value, Mapping) and "body" not in value):
             return reader.marker(path, value)
@@ -217,7 +217,7 @@ class ElementEntry:
             reader.faults.add(f"{path}.radius", f"is {radius.value:g}", "must be greater than 0")
         field = CYLINDER["sense"]
         sense = reader.choice(f"{path}.sense", value.get("sense", field.default), field)
-        return None if marker is None else Cylinder(marker, radius, 1 if sense == "positive" else -1)
+        return None if marker is None else WrapCylinder(marker, radius, 1 if sense == "positive" else -1)
 
     def body(self, key: str = "body") -> tuple[int, Body] | None:
         given, own = self.values.get(key), {body.name: k for k, body in enumerate(self.around.bodies)}

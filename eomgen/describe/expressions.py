@@ -1,7 +1,7 @@
 """Stage describe, expressions: text -> graph, by a whitelist over Python's syntax tree; nothing is ever executed.
 
 Allowed are numbers, names, ``+ - * / **``, comparisons, ``and or not``, ``a if c else b``, the functions of
-:data:`~eomgen.describe.names.FUNCTIONS`, functions that the graph declares and, where markers can be resolved (in
+:func:`~eomgen.describe.names.function_words`, functions that the graph declares and, where markers can be resolved (in
 outputs), ``x``, ``vx``, ``wx`` and the like of a marker, ``rod.tip`` or ``rod``.  Comparisons and logic give 1 or 0.
 Length, depth, size, numbers and exponents are bounded, so hostile text costs no more than honest text.
 """
@@ -15,17 +15,13 @@ from collections.abc import Callable
 
 from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
-from .names import FUNCTIONS, QUANTITIES, nearest
+from ..operations import OPERATIONS
+from .names import QUANTITIES, function_words, nearest
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
 NODES = 2000  #: names, numbers and operations
 EXPONENT = 1000.0  #: size of a numeric exponent
-
-ALLOWED = (
-    "allowed are numbers, names, + - * / **, comparisons, and, or, not, 'a if c else b' and the functions "
-    + " ".join(FUNCTIONS)
-)
 
 #: A name -> its expression; may raise :class:`ExpressionError` or note the fault and return a placeholder.
 Resolve = Callable[[str], Expr]
@@ -67,6 +63,12 @@ _REFUSED: dict[type[ast.AST], str] = {
 }
 
 
+def allowed() -> str:
+    """What an expression may hold, for messages."""
+    start = "allowed are numbers, names, + - * / **, comparisons, and, or, not, 'a if c else b' and the functions "
+    return start + " ".join(function_words())
+
+
 def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = None, any_function: bool = False) -> Expr:
     """The graph expression of a text.
 
@@ -95,12 +97,12 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     if len(text) > LENGTH:
         raise ExpressionError(f"an expression of {len(text)} characters is too long", 1, f"at most {LENGTH}", text)
     if not text.strip():
-        raise ExpressionError("the expression is empty", 1, ALLOWED, text)
+        raise ExpressionError("the expression is empty", 1, allowed(), text)
     foreign = _FOREIGN.search(text)
     if foreign:
         mark = foreign.group()
         raise ExpressionError(
-            f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, ALLOWED), text
+            f"{mark!r} has no place in an expression", foreign.start() + 1, _HINTS.get(mark, allowed()), text
         )
     joined = _JOINED.search(text)
     if joined:
@@ -113,12 +115,12 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
         tree = ast.parse(line[start:].rstrip() + "\n", mode="single")
     except SyntaxError as error:
         column = (error.offset or 1) + start
-        raise ExpressionError(f"not a valid expression ({error.msg})", column, ALLOWED, text) from None
+        raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None
     except (ValueError, MemoryError, RecursionError):
         raise ExpressionError("nested too deeply", 1, f"at most {DEPTH} levels", text) from None
     body = tree.body
     if len(body) != 1 or not isinstance(body[0], ast.Expr):
-        raise ExpressionError("a statement, not an expression", start + 1, ALLOWED, text)
+        raise ExpressionError("a statement, not an expression", start + 1, allowed(), text)
     return _Walker(text, start, graph, resolve, locate, any_function).walk(body[0].value, 0)
 
 
@@ -145,10 +147,12 @@ class _Walker:
     ) -> None:
         self.text, self.start, self.graph, self.any_function = text, start, graph, any_function
         self.resolve, self.locate = resolve, locate
+        self.words = function_words()
         self.size = 0
 
-    def fault(self, node: ast.AST, message: str, remedy: str = ALLOWED) -> ExpressionError:
-        return ExpressionError(message, getattr(node, "col_offset", 0) + self.start + 1, remedy, self.text)
+    def fault(self, node: ast.AST, message: str, remedy: str | None = None) -> ExpressionError:
+        column = getattr(node, "col_offset", 0) + self.start + 1
+        return ExpressionError(message, column, allowed() if remedy is None else remedy, self.text)
 
     def walk(self, node: ast.expr, depth: int) -> Expr:
         self.size += 1
@@ -179,7 +183,7 @@ class _Walker:
     def number(self, node: ast.Constant) -> Expr:
         value = node.value
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fault(node, f"{value!r} is not a number", "write 1 or 0 for true or false; " + ALLOWED)
+            raise self.fault(node, f"{value!r} is not a number", "write 1 or 0 for true or false; " + allowed())
         try:
             number = float(value)
         except OverflowError:
@@ -191,7 +195,7 @@ class _Walker:
     def name(self, node: ast.Name) -> Expr:
         if node.id == "pi":
             return self.graph.constant(math.pi)
-        if node.id in FUNCTIONS or node.id in self.graph.functions:
+        if node.id in self.words or node.id in self.graph.functions:
             raise self.fault(node, f"{node.id!r} is a function", f"write {node.id}(...)")
         try:
             return self.resolve(node.id)
@@ -236,17 +240,17 @@ class _Walker:
         name = node.func.id
         if node.keywords:
             raise self.fault(node, f"{name}() takes no keywords")
-        if name in QUANTITIES and name not in FUNCTIONS:
+        if name in QUANTITIES and name not in self.words:
             return self.quantity(node, name)
         declared = self.graph.functions.get(name)
-        if self.any_function and (name == "diff" or (name not in FUNCTIONS and declared is None)):
+        if self.any_function and (name == "diff" or (name not in self.words and declared is None)):
             for argument in node.args:
                 self.walk(argument, depth + 1)
             return self.graph.symbol("?")
-        if name not in FUNCTIONS and declared is None:
-            known = [*FUNCTIONS, *self.graph.functions, *(QUANTITIES if self.locate else ())]
+        if name not in self.words and declared is None:
+            known = [*self.words, *self.graph.functions, *(QUANTITIES if self.locate else ())]
             raise self.fault(node, f"unknown function {name!r}", nearest(name, known, "functions"))
-        least, most = FUNCTIONS[name] if declared is None else (declared.arity, declared.arity)
+        least, most = self.words[name] if declared is None else (declared.arity, declared.arity)
         if not least <= len(node.args) <= most:
             number = f"{least}" if least == most else f"{least} or more"
             plural = "" if number == "1" else "s"
@@ -257,11 +261,10 @@ class _Walker:
         if declared is not None:
             zeros = (0,) * declared.arity
             return Expr(self.graph, self.graph.call(declared, zeros, [x.id for x in arguments]))
-        if name in ("min", "max"):
-            return self.fold(node, name, arguments)
         if name == "heaviside":  # 0, 1/2 at 0, 1
             return 0.5 * (1.0 + self.apply(node, "sign", *arguments))
-        return self.apply(node, "select" if name == "where" else name, *arguments)
+        row = next(row for row in OPERATIONS.values() if row.word == name)
+        return self.fold(node, row.name, arguments) if row.many else self.apply(node, row.name, *arguments)
 
     def derivative(self, node: ast.Call, depth: int) -> Expr:
         """``diff(f(x, y), 1, 0)``: a derivative of a declared function, one order for each of its arguments."""

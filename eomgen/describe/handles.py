@@ -9,7 +9,7 @@ from ..errors import UsageError
 from ..joints import JOINTS
 from .build_joints import coordinate_names, sketch
 from .described import Described
-from .description import GROUND_NAME, Entry, is_zero, items, label_of
+from .description import GROUND_NAME, DescribedEntry, is_zero, items, label_of
 from .mechanism import velocity_names
 from .scope import RATES
 from .sympy_face import symbol
@@ -92,7 +92,7 @@ class MarkerHandle:
 class BodyHandle(MarkerHandle):
     """A body, or ground; used as a marker it stands for the frame at its origin."""
 
-    def __init__(self, model: Described, name: str, entry: Entry | None) -> None:
+    def __init__(self, model: Described, name: str, entry: DescribedEntry | None) -> None:
         super().__init__(model, name)
         self.name = name
         self._entry = entry
@@ -155,7 +155,7 @@ class JointHandle:
         Name of the joint.
     """
 
-    def __init__(self, model: Described, entry: Entry) -> None:
+    def __init__(self, model: Described, entry: DescribedEntry) -> None:
         self.model, self.name, self._entry = model, entry.name, entry
 
     def __repr__(self) -> str:

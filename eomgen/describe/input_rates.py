@@ -11,14 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..constraints import Driver, Equation
-from ..constraints.base import POSITION, Constraint
+from ..constraints.constraint import POSITION, Constraint
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import gradient, jvp
 from ..graph.substitute import symbols_of
 from .input_names import chains, rate_of, split_rate
 from .mechanism import Event, GivenEquations, Input, Lagrangian, Output
-from .reading import Reader
 from .time_jumps import jumps_in_time
+from .values import Reader
 
 
 def clock(graph: Graph, inputs: Sequence[Input]) -> dict[Expr, Expr]:

@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from .checks import check_keys
 from .description import items
 from .fields import DISPLAY, LIMITS
-from .reading import Reader
+from .values import Reader
 
 Limits = tuple[tuple[str, float], ...]  #: (key, value) of what is limited
 

@@ -21,9 +21,9 @@ from ..records import dataclass
 from .description import place_of
 
 if TYPE_CHECKING:
-    from ..constraints.base import Constraint
-    from ..forces.base import Force
-    from ..joints.base import Joint
+    from ..constraints.constraint import Constraint
+    from ..forces.force import Force
+    from ..joints.joint import Joint
 
 
 @dataclass(frozen=True)

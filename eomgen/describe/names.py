@@ -7,22 +7,19 @@ import re
 import sys
 from collections.abc import Iterable
 
-from ..graph.elementary import ELEMENTARY
 from ..graph.shown import quoted
+from ..operations import OPERATIONS
 
-#: Functions an expression may call, with the least and the greatest number of arguments.
-FUNCTIONS: dict[str, tuple[int, int]] = {
-    **dict.fromkeys(ELEMENTARY, (1, 1)),
-    "atan2": (2, 2),
-    "sqrt": (1, 1),
-    "abs": (1, 1),
-    "sign": (1, 1),
-    "min": (2, 64),
-    "max": (2, 64),
-    "heaviside": (1, 1),
-    "where": (3, 3),
-    "diff": (2, 17),
-}
+#: Arguments that a function of any number of them takes at most.
+MOST = 64
+
+
+def function_words() -> dict[str, tuple[int, int]]:
+    """Functions an expression may call, with the least and the greatest number of arguments."""
+    rows = [row for row in OPERATIONS.values() if row.word]
+    found = {row.word: (row.arity, MOST if row.many else row.arity) for row in rows}
+    return {**found, "heaviside": (1, 1), "diff": (2, 17)}
+
 
 #: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).
 QUANTITIES: dict[str, tuple[int, int]] = {
@@ -95,7 +92,7 @@ def fault_of_name(name: object, symbol: bool = False) -> tuple[str, str] | None:
             return "'t' is the time", "choose another name"
         if name == "pi":
             return "'pi' is the number", "choose another name"
-        if name in FUNCTIONS:
+        if name in function_words():
             return f"{name!r} is a function", f"choose another name, e.g. {name}_"
     return None
 

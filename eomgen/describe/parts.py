@@ -10,14 +10,15 @@ from ..errors import UsageError
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from ..solids import SOLIDS, MassProperties, point, turn_tensor
+from ..graph.tensors import rotate_symmetric
+from ..solids import SOLIDS, MassProperties, point
 from ..solids.mesh import measure_mesh
 from .checks import check_keys, unknown_key
 from .description import items, place_of
 from .fields import KINDS, POINT, SOLID, SOLID_KEYS, solid_fields
 from .names import nearest
 from .placement import TURNS, turn_matrix
-from .reading import Reader
+from .values import Reader
 
 
 def read_parts(reader: Reader, path: str, values: Mapping[str, Any]) -> list[MassProperties]:
@@ -85,7 +86,7 @@ def _solid(reader: Reader, path: str, values: Mapping[str, Any]) -> MassProperti
     mass = given["mass"] if "mass" in given else given[density] * own.mass
     if subtract:
         mass = -mass
-    tensor = turn_tensor(frame.rotation, own.inertia)
+    tensor = rotate_symmetric(frame.rotation, own.inertia)
     x, y, z = (vec.scale(mass, row) for row in tensor)
     com = vec.add(frame.position, vec.times(frame.rotation, own.com))
     return MassProperties(mass, com, (x, y, z))

@@ -13,7 +13,7 @@ from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..limits.descriptions import TENSOR, TENSOR_TERMS
 from ..limits.inertia import COMPUTED
-from ..numeric.inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales, longest_within
+from ..numeric.rigid_inertia import EXCESS, SWITCH, fault_of_inertia, inertia_scales, longest_within
 from .description import Faults
 from .mechanism import Body, JointSpec
 

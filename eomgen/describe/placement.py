@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, cos, sin
+from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3
-from ..limits.rounding import QUARTER
+from ..rotations.scalars import matrix_from_roll_pitch_yaw
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _NX, _NY, _NZ = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
@@ -26,17 +26,6 @@ TURNS: dict[str, tuple[Numbers, Numbers, Numbers]] = {
 }
 
 
-def cosine_and_sine(angle: Expr) -> tuple[Expr, Expr]:
-    """cos and sin of an angle; exact 0 and +-1 for numeric multiples of pi/2 (to within 1e-15 of relative rounding)."""
-    value = angle.value
-    if value is not None:
-        quarter = round(value / (math.pi / 2))
-        if abs(value - quarter * (math.pi / 2)) <= QUARTER * max(1, abs(quarter)):
-            c, s = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarter % 4]
-            return angle.graph.constant(c), angle.graph.constant(s)
-    return cos(angle), sin(angle)
-
-
 def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
     """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF.
 
@@ -51,12 +40,7 @@ def rpy_rotation(graph: Graph, rpy: Sequence[Expr]) -> Mat3:
     Mat3
         Takes marker axes to body axes.
     """
-    (cr, sr), (cp, sp), (cy, sy) = (cosine_and_sine(angle) for angle in rpy)
-    o, i = graph.zero, graph.one
-    about_x: Mat3 = ((i, o, o), (o, cr, -sr), (o, sr, cr))
-    about_y: Mat3 = ((cp, o, sp), (o, i, o), (-sp, o, cp))
-    about_z: Mat3 = ((cy, -sy, o), (sy, cy, o), (o, o, i))
-    return vec.product(about_z, vec.product(about_y, about_x))
+    return vec.matrix(graph, matrix_from_roll_pitch_yaw(rpy))
 
 
 def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:

@@ -9,7 +9,7 @@ from ..constraints.planetary import WHEELS
 from ..elements.element_type import Types
 from ..forces import FORCES
 from ..joints import JOINTS
-from ..numeric.inertia import CHECKS
+from ..numeric.rigid_inertia import CHECKS
 from .fields import (
     AXES,
     BODY,

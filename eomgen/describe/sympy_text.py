@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import partialmethod
 from typing import Any
 
 from ..errors import ExpressionError, UsageError
 from ..graph.core import Expr, Graph
 from ..graph.functions import Function
+from ..operations import OPERATIONS
 from .expressions import parse
 from .scope import RATES
 from .sympy_face import free_names, function_name, function_names
@@ -33,17 +35,11 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
 
     from ..graph.shown import shortened
 
+    def named(printer: Any, e: Any, word: str) -> str:
+        return f"{word}({', '.join(printer._print(x) for x in e.args)})"
+
     class Printer(StrPrinter):  # type: ignore[misc]  # SymPy has no types
         """SymPy's text with the names of functions that a model file uses."""
-
-        def _print_Abs(self, e: Any) -> str:
-            return f"abs({self._print(e.args[0])})"
-
-        def _print_Min(self, e: Any) -> str:
-            return f"min({', '.join(self._print(x) for x in e.args)})"
-
-        def _print_Max(self, e: Any) -> str:
-            return f"max({', '.join(self._print(x) for x in e.args)})"
 
         def _print_Float(self, e: Any) -> str:
             return repr(float(e))
@@ -104,6 +100,9 @@ def sympy_text(expression: Any, functions: Collection[str] = ()) -> str:
             call = f"{e.expr.func.__name__}({', '.join(self._print(x) for x in operands)})"
             return f"diff({', '.join([call, *map(str, orders)])})"
 
+    for row in OPERATIONS.values():
+        if row.word and row.sympy_class:
+            setattr(Printer, f"_print_{row.sympy_class}", partialmethod(named, word=row.word))
     try:
         text = str(Printer().doprint(expression))
     except RecursionError:

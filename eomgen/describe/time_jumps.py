@@ -11,12 +11,12 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..graph.differentiate import gradient
-from ..graph.rounding import is_rounding, with_bounds
+from ..graph.rounding_bounds import is_rounding, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
+from ..operations import CONDITION, operations_with
 
 TRIES = 5  #: random places at which a change is looked at
-COMPARED = frozenset({"lt", "le", "eq"})
 
 
 def jumps_in_time(expressions: Sequence[Expr]) -> bool:
@@ -28,9 +28,10 @@ def jumps_in_time(expressions: Sequence[Expr]) -> bool:
         return False
     graph = expressions[0].graph
     t = graph.symbol("t")
+    compared = operations_with(lambda row: row.kind == CONDITION and row.jumps)
     for i in reachable(graph, [x.id for x in expressions]):
         operation, *operands = graph.nodes[i]
-        if operation not in COMPARED:
+        if operation not in compared:
             continue
         apart = Expr(graph, operands[0]) - Expr(graph, operands[1])
         slope = gradient(apart, [t])[0]

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from .description import GROUND_NAME, SECTIONS, Description, Entry, items
+from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, items
 from .sympy_face import free_names, is_sympy, symbol
 
 _MOTION = re.compile(r"(\w+)\((.*)\)\Z", re.DOTALL)
@@ -41,19 +41,19 @@ def with_named_markers(description: Description) -> Description:
     named_symbols = {symbol(name): symbol(f"{u[1]}({named[u[2]]})") for name, u in uses.items() if u[2] in named}
     for name, entries in sections.items():
         sections[name] = [
-            Entry(entry.name, _replaced(entry.values, named_symbols), entry.path, entry.trusted, entry.folder)
+            DescribedEntry(entry.name, _replaced(entry.values, named_symbols), entry.path, entry.trusted, entry.folder)
             for entry in entries
         ]
     values = _replaced(description.values, named_symbols)
     return Description(values=values, sections=sections, notes=description.notes, renamed=description.renamed)
 
 
-def _name(bodies: list[Entry], reference: Mapping[str, Any]) -> str:
+def _name(bodies: list[DescribedEntry], reference: Mapping[str, Any]) -> str:
     """Give a body a marker at a reference; returns how to refer to it."""
     body = reference["body"]
     place = next((k for k, entry in enumerate(bodies) if entry.name == body), None)
     if place is None:  # ground, of which nothing was said yet
-        bodies.append(Entry(GROUND_NAME, {}, f"bodies.{GROUND_NAME}"))
+        bodies.append(DescribedEntry(GROUND_NAME, {}, f"bodies.{GROUND_NAME}"))
         place = len(bodies) - 1
     entry = bodies[place]
     markers = entry.values.get("markers") or {}
@@ -63,7 +63,7 @@ def _name(bodies: list[Entry], reference: Mapping[str, Any]) -> str:
     while f"marker_{k}" in taken:
         k += 1
     placed = {key: value for key, value in reference.items() if key != "body"}
-    bodies[place] = Entry(
+    bodies[place] = DescribedEntry(
         entry.name,
         {**entry.values, "markers": [*listed, (f"marker_{k}", placed)]},
         entry.path,

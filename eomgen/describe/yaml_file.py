@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import ModelError, Problem
-from ..files.paths import as_name
+from ..files.path_names import as_name
 from ..files.reading import open_plain
 from .description import SECTIONS, Description, Faults
 from .fields import KINDS, MODEL, SHORT

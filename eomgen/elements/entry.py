@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from ..frames import Cylinder, Marker
+from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from .field import Fields
@@ -114,7 +114,7 @@ class Entry(Protocol):
     def axis(self, key: str) -> Vec3:
         """A direction of length 1."""
 
-    def via(self, key: str = "via") -> Sequence[Marker | Cylinder] | None:
+    def via(self, key: str = "via") -> Sequence[Marker | WrapCylinder] | None:
         """What a path runs over, in order; None if anything is wrong with it."""
 
     def coordinate(self, key: str = "joint", kind: str = "") -> Found | None:

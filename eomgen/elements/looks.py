@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..frames import Cylinder, Marker
+from ..frames import Marker, WrapCylinder
 from ..graph.core import Expr
 
 Points = tuple[tuple[float, ...], ...]
@@ -58,7 +58,7 @@ class Drawn(NamedTuple):
 
     Attributes
     ----------
-    stops : tuple of Marker and Cylinder
+    stops : tuple of Marker and WrapCylinder
         What it runs over, in order; one marker: lines about its z axis.
     coordinate : str
         Or the coordinate of a joint that it acts on: lines about an angle, lines between the markers along a length.
@@ -69,7 +69,7 @@ class Drawn(NamedTuple):
         Lines in the plane across the axis, in sizes of a symbol.
     """
 
-    stops: tuple[Marker | Cylinder, ...] = ()
+    stops: tuple[Marker | WrapCylinder, ...] = ()
     coordinate: str = ""
     along: tuple[Points, ...] = ()
     about: tuple[Points, ...] = ()

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 from ..graph.core import Graph
 from ..records import dataclass
-from .straight import Piece
+from .straight import PrintedFunction
 
 CIRCULAR = ("sin", "cos")
 
@@ -27,7 +27,7 @@ class Angles:
     arguments: tuple[int, ...]
 
 
-def gather_angles(graph: Graph, piece: Piece) -> Angles:
+def gather_angles(graph: Graph, piece: PrintedFunction) -> Angles:
     """The angles of a piece that do not themselves depend on a sin or cos computed in it."""
     nodes = graph.nodes
     inside = set(piece.statements)

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..limits.in_c import definitions
 from ..program import KERNELS, Block, Program
-from ..program.loops import LARGE
+from ..program.loop_blocks import LARGE
 from ..program.series import NoSeriesError
 from .c_functions import declarations, function_files, used_calls
 from .c_lanes import lane_files, lane_kernels
@@ -106,7 +106,7 @@ def _context(program: Program, printed: list[Printed]) -> dict[str, Any]:
         "order": [*program.preferred, *others],
         "dependent": [int(i in others) for i in range(sizes.n_v)],
         "parent": program.parent,
-        "balls": program.balls,
+        "quaternion_slots": program.quaternion_slots,
         "coordinate_of": program.coordinate_of,
         "by_columns": program.by_columns,
         "system": program.system if "system" in program.block_names else None,

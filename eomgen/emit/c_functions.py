@@ -1,19 +1,19 @@
 """Stage emit: the functions a program calls -> C files of their own: tables as constants, native sources as they are.
 
-The arithmetic is that of :mod:`eomgen.numeric.functions`.  Everything is re-entrant: tables are constant.
+The arithmetic is that of :mod:`eomgen.numeric.user_functions`.  Everything is re-entrant: tables are constant.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from ..errors import UsageError
 from ..graph.functions import Function
 from ..graph.traverse import reachable
-from ..numeric.functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
+from ..numeric.user_functions import Curve, Orders, Surface, base_orders, difference_step, first_excess, lowered
 from ..program import Program
 from .sources import render
 
@@ -41,13 +41,17 @@ def each_name(function: str, orders: Sequence[int]) -> str:
     return f"each_{function}_{'_'.join(map(str, orders))}"
 
 
+def each_lane(function: str, operands: Iterable[str]) -> str:
+    """The loop that calls a function of doubles in every lane."""
+    lanes = ", ".join(f"EOMGEN_LANE({x}, k)" for x in operands)
+    return f"for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {function}({lanes}); }}"
+
+
 def _each(program: str, function: Function, orders: Sequence[int]) -> str:
     """Its definition."""
     arity = range(function.arity)
-    lanes = ", ".join(f"EOMGEN_LANE(x{k}, k)" for k in arity)
     head = f"EOMGEN_SHARED inline real {each_name(function.name, orders)}({', '.join(f'real x{k}' for k in arity)})"
-    call = f"{c_name(program, function.name, orders)}({lanes})"
-    loop = f"for (int k = 0; k < EOMGEN_WIDTH; k++) {{ EOMGEN_LANE(y, k) = {call}; }}"
+    loop = each_lane(c_name(program, function.name, orders), [f"x{k}" for k in arity])
     return f"{head}\n{{\n    real y = same(0.0);\n    {loop}\n    return y;\n}}\n"
 
 

@@ -64,7 +64,7 @@ def driver_files(program: Program) -> list[str]:
         space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
         if program.given_rates:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
-        files.update(dict.fromkeys(space if program.balls or program.given_rates else ("space_plain",)))
+        files.update(dict.fromkeys(space if program.quaternion_slots or program.given_rates else ("space_plain",)))
     for driver in program.drivers:
         if driver.name == "dae_jacobian":
             needed: tuple[str, ...] = ("dae_jacobian",)

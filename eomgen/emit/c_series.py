@@ -10,11 +10,12 @@ from collections.abc import Container
 from math import inf
 from typing import NamedTuple
 
+from ..operations import CONDITION, OPERATIONS
 from ..program import Program
 from ..program.series import MOST_ORDER, Series, Term, behind, make_series
 from .angles import print_angles
 from .c_lanes import WIDTHS
-from .c_text import ARITHMETIC, CONDITION_PATTERNS, HELPERS, PATTERNS, literal
+from .c_text import helper, literal
 from .sources import read_template, render
 from .straight import references
 
@@ -34,7 +35,8 @@ def series_files(program: Program) -> dict[str, str]:
     """
     series = make_series(program)
     block = next(b for b in program.blocks if b.name == "rhs")
-    printer = _Printer(series, references(program, block.inputs))
+    printer = _SeriesPrinter(series, references(program, block.inputs))
+    used = sorted({t.kind for t in series.terms} & OPERATIONS.keys())
     context = {
         "name": program.name,
         "n": len(series.rates),
@@ -47,10 +49,16 @@ def series_files(program: Program) -> dict[str, str]:
         "n_work": printer.rows * ROW,
         "kept": printer.kept,
         "widths": [(width, tests) for width, (tests, _) in sorted(WIDTHS.items(), reverse=True) if tests],
-        "helpers": [HELPERS[k] for k in sorted({t.kind for t in series.terms} & HELPERS.keys())],
+        "helpers": [text for k in used if (text := helper(OPERATIONS[k]))],
     }
     files = {f"{program.name}_series.{end}": render(f"c/series.{end}.j2", context) for end in ("h", "c")}
     return {"eomgen_series.h": read_template("c/eomgen_series.h"), **files}
+
+
+def _signed(parts: list[tuple[int, str]]) -> str:
+    """A sum of texts with their signs."""
+    text = "".join(f" {'-' if sign < 0 else '+'} {part}" for sign, part in parts)
+    return text.removeprefix(" + ") if text.startswith(" + ") else f"-{text[3:]}"
 
 
 class _Factor(NamedTuple):
@@ -63,7 +71,7 @@ class _Factor(NamedTuple):
         return _Factor(self.number * other.number, tuple(sorted(self.names + other.names)))
 
 
-class _Printer:
+class _SeriesPrinter:
     """Statements of the order 0 and of order k; ``a3`` is the value of term 3, ``b3`` its coefficient of order k."""
 
     def __init__(self, series: Series, texts: dict[int, str]) -> None:
@@ -156,7 +164,7 @@ class _Printer:
     def _rule(self, i: int, term: Term) -> str:
         """The coefficient of order k of a term as a C expression; sums and rows it needs are noted."""
         self._depth[i] = 1 + max((self._depth.get(k, 0) for k in term.operands), default=0)
-        rule = getattr(self, f"_{term.kind}", self._function)
+        rule = getattr(self, f"_{term.kind}", self._by_rate)
         return str(rule(i, term, *term.operands))
 
     def _changes(self, i: int) -> bool:
@@ -198,37 +206,28 @@ class _Printer:
     def _sqrt(self, i: int, term: Term, p: int) -> str:
         return f"(b{p} - {self._sum(i, i)})*(0.5*{self._reciprocal(i)})"
 
-    def _log(self, i: int, term: Term, p: int) -> str:
-        inverse = self._reciprocal(p)
-        return f"(b{p} - inverse*{self._sum(i, p, True)})*{inverse}"
-
     def _pow(self, i: int, term: Term, p: int, q: int) -> str:
         inverse, e = self._reciprocal(p), self._zero(q)
         weighted, plain = self._sum(p, i, True), self._sum(p, i)
         return f"(({e} + 1.0)*inverse*{weighted} - {plain} + {e}*b{p}*a{i})*{inverse}"
 
-    def _function(self, i: int, term: Term, p: int) -> str:
-        """Those whose rate is the operand's times another term: exp, sin, cos, sinh, cosh, tan, tanh."""
-        other = i if term.kind == "exp" else term.other
-        text = f"inverse*{self._sum(p, other, True)} + b{p}*{self._zero(other)}"
-        return f"-({text})" if term.kind == "cos" else text
-
-    def _inverse(self, i: int, term: Term, p: int) -> str:
-        """Those whose rate is the operand's divided by another term: asin, acos, atan."""
-        inverse = self._reciprocal(term.other)
-        sign = "-" if term.kind == "acos" else ""
-        return f"({sign}b{p} - inverse*{self._sum(i, term.other, True)})*{inverse}"
-
-    _asin = _acos = _atan = _inverse
-
-    def _atan2(self, i: int, term: Term, y: int, x: int) -> str:
-        inverse = self._reciprocal(term.other)
-        sums, ends = f"-{self._sum(i, term.other, True)}", ""
-        if self._changes(y):
-            sums, ends = f"{self._sum(y, x, True)} {sums}", f" + b{y}*{self._zero(x)}"
-        if self._changes(x):
-            sums, ends = f"{sums} - {self._sum(x, y, True)}", f"{ends} - b{x}*{self._zero(y)}"
-        return f"(inverse*({sums}){ends})*{inverse}"
+    def _by_rate(self, i: int, term: Term, *operands: int) -> str:
+        """A function whose rate is a sum of operands' rates times other terms, or that divided by a term."""
+        inverse = f"*{self._reciprocal(term.divisor)}" if term.divisor >= 0 else ""
+        last = [(-1, self._sum(i, term.divisor, True))] if inverse else []
+        sums, ends = [], []
+        moving = [(p, *by) for p, by in zip(operands, term.numerators, strict=True) if self._changes(p)]
+        turned = -1 if not inverse and all(sign < 0 for _, sign, _ in moving) else 1
+        for p, sign, n in moving:
+            ends.append((sign * turned, f"b{p}*{self._zero(n)}" if n >= 0 else f"b{p}"))
+            sums += [(sign * turned, self._sum(p, n, True))] if n >= 0 and self._changes(n) else []
+        lower = _signed([*sums, *last])
+        if sums:
+            ends = [(1, f"inverse*({lower})" if len(sums + last) > 1 else f"inverse*{lower}"), *ends]
+        elif last:
+            ends.append((-1, f"inverse*{last[0][1]}"))
+        text = _signed(ends)
+        return f"({text}){inverse}" if inverse else text if turned > 0 else f"-({text})"
 
     # the statements
 
@@ -264,16 +263,11 @@ class _Printer:
         if kind in ("sin", "cos") and operands[0] in angles:
             return f"const real a{i} = {'sines' if kind == 'sin' else 'cosines'}[{angles[operands[0]]}];"
         numbers = all(self._terms[k].kind == "number" for k in operands)
-        show = self._zero if kind in ARITHMETIC and not numbers else self._real
-        texts = list(map(show, operands))
-        if kind in CONDITION_PATTERNS:
-            value = f"choose({CONDITION_PATTERNS[kind].format(*texts)}, same(1.0), same(0.0))"
-        else:
-            value = (
-                f"choose({texts[0]} != 0.0, {texts[1]}, {texts[2]})"
-                if kind == "select"
-                else PATTERNS[kind].format(*texts)
-            )
+        row = OPERATIONS[kind]
+        show = self._zero if row.takes_numbers and not numbers else self._real
+        first, *rest = map(show, operands)
+        value = row.c.format(f"{first} != 0.0" if row.chooses else first, *rest)
+        value = f"choose({value}, same(1.0), same(0.0))" if row.kind == CONDITION else value
         return f"const real a{i} = {value};"
 
     def states(self) -> list[str]:

@@ -10,54 +10,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..graph.core import Expr
-from ..graph.elementary import ELEMENTARY
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
+from ..operations import ARITHMETIC, CONDITION, OPERATIONS, Operation, operations_with
 from ..program import Block, Program
 from .angles import CIRCULAR, gather_angles, print_angles
-from .c_functions import each_name
-from .straight import CONDITIONS, Piece, Pieces, cut, references
-
-PATTERNS: dict[str, str] = {
-    "add": "{} + {}",
-    "sub": "{} - {}",
-    "mul": "{}*{}",
-    "div": "{}/{}",
-    "neg": "-{}",
-    "abs": "abs_of({})",
-    "sign": "sign_of({})",
-    "min": "smaller({}, {})",
-    "max": "larger({}, {})",
-    "sin": "sine_of({})",
-    "cos": "cosine_of({})",
-    **dict.fromkeys(("pow", "atan2"), "each_{}({{}}, {{}})"),
-    **{name: "each_{}({{}})" for name in ("sqrt", *ELEMENTARY) if name not in ("sin", "cos")},
-}
-PATTERNS.update({name: text.format(name) for name, text in PATTERNS.items() if text.startswith("each_")})
-
-CONDITION_PATTERNS: dict[str, str] = {
-    "lt": "({} < {})",
-    "le": "({} <= {})",
-    "eq": "({} == {})",
-    "not": "({} == 0.0)",
-    "and": "(({} != 0.0) & ({} != 0.0))",
-    "or": "(({} != 0.0) | ({} != 0.0))",
-}
-#: Operations in which a constant may stand beside a value as it is; elsewhere it must become a ``real``.
-ARITHMETIC = frozenset({"add", "sub", "mul", "div", "lt", "le", "eq"})
-
-#: operation -> definition it needs; NaN wins in smaller and larger, as in numpy.minimum.
-HELPERS: dict[str, str] = {
-    "sign": "EOMGEN_SHARED inline real sign_of(real a)\n{\n"
-    "    return choose(a > 0.0, same(1.0), choose(a < 0.0, same(-1.0), choose(a == 0.0, same(0.0), a)));\n}\n",
-    "min": "EOMGEN_SHARED inline real smaller(real a, real b)\n{\n    return choose((a <= b) | (a != a), a, b);\n}\n",
-    "max": "EOMGEN_SHARED inline real larger(real a, real b)\n{\n    return choose((a >= b) | (a != a), a, b);\n}\n",
-    **{
-        name: f"EOMGEN_EACH{'_PAIR' if name in ('pow', 'atan2') else ''}(each_{name}, {name})\n"
-        for name, text in PATTERNS.items()
-        if text.startswith("each_")
-    },
-}
+from .c_functions import each_lane, each_name
+from .straight import Pieces, PrintedFunction, cut, references
 
 SIGNATURE = (
     "real t, const real *restrict x, const real *restrict u,\n"
@@ -74,13 +33,14 @@ def literal(value: float) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-class _Printer:
+class _CPrinter:
     """Prints the statements of one block; variables are numbered through all its pieces."""
 
     def __init__(self, program: Program, references: dict[int, str]) -> None:
         self._graph, self._nodes, self._calls = program.graph, program.graph.nodes, program.graph.calls
         self._angles: dict[int, int] = {}  #: angles whose sin and cos are there -> their places
         self._fixed = references
+        self._beside_numbers = operations_with(lambda row: row.takes_numbers)
         self._variables: dict[int, str] = {}
         self.used: set[str] = set()  #: arguments read or written since last emptied
 
@@ -104,38 +64,38 @@ class _Printer:
 
     def operands(self, node: Node) -> list[str]:
         """The operands of an operation; beside a value, arithmetic takes a number as it is."""
-        if node[0] in ARITHMETIC and not all(self._nodes[k][0] == "const" for k in node[1:]):
+        if node[0] in self._beside_numbers and not all(self._nodes[k][0] == "const" for k in node[1:]):
             return [self.operand(k) for k in node[1:]]
         return [self.real(k) for k in node[1:]]
 
-    def condition(self, i: int, piece: Piece) -> str:
+    def condition(self, i: int, piece: PrintedFunction) -> str:
         if i in piece.inlined:
             node = self._nodes[i]
-            return CONDITION_PATTERNS[node[0]].format(*self.operands(node))
+            return OPERATIONS[node[0]].c.format(*self.operands(node))
         return f"({self.real(i)} != 0.0)"
 
-    def failed(self, i: int, piece: Piece | None) -> str:
+    def failed(self, i: int, piece: PrintedFunction | None) -> str:
         """The text of a check that is not passed; NaN passes, and is found in the result."""
         node = self._nodes[i]
         if piece is not None and i in piece.inlined and node[0] == "lt":
             return "{} >= {}".format(*self.operands(node))
         return f"{self.real(i)} <= 0.0"
 
-    def _value(self, i: int, piece: Piece) -> str:
+    def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
         kind = node[0]
-        if kind == "select":
-            return f"choose({self.condition(node[1], piece)}, {self.real(node[2])}, {self.real(node[3])})"
-        if kind in CONDITIONS:
-            return f"choose({CONDITION_PATTERNS[kind].format(*self.operands(node))}, same(1.0), same(0.0))"
         if kind in self._calls:
             function, orders = self._calls[kind]
             return f"{each_name(function.name, orders)}({', '.join(map(self.real, node[1:]))})"
         if kind in CIRCULAR and node[1] in self._angles:
             return f"{'sines' if kind == 'sin' else 'cosines'}[{self._angles[node[1]]}]"
-        return PATTERNS[kind].format(*self.operands(node))
+        row = OPERATIONS[kind]
+        if row.kind != ARITHMETIC and row.chooses:
+            return row.c.format(self.condition(node[1], piece), *map(self.real, node[2:]))
+        text = row.c.format(*self.operands(node))
+        return f"choose({text}, same(1.0), same(0.0))" if row.kind == CONDITION else text
 
-    def lines(self, piece: Piece) -> list[str]:
+    def lines(self, piece: PrintedFunction) -> list[str]:
         result: list[str] = []
         loaded: set[int] = set()
         angles = gather_angles(self._graph, piece)
@@ -153,7 +113,7 @@ class _Printer:
                 self._statement(i, piece, loaded, result)
         return result
 
-    def _statement(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _statement(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         if i not in piece.inlined:
             self._load(i, piece, loaded, result)
             result.append(f"const real {self._name(i)} = {self._value(i, piece)};")
@@ -168,7 +128,7 @@ class _Printer:
             self.used.add("w")
             result.append(f"w[{piece.stores[i]}] = {self._name(i)};")
 
-    def _load(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _load(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read values of earlier pieces just before their first use."""
         for k in self._nodes[i][1:]:
             if k in piece.inlined:
@@ -176,7 +136,7 @@ class _Printer:
             else:
                 self._read(k, piece, loaded, result)
 
-    def _read(self, i: int, piece: Piece, loaded: set[int], result: list[str]) -> None:
+    def _read(self, i: int, piece: PrintedFunction, loaded: set[int], result: list[str]) -> None:
         """Read a value of an earlier piece, if it is one."""
         if i in piece.loads and i not in loaded:
             loaded.add(i)
@@ -206,7 +166,7 @@ def print_block(program: Program, block: Block) -> Printed:
 
 def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, str]) -> Printed:
     """Print cut statements as one function, or as several and one that calls them."""
-    printer = _Printer(program, texts)
+    printer = _CPrinter(program, texts)
     main = _direct(printer, pieces) + [f"EOMGEN_REJECT({printer.failed(i, None)})" for i in pieces.checks]
     used = {*printer.used, *(["out"] if pieces.direct else [])}
     functions: list[tuple[str, str]] = []
@@ -224,7 +184,7 @@ def print_pieces(program: Program, name: str, pieces: Pieces, texts: dict[int, s
     return Printed(_function(f"static flag {name}", used, main), tuple(functions), pieces.work)
 
 
-def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
+def _direct(printer: _CPrinter, pieces: Pieces) -> list[str]:
     """Results that need no statement; a long run of zeros becomes a loop that later results overwrite."""
     texts = [(k, printer.real(i)) for k, i in pieces.direct]
     zeros = [k for k, text in texts if text == "same(0.0)"]
@@ -243,8 +203,22 @@ def print_precompute(program: Program) -> Printed:
     return print_pieces(program, "precompute_block", pieces, texts)
 
 
+def helper(row: Operation) -> str:
+    """The definition that the C text of an operation needs, in every lane; empty where headers have it."""
+    letters = "abc"[: row.arity]
+    name = row.c.partition("(")[0]
+    head = f"EOMGEN_SHARED inline real {name}({', '.join(f'real {x}' for x in letters)})\n{{\n"
+    if row.body:
+        return f"{head}    return {row.body};\n}}\n"
+    if not name.startswith("each_"):
+        return ""
+    if row.arity < 3:
+        return f"EOMGEN_EACH{'_PAIR' if row.arity == 2 else ''}({name}, {row.name})\n"
+    return f"{head}    real y = same(0.0);\n    {each_lane(row.name, letters)}\n    return y;\n}}\n"
+
+
 def used_helpers(program: Program, roots: Sequence[Expr]) -> list[str]:
     """Definitions of the helper functions that these expressions need."""
     nodes = program.graph.nodes
     operations = {nodes[i][0] for i in reachable(program.graph, (y.id for y in roots))}
-    return [text for operation, text in HELPERS.items() if operation in operations]
+    return [text for name, row in OPERATIONS.items() if name in operations and (text := helper(row))]

@@ -22,8 +22,8 @@ def emit_numpy(program: Program, bundled: bool = False) -> SourceSet:
     Returns
     -------
     SourceSet
-        ``_core.py``, which imports NumPy, ``.runtime.numpy_core`` and ``.numeric.functions`` only, ``model.json``, and
-        if bundled ``native_f.py`` for a native function ``f``.
+        ``_core.py``, which imports NumPy, ``.runtime.numpy_core`` and ``.numeric.user_functions`` only; ``model.json``;
+        if bundled, ``native_f.py`` for a native function ``f``.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Stage emit: the functions a program calls -> Python text that makes them from ``numeric.functions``; twin files."""
+"""Stage emit: the functions a program calls -> Python text that makes them; twin files."""
 
 from __future__ import annotations
 
 from ..errors import UsageError
 from ..graph.functions import Function
-from ..numeric.functions import Curve, Surface, Twin
+from ..numeric.user_functions import Curve, Surface, Twin
 from ..program import Program
 from .c_functions import used_calls
 
@@ -26,7 +26,7 @@ def define_functions(program: Program, bundled: bool) -> tuple[list[str], list[s
     """
     calls = used_calls(program)
     kinds = {type(f.require_evaluator()).__name__ for f, _ in calls.values() if bundled or f.native is None}
-    imports = [f"from .numeric.functions import {', '.join(sorted(kinds))}"] if kinds else []
+    imports = [f"from .numeric.user_functions import {', '.join(sorted(kinds))}"] if kinds else []
     definitions = []
     for f, _ in calls.values():
         if f.native is None:

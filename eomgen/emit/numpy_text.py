@@ -7,36 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..graph.elementary import ELEMENTARY
 from ..graph.substitute import symbols_of
+from ..operations import CONDITION, OPERATIONS
 from ..program import Block, Program
-from .straight import CONDITIONS, Piece, Pieces, cut, references
-
-PATTERNS: dict[str, str] = {
-    "add": "{} + {}",
-    "sub": "{} - {}",
-    "mul": "{} * {}",
-    "div": "{} / {}",
-    "neg": "-{}",
-    "pow": "np.power({}, {})",
-    "atan2": "np.arctan2({}, {})",
-    "min": "np.minimum({}, {})",
-    "max": "np.maximum({}, {})",
-    **{name: f"np.{name}({{}})" for name in ("sqrt", "abs", "sign")},
-    **{name: f"np.{function.array}({{}})" for name, function in ELEMENTARY.items()},
-}
-
-CONDITION_PATTERNS: dict[str, str] = {
-    "lt": "np.less({}, {})",
-    "le": "np.less_equal({}, {})",
-    "eq": "np.equal({}, {})",
-    "not": "np.logical_not({})",
-    "and": "np.logical_and({}, {})",
-    "or": "np.logical_or({}, {})",
-}
+from .straight import Pieces, PrintedFunction, cut, references
 
 
-class _Printer:
+class _NumpyPrinter:
     def __init__(self, program: Program, references: dict[int, str]) -> None:
         self._nodes, self._calls = program.graph.nodes, program.graph.calls
         self._fixed = references
@@ -52,24 +29,23 @@ class _Printer:
             return f"({text})" if text.startswith("-") else text
         return self._fixed.get(i) or self._name(i)
 
-    def condition(self, i: int, piece: Piece) -> str:
+    def condition(self, i: int, piece: PrintedFunction) -> str:
         if i in piece.inlined:
             node = self._nodes[i]
-            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+            return OPERATIONS[node[0]].numpy.format(*map(self.operand, node[1:]))
         return f"np.not_equal({self.operand(i)}, 0.0)"
 
-    def _value(self, i: int, piece: Piece) -> str:
+    def _value(self, i: int, piece: PrintedFunction) -> str:
         node = self._nodes[i]
-        if node[0] == "select":
-            return f"np.where({self.condition(node[1], piece)}, {self.operand(node[2])}, {self.operand(node[3])})"
-        if node[0] in CONDITIONS:
-            return CONDITION_PATTERNS[node[0]].format(*map(self.operand, node[1:])) + " * 1.0"
         if node[0] in self._calls:
             function, orders = self._calls[node[0]]
             return f"call_{function.name}({', '.join([*map(self.operand, node[1:]), *map(str, orders)])})"
-        return PATTERNS[node[0]].format(*map(self.operand, node[1:]))
+        row = OPERATIONS[node[0]]
+        if row.chooses:
+            return row.numpy.format(self.condition(node[1], piece), *map(self.operand, node[2:]))
+        return row.numpy.format(*map(self.operand, node[1:])) + " * 1.0" * (row.kind == CONDITION)
 
-    def lines(self, piece: Piece) -> list[str]:
+    def lines(self, piece: PrintedFunction) -> list[str]:
         result = [f"{self._name(i)} = w[{slot}]" for i, slot in sorted(piece.loads.items(), key=lambda pair: pair[1])]
         for i in piece.statements:
             if i not in piece.inlined:
@@ -91,7 +67,7 @@ def _function(name: str, arguments: str, doc: str, lines: Sequence[str]) -> str:
 def print_block(program: Program, block: Block) -> str:
     """The functions of a block, the last of them ``<name>(t, x, u, c)``."""
     pieces = cut(program.graph, block.outputs, block.checks, program.parameter_only, program.limits.statements)
-    printer = _Printer(program, references(program, block.inputs))
+    printer = _NumpyPrinter(program, references(program, block.inputs))
     start = [f"out = np.empty(({block.n_out}, *x.shape[1:]))"]
     if program.time in symbols_of((*block.outputs, *block.checks)):
         start.append("t = np.asarray(t, dtype=float)[()]")  # never a Python float, whose division by zero raises
@@ -106,7 +82,7 @@ def print_precompute(program: Program) -> str:
     """``precompute(p)``: the constants c that the blocks read."""
     graph, n = program.graph, len(program.parameters)
     pieces = cut(graph, program.hoisted, (), frozenset(), program.limits.statements)
-    printer = _Printer(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
+    printer = _NumpyPrinter(program, {graph.symbol(name).id: f"x[{k}]" for k, name in enumerate(program.parameters)})
     start = [
         "t = u = c = None",
         "x = np.array(p, dtype=float)",
@@ -118,7 +94,7 @@ def print_precompute(program: Program) -> str:
 
 
 def _print_pieces(
-    printer: _Printer, name: str, doc: str, pieces: Pieces, start: Sequence[str], end: Sequence[str]
+    printer: _NumpyPrinter, name: str, doc: str, pieces: Pieces, start: Sequence[str], end: Sequence[str]
 ) -> str:
     main = [*start, *_direct(printer, pieces)]
     main += [f"good.append(np.less(0.0, {printer.operand(i)}))" for i in pieces.checks]
@@ -136,7 +112,7 @@ def _print_pieces(
     return "\n\n".join(functions)
 
 
-def _direct(printer: _Printer, pieces: Pieces) -> list[str]:
+def _direct(printer: _NumpyPrinter, pieces: Pieces) -> list[str]:
     texts = [(k, printer.operand(i)) for k, i in pieces.direct]
     lines = [f"out[{k}] = {text}" for k, text in texts if text != "0.0"]
     return ["out[...] = 0.0", *lines] if len(lines) < len(texts) else lines

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import replace
-from importlib.resources import files
+from textwrap import fill
 from typing import Any
 
 from ..errors import UsageError
 from ..layer import read_layer
 from ..program import Program
+from ..targets import find_target
 from ..texts import summary_text
 from .c import emit_c
-from .calls import describe_calls
+from .carried import carry
 from .layouts import describe_layouts
 from .numpy import emit_numpy
-from .sources import SourceSet, render
+from .python_calls import describe_calls
+from .slim import carry_slim
+from .sources import SourceSet, metadata_json, render
 
 #: Annotated attributes of the package, all of its default module.
 ANNOTATED: tuple[tuple[str, str], ...] = (
@@ -35,26 +38,21 @@ FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces"
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
-#: Files of verification/ that need no equations.
-VERIFICATION = (
-    *("__init__.py", "cases.py", "comparison.py", "differences.py", "finding.py"),
-    *("identities.py", "jacobians.py", "recorded.py", "selftest.py", "verify.py"),
-)
-#: Files of api/ that need no equations.
-FACADE = ("__init__.py", "module.py")
-#: Files of the other folders that no package needs: of eomgen's own cache, and of files of robots.
-ELSEWHERE = frozenset({"files/kept.py", "files/locks.py", "limits/files.py"})
 PICTURES = ("draw", "draw_branches")
 METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
+#: What a slim package has of them.
+SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 
 
-def emit_package(program: Program, target: str) -> SourceSet:
+def emit_package(program: Program, target: str, slim: bool = False) -> SourceSet:
     """All files of an exported package, relative to its own folder.
 
     Parameters
     ----------
     program : Program
     target : {'cython', 'numpy', 'c'}
+    slim : bool, optional
+        Only calls and runs, as ``cython`` or ``numpy``; everything else refuses by name.
 
     Returns
     -------
@@ -65,18 +63,20 @@ def emit_package(program: Program, target: str) -> SourceSet:
     Raises
     ------
     UsageError
-        An unknown target.
+        An unknown target, or ``slim`` for a library of C, which holds no Python.
     """
-    makers: dict[str, Callable[[Program], dict[str, str]]] = {"cython": _cython, "numpy": _numpy, "c": _c_library}
-    if target not in makers:
-        raise UsageError(f"no target {target!r}; there are {', '.join(makers)}")
-    return SourceSet(makers[target](replace(program, metadata={**program.metadata, "target": target})))
+    row = find_target(target)
+    if slim and not row.module:
+        raise UsageError(f"target {target} holds no Python that could be left out; slim is for target cython or numpy")
+    program = replace(program, metadata={**program.metadata, "target": target})
+    return SourceSet({"model.json": metadata_json(program), **row.files(program, _context(program, slim))})
 
 
-def _cython(program: Program) -> dict[str, str]:
+def cython_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Sources in C and Cython, what builds them, and what of eomgen they need."""
     sources = emit_c(program)
     written = (*sources, *read_layer())
-    context = _context(program) | {
+    context |= {
         "c_files": [name for name in written if name.endswith(".c")],
         "headers": [name for name in written if name.endswith((".h", ".pxi"))],
     }
@@ -84,20 +84,22 @@ def _cython(program: Program) -> dict[str, str]:
         **sources,
         **read_layer(),
         "setup.py": render("python/setup.py.j2", context),
-        **_python_files(context),
-        **_runtime_files(),
+        **_python_files(context, {}),
     }
 
 
-def _numpy(program: Program) -> dict[str, str]:
-    return {**emit_numpy(program, bundled=True), **_python_files(_context(program)), **_runtime_files()}
+def numpy_package(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Functions of NumPy arrays, and what of eomgen they need."""
+    own = emit_numpy(program, bundled=True)
+    return {**own, **_python_files(context, own)}
 
 
-def _c_library(program: Program) -> dict[str, str]:
+def c_library(program: Program, context: dict[str, Any]) -> dict[str, str]:
+    """Sources, headers, Makefile."""
     sources = emit_c(program)
     c_files = [name for name in sources if name.endswith(".c")]
     objects = [name.removesuffix(".c") + ".o" for name in c_files]
-    context = _context(program) | {"c_files": c_files, "object_files": objects}
+    context |= {"c_files": c_files, "object_files": objects}
     return {
         **sources,
         "Makefile": render("c/Makefile.j2", context),
@@ -105,32 +107,27 @@ def _c_library(program: Program) -> dict[str, str]:
     }
 
 
-def _python_files(context: dict[str, Any]) -> dict[str, str]:
-    names = ("__init__.py", "__init__.pyi", "selftest.py", "pyproject.toml", "README.md")
-    return {"py.typed": "", **{name: render(f"python/{name}.j2", context) for name in names}}
+def _python_files(context: dict[str, Any], core: Mapping[str, str]) -> dict[str, str]:
+    """What is generated in Python besides the core, and all of eomgen that it needs."""
+    slim = context["slim"]
+    names = ("__init__.py", "__init__.pyi", *(() if slim else ("selftest.py",)))
+    own = {name: render(f"python/{name}.j2", context) for name in names}
+    signals = bool(context["metadata"].get("signals"))
+    found = carry_slim({**core, **own}, signals) if slim else carry({**core, **own})
+    context = context | {"folders": sorted({name.partition("/")[0] for name in found if "/" in name})}
+    about = {name: render(f"python/{name}.j2", context) for name in ("pyproject.toml", "README.md")}
+    return {"py.typed": "", **own, **about, **found}
 
 
-def _runtime_files() -> dict[str, str]:
-    """Files of eomgen as they are: of its root, of limits/ to ensembles/ but ELSEWHERE, and of verification/."""
-    root = files("eomgen")
-    found = {name: (root / name).read_text(encoding="utf-8") for name in ("errors.py", "kernel_table.py", "texts.py")}
-    for folder in ("limits", "files", "numeric", "runtime", "analysis", "simulation", "ensembles"):
-        for item in sorted((root / folder).iterdir(), key=lambda item: item.name):
-            if item.name.endswith(".py") and f"{folder}/{item.name}" not in ELSEWHERE:
-                found[f"{folder}/{item.name}"] = item.read_text(encoding="utf-8")
-    for name in FACADE:
-        found[f"api/{name}"] = (root / "api" / name).read_text(encoding="utf-8")
-    for name in VERIFICATION:
-        found[f"verification/{name}"] = (root / "verification" / name).read_text(encoding="utf-8")
-    return found
-
-
-def _context(program: Program) -> dict[str, Any]:
+def _context(program: Program, slim: bool) -> dict[str, Any]:
     metadata = program.metadata
     doc = str(metadata.get("doc") or "").strip()
     q = list(metadata.get("q_reference") or [0.0] * program.sizes.n_q)
+    calls, methods = describe_calls(program), SLIM_METHODS if slim else METHODS
+    attributes, forms = [*(name for name, _ in ANNOTATED), *methods], () if slim else ("minimal",)
     return {
         "name": program.name,
+        "slim": slim,
         "prefix": program.name.upper(),
         "doc": doc,
         "description": summary_text(doc.splitlines()[0] if doc else f"Equations of motion of {program.name}"),
@@ -138,10 +135,11 @@ def _context(program: Program) -> dict[str, Any]:
         "compiled": metadata["target"] == "cython",
         "metadata": metadata,
         "layouts": describe_layouts(program),
-        "calls": describe_calls(program),
-        "attributes": [*(name for name, _ in ANNOTATED), *METHODS],
+        "calls": [call for call in calls if not slim or call.text.partition("(")[0] in attributes],
+        "attributes": attributes,
+        "listed": fill(", ".join(f'"{name}"' for name in (*attributes, *forms)), 110).splitlines(),
         "annotations": ANNOTATED,
-        "methods": METHODS,
+        "methods": methods,
         "p_values": _numbers(metadata.get("p_values")),
         "u_values": _numbers(metadata.get("u_values")),
         "x_values": _numbers([*q, *[0.0] * program.sizes.n_v]),

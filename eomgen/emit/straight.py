@@ -10,14 +10,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..graph.core import Expr, Graph
 from ..graph.schedule import chunk, order
 from ..graph.traverse import LEAVES
+from ..operations import CONDITION, operations_with
 from ..program import Program
 from ..records import dataclass
 
-CONDITIONS = frozenset({"lt", "le", "eq", "not", "and", "or"})
-
 
 @dataclass(frozen=True)
-class Piece:
+class PrintedFunction:
     """A run of statements, printed as one function.
 
     Attributes
@@ -46,7 +45,7 @@ class Piece:
 class Pieces:
     """All of a block: its pieces, results that need no statement, and the work slots used."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PrintedFunction, ...]
     direct: tuple[tuple[int, int], ...]  #: (place in the result, id of a leaf or a hoisted value)
     checks: tuple[int, ...]  #: checks that are leaves or hoisted values
     work: int
@@ -84,7 +83,7 @@ def cut(
                 work += 1
             slots[i] = free.pop()
         pieces.append(
-            Piece(
+            PrintedFunction(
                 statements=c.statements,
                 loads={i: slots[i] for i in c.imports},
                 stores={i: slots[i] for i in c.exports},
@@ -126,11 +125,11 @@ def _pair(graph: Graph, sequence: list[int]) -> list[int]:
 
 def _conditions(graph: Graph, statements: Iterable[int], kept: set[int], checks: set[int]) -> frozenset[int]:
     """Conditions of this piece that are used as conditions only."""
-    nodes = graph.nodes
+    nodes, conditions = graph.nodes, operations_with(lambda row: row.kind == CONDITION)
     found = set()
     for i in statements:
         node = nodes[i]
-        if node[0] in CONDITIONS and i not in kept and (i not in checks or node[0] == "lt"):
+        if node[0] in conditions and i not in kept and (i not in checks or node[0] == "lt"):
             found.add(i)
         found.difference_update(node[2:] if node[0] == "select" else node[1:])
     return frozenset(found)

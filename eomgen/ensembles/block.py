@@ -1,4 +1,4 @@
-"""A block of cases -> Block, what became of its runs; in compiled code on several threads, or one by one in Python."""
+"""A block of cases -> RunBlock, what became of its runs: in compiled code on threads, or one by one in Python."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..runtime.signals import Forcing
 from ..simulation.compiled import MESSAGES, RESET_FAILED, STOPPED, TERMINAL, TOO_SMALL, ZENO, stepper_options
 from ..simulation.events import WAIT, Events
 from ..simulation.simulate import simulate
-from .cases import UNASSEMBLED, Cases, assemble_states
+from .given_cases import UNASSEMBLED, Cases, assemble_states
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -78,7 +78,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Block:
+class RunBlock:
     """What became of the runs of a block.
 
     Attributes
@@ -116,7 +116,7 @@ class Block:
 
 def run_block(
     module: BoundModel, cases: Cases, plan: Plan, threads: int = 1, watch: Callable[[int], None] | None = None
-) -> Block:
+) -> RunBlock:
     """Run every case of a block.
 
     Parameters
@@ -140,7 +140,7 @@ def run_block(
     block = _spread(found, good, cases.count, plan.span[0]) if some else found
     block.status[failed] = UNASSEMBLED
     project(module, cases, block, plan)
-    return Block(**{**vars(block), "words": {**block.words, **told}})
+    return RunBlock(**{**vars(block), "words": {**block.words, **told}})
 
 
 def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
@@ -149,7 +149,7 @@ def _rows(cases: Cases, chosen: Any) -> dict[str, Array]:
 
 def _run_compiled(
     module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
-) -> Block:
+) -> RunBlock:
     core: Any = eager(module.core)
     forcing = find_forcing(module, plan)
     forcing.attach(module)
@@ -162,7 +162,7 @@ def _run_compiled(
     work(ensemble, min(threads, max(len(x0), 1)), watch)
     samples, notes = (None if x is None else x.transpose(2, 1, 0) for x in (ensemble.samples, ensemble.notes))
     numbers = {name: getattr(ensemble, name) for name in ("t", "status", "failure", "failure_time", *COUNTS)}
-    return Block(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
+    return RunBlock(x=ensemble.x.T, samples=samples, notes=notes, **numbers)
 
 
 def find_forcing(module: BoundModel, plan: Plan) -> Forcing:
@@ -245,7 +245,7 @@ def work(ensemble: Any, threads: int, watch: Callable[[int], None] | None) -> No
 
 def _run_python(
     module: BoundModel, x0: Array, rows: Mapping[str, Array], plan: Plan, threads: int, watch: Any
-) -> Block:
+) -> RunBlock:
     """The same through ``simulate``, one run after the other: where there is no compiled stepper for the method."""
     count, n = x0.shape
     sizes = None if plan.t_eval is None else (n, len(plan.t_eval), count)
@@ -254,7 +254,7 @@ def _run_python(
     notes = np.full((2 + n, plan.keep_events, count), np.nan) if names else None
     samples = None if sizes is None else np.full(sizes, np.nan)
     x, t = np.full((n, count), np.nan), np.full(count, plan.span[0])
-    block = Block(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
+    block = RunBlock(x, t, samples, status, failure, np.zeros(count), steps, rejected, evaluations, noted, notes)
     for k in range(count):
         bound = module.bind(*(rows[name] if rows[name].ndim == 1 else rows[name][k] for name in ("p", "u")))
         constants = {name: float(bound.u[module.u_names.index(name)]) for name in plan.constants}
@@ -290,7 +290,7 @@ def _take_notes(notes: Array, t_events: list[Array], x_events: list[Array]) -> N
     notes[:, : len(order)] = found[:, order]
 
 
-def _spread(found: Block, good: Integers, count: int, start: float) -> Block:
+def _spread(found: RunBlock, good: Integers, count: int, start: float) -> RunBlock:
     """A block with places for the runs that could not be begun."""
 
     def widened(array: Any, fill: float) -> Any:
@@ -303,10 +303,10 @@ def _spread(found: Block, good: Integers, count: int, start: float) -> Block:
         name: value if name == "words" or value is None else widened(value, fills.get(name, 0))
         for name, value in vars(found).items()
     }
-    return Block(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
+    return RunBlock(**{**wide, "words": {int(good[k]): text for k, text in found.words.items()}})
 
 
-def project(module: BoundModel, cases: Cases, block: Block, plan: Plan) -> None:
+def project(module: BoundModel, cases: Cases, block: RunBlock, plan: Plan) -> None:
     """Bring the stored states onto the constraints, as ``simulate`` does; a state that cannot be becomes NaN."""
     if not module.n_rows and not module.layout.space:
         return
@@ -318,7 +318,9 @@ def project(module: BoundModel, cases: Cases, block: Block, plan: Plan) -> None:
         _project_columns(module, cases, block, plan, block.notes[2:], block.notes[1])
 
 
-def _project_columns(module: BoundModel, cases: Cases, block: Block, plan: Plan, states: Array, times: Array) -> None:
+def _project_columns(
+    module: BoundModel, cases: Cases, block: RunBlock, plan: Plan, states: Array, times: Array
+) -> None:
     """Project states (n_x, m, k) at times (m, k) where they are."""
     led = find_forcing(module, plan).constrained
     if cases.alike and not led:

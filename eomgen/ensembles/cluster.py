@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.counts import as_count
-from ..runtime.names import require
-from .block import LOST, MEANING, Block, Plan, find_events
-from .blocks import RUNS, Kept, keep, reduce_block
-from .cases import Cases
+from ..runtime.near_names import require
+from .block import LOST, MEANING, Plan, RunBlock, find_events
+from .given_cases import Cases
 from .handle import Handle
 from .reductions import Custom, Reduction
+from .run_blocks import RUNS, Kept, keep, reduce_block
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -131,7 +131,7 @@ def _lost(module: BoundModel, cases: Cases, plan: Plan, reduction: Reduction, er
     notes = np.full((2 + sizes[0], plan.keep_events, k), np.nan) if find_events(module, plan).names else None
     status = np.full(k, LOST, dtype=np.intc)
     x, t = np.full((sizes[0], k), np.nan), np.full(k, plan.span[0])
-    block = Block(x, t, samples, status, failure, np.zeros(k), steps, rejected, evaluations, noted, notes)
+    block = RunBlock(x, t, samples, status, failure, np.zeros(k), steps, rejected, evaluations, noted, notes)
     words = dict.fromkeys(range(k), f"{MEANING[LOST]}: {type(error).__name__}: {error}")
     if isinstance(reduction, Custom):  # the function has nothing to work on
         return {f"runs_{name}": getattr(block, name) for name in RUNS}, words

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
+from ..runtime.near_names import require, unknown
 from ..runtime.origin import origin, plain, spell_input
 from ..simulation.simulate import simulate
 from .block import EVENT, MEANING, Plan, find_events, find_forcing
-from .cases import Cases
-from .reductions import Reduction, States, Statistics, names_of, summarise, with_outputs
+from .given_cases import Cases
+from .reductions import KeptStates, Reduction, Statistics, names_of, summarise, with_outputs
 
 if TYPE_CHECKING:
     import pandas
@@ -83,10 +83,10 @@ class Ensemble:
         self.t_end, self.status = runs["t"], runs["status"]
         self.steps, self.rejected, self.evaluations = runs["steps"], runs["rejected"], runs["evaluations"]
         self.event_names, self.event_counts = tuple(find_events(module, plan).names), runs["noted"]
-        self._notes = kept.get("notes") if isinstance(reduction, States) else None
+        self._notes = kept.get("notes") if isinstance(reduction, KeptStates) else None
         self._failure, self._failure_time = runs["failure"], runs["failure_time"]
         self.reached = self.samples = self.x = None
-        if isinstance(reduction, States):
+        if isinstance(reduction, KeptStates):
             self.reached, self.samples = kept.get("x"), kept.get("samples")
             self.x = None if self.reached is None else np.where(self.ok, self.reached, np.nan)
             kept = {}
@@ -240,7 +240,7 @@ class Ensemble:
         limit : int
             Draw so many runs at most, evenly chosen.
         """
-        from .picture import draw
+        from .column_picture import draw
 
         return draw(self, name, ax, limit)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import MissingDependencyError, ToolchainError, UsageError
-from ..files.entry import MANIFEST, read_entry
+from ..files.build_folder import MANIFEST, read_entry
 from ..numeric.scales import Array
 from ..runtime.late import eager
 from ..runtime.pickling import restore

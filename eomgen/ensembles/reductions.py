@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from ..texts import shown
-from .block import EVENT, Block, Plan, inputs_at
-from .cases import Cases
+from .block import EVENT, Plan, RunBlock, inputs_at
+from .given_cases import Cases
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -27,11 +27,11 @@ GRAIN = 256  #: runs summarised at a time; fixed, so that rounding does not depe
 class Reduction(Protocol):
     """How blocks are boiled down."""
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays: ...
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays: ...
     def join(self, parts: Sequence[Arrays]) -> Arrays: ...
 
 
-class States:
+class KeptStates:
     """The last states, the samples where times were asked for, and the events.
 
     Parameters
@@ -43,7 +43,7 @@ class States:
     def __init__(self, kept: Sequence[str] = ("x", "samples", "notes")) -> None:
         self.kept = tuple(kept)
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
         """x (n_x, k), samples (n_x, m, k), notes (2 + n_x, m, k)."""
         return {name: getattr(block, name) for name in self.kept if getattr(block, name) is not None}
 
@@ -59,7 +59,7 @@ class Statistics:
     sample variance, The American Statistician 37 (1983).
     """
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
         """count, mean, squares, least, greatest (g, n, m) of each grain; m is 1 without t_eval."""
         if plan.t_eval is None or block.samples is None:
             ended = (block.status == 0) | (block.status == EVENT)
@@ -91,13 +91,13 @@ class Custom:
     Parameters
     ----------
     function : callable
-        ``function(block)`` with a :class:`~.block.Block` -> a mapping of names to arrays.
+        ``function(block)`` with a :class:`~.block.RunBlock` -> a mapping of names to arrays.
     """
 
-    def __init__(self, function: Callable[[Block], Mapping[str, Any]]) -> None:
+    def __init__(self, function: Callable[[RunBlock], Mapping[str, Any]]) -> None:
         self.function = function
 
-    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: Block) -> Arrays:
+    def reduce(self, module: BoundModel, cases: Cases, plan: Plan, block: RunBlock) -> Arrays:
         """As the function says."""
         made = self.function(block)
         if not isinstance(made, Mapping) or not all(isinstance(name, str) for name in made):
@@ -120,9 +120,9 @@ def choose_reduction(reduce: Any) -> Reduction:
     if reduce is not None and not isinstance(reduce, str):
         raise UsageError(f"{WANTED}, not {shown(reduce)}")
     if reduce in (None, "states"):
-        return States()
+        return KeptStates()
     if reduce == "events":
-        return States(["notes"])
+        return KeptStates(["notes"])
     if reduce == "statistics":
         return Statistics()
     raise UsageError(f"{WANTED}, not {reduce!r}")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.counts import read_count
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
 from ..runtime.signals import Forcing, Signal
@@ -22,10 +22,10 @@ from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
-from .blocks import RUNS, Kept, choose_size, run_local, split
-from .cases import Cases, collect_cases
 from .ensemble import Ensemble
+from .given_cases import Cases, collect_cases
 from .reductions import GRAIN, Reduction, choose_reduction
+from .run_blocks import RUNS, Kept, choose_size, run_local, split
 from .store import stored_length
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def simulate_many(
     reduce : {'states', 'statistics', 'events'} or callable, optional
         What to keep: every run's last state, its states at t_eval and its events (default); its events alone; or count,
         mean, variance, least and greatest of states and outputs over the runs; or what ``reduce(block)`` returns for
-        each :class:`~.block.Block`, a mapping of names to arrays.  Only what is kept takes memory.
+        each :class:`~.block.RunBlock`, a mapping of names to arrays.  Only what is kept takes memory.
     threads : int, optional
         Runs at a time; all processors by default.
     cluster : True, int, str or dask Client, optional

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.reading import open_plain
 from ..files.writing import remove_parts, write_whole
 from ..runtime.arrays import BROKEN, read_arrays
-from .blocks import LARGEST, RUNS
+from .run_blocks import LARGEST, RUNS
 
 FORMAT = "eomgen ensemble 1"
 RUNS_KEPT = tuple(f"runs_{name}" for name in RUNS)

@@ -2,8 +2,8 @@
 
 from . import amalgamated, augmented, embedding, gibbs_appell, hamilton, lagrange, newton_euler, recursive
 from .armature import with_armature
-from .equations import Method, TreeEquations
 from .given import GIVEN, take_given
+from .tree_equations import Method, TreeEquations
 
 METHODS: dict[str, Method] = {
     "embedding": with_armature(embedding.derive),

@@ -9,11 +9,12 @@ each equation of a cut joint or coupling.
 from __future__ import annotations
 
 from ..graph.core import Expr
+from ..graph.spatial import scaled, sub
 from ..kinematics import Kinematics
-from ..kinematics.units import Units
-from .equations import LinearSystem, TreeEquations
-from .free_bodies import FreeBodies, cut_joints, scaled, sub
+from ..kinematics.typical_sizes import Units
+from .free_bodies import FreeBodies, cut_joints
 from .free_body_system import Forces, Unknowns, free_body_equations
+from .tree_equations import LinearSystem, TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

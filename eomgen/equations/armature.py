@@ -12,7 +12,7 @@ from functools import partial
 from ..graph.core import Expr
 from ..graph.substitute import substitute
 from ..kinematics import Kinematics
-from .equations import Method, Rows, TreeEquations
+from .tree_equations import Method, Rows, TreeEquations
 
 
 def with_armature(method: Method) -> Method:
@@ -38,8 +38,8 @@ def add_armature(kinematics: Kinematics, tree: TreeEquations) -> TreeEquations:
     still = dict.fromkeys(kinematics.a, graph.zero)
     slopes: list[tuple[Expr, list[Expr]]] = []
     for name, inertia in drives:
-        if name in kinematics.freedoms:
-            k = kinematics.freedoms.index(name)
+        if name in kinematics.velocity_labels:
+            k = kinematics.velocity_labels.index(name)
             slope: list[Expr] = [graph.one if j == k else graph.zero for j in range(n)]
             rate, acceleration, rest = kinematics.v[k], kinematics.a[k], graph.zero
         else:

@@ -13,10 +13,10 @@ from dataclasses import replace
 from ..graph.core import Expr
 from ..kinematics import Kinematics
 from ..kinematics.loops import Constraints
-from ..kinematics.units import Units
+from ..kinematics.typical_sizes import Units
 from . import embedding, lagrange
 from .armature import with_armature
-from .equations import LinearSystem, TreeEquations
+from .tree_equations import LinearSystem, TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

@@ -20,7 +20,7 @@ from ..limits.inertia import WORTH_A_WORD
 from ..limits.rounding import EPS, TINY
 from ..numeric import algebra
 from ..numeric.partitions import partition
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 FREE = ("newton_euler", "amalgamated")  #: methods that never form the embedded mass matrix
 
@@ -43,7 +43,7 @@ def smallest_share(kinematics: Kinematics, mobility: Mobility, tree: TreeEquatio
 
     1 where there is no degree of freedom.
     """
-    m, names = kinematics.mechanism, kinematics.freedoms
+    m, names = kinematics.mechanism, kinematics.velocity_labels
     n, r = len(names), mobility.rank
     if n == r or m.negative:
         return 1.0

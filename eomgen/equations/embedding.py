@@ -17,16 +17,17 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
+from ..graph.spatial import Wrench, add, dot
 from ..graph.vectors import Mat3, Vec3
-from ..kinematics import Kinematics, Link, Twist
+from ..kinematics import Kinematics
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia, Wrench
+from ..kinematics.joint_rates import joint_rates, slide_accelerations
+from ..kinematics.link_axes import Rows, SlidingTriple, Turned, falling, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias
 from ..kinematics.parallel import Resolved, resolve_parallel
-from ..kinematics.rates import joint_rates, slide_accelerations
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, Rows, Turned, falling, turn_forces, turn_links
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -68,7 +69,7 @@ def _turned_system(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     rest: tuple[Expr, ...],
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
 ) -> tuple[Rows, tuple[Expr, ...]]:
     """M and h in turned velocities."""
     matrix = [list(row) for row in _composite_mass_matrix(resolved, inertias)]
@@ -81,20 +82,6 @@ def _cost(mass: Rows, bias: Sequence[Expr]) -> int:
     """Operations of the lower triangle and the bias, sines and cosines as many as they last."""
     found = count([*(x for i, row in enumerate(mass) for x in row[: i + 1]), *bias])
     return found.total + 12 * (found.functions.get("sin", 0) + found.functions.get("cos", 0))
-
-
-def _add(a: Twist, b: Twist) -> Twist:
-    return vec.add(a[0], b[0]), vec.add(a[1], b[1])
-
-
-def _project(column: Twist, wrench: Wrench) -> Expr:
-    return vec.dot(column[0], wrench[0]) + vec.dot(column[1], wrench[1])
-
-
-def _lift(link: Link, wrench: Wrench) -> Wrench:
-    """A wrench on the link (moment about its origin, force), about the parent's origin in parent axes."""
-    push = link.up(wrench[1])
-    return vec.add(link.up(wrench[0]), vec.cross(link.position, push)), push
 
 
 def _turning(omega: Vec3, alpha: Vec3) -> Mat3:
@@ -125,7 +112,7 @@ def _sweep(
     resolved: Resolved,
     inertias: list[SpatialInertia],
     a: tuple[Expr, ...],
-    blocks: Sequence[Block] = (),
+    blocks: Sequence[SlidingTriple] = (),
 ) -> tuple[Expr, ...]:
     """Newton-Euler: accelerations outwards, wrenches inwards, projected on the joints, some of them turned."""
     graph, links, twists = kinematics.graph, resolved.links, resolved.twists
@@ -158,9 +145,9 @@ def _sweep(
     for k in reversed(range(len(links))):
         link = links[k]
         for c, column in enumerate(link.columns):
-            result[link.first + c] = result[link.first + c] + _project(column, wrenches[k])
+            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
         if link.parent != GROUND:
-            wrenches[link.parent] = _add(wrenches[link.parent], _lift(link, wrenches[k]))
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
     return tuple(result)
 
 
@@ -178,12 +165,12 @@ def _composite_mass_matrix(resolved: Resolved, inertias: list[SpatialInertia]) -
             i = link.first + c
             wrench = composite[k].times(*column)
             for d in range(c + 1):
-                rows[i][link.first + d] = rows[link.first + d][i] = _project(link.columns[d], wrench)
+                rows[i][link.first + d] = rows[link.first + d][i] = dot(link.columns[d], wrench)
             outer, at = link, link.parent
             while at != GROUND:
-                wrench = _lift(outer, wrench)
+                wrench = outer.lift(wrench)
                 outer = links[at]
                 for d, other in enumerate(outer.columns):
-                    rows[i][outer.first + d] = rows[outer.first + d][i] = _project(other, wrench)
+                    rows[i][outer.first + d] = rows[outer.first + d][i] = dot(other, wrench)
                 at = outer.parent
     return tuple(tuple(row) for row in rows)

@@ -13,52 +13,13 @@ from ..frames import GROUND, Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian, jvp
+from ..graph.spatial import Twist, Wrench, add, cross_motion, cross_wrench, dot, scaled, sub
 from ..graph.substitute import substitute
-from ..kinematics import Kinematics, Link, Twist
-from ..kinematics.inertia import Wrench
+from ..kinematics import Kinematics
 from ..kinematics.loads import applied_wrenches, drive_inertias
 from ..records import dataclass
 
 Rows = tuple[tuple[Expr, ...], ...]
-
-
-def add(*terms: Twist) -> Twist:
-    """The sum of twists or wrenches."""
-    total = terms[0]
-    for term in terms[1:]:
-        total = vec.add(total[0], term[0]), vec.add(total[1], term[1])
-    return total
-
-
-def sub(a: Twist, b: Twist) -> Twist:
-    """a - b"""
-    return vec.sub(a[0], b[0]), vec.sub(a[1], b[1])
-
-
-def scaled(s: Expr, a: Twist) -> Twist:
-    """s a"""
-    return vec.scale(s, a[0]), vec.scale(s, a[1])
-
-
-def dot(a: Twist, b: Twist) -> Expr:
-    """Power of a wrench on a twist."""
-    return vec.dot(a[0], b[0]) + vec.dot(a[1], b[1])
-
-
-def cross_motion(v: Twist, m: Twist) -> Twist:
-    """v x m of a twist v and a motion vector m (Featherstone, RBDA, eq. 2.31)."""
-    return vec.cross(v[0], m[0]), vec.add(vec.cross(v[0], m[1]), vec.cross(v[1], m[0]))
-
-
-def cross_wrench(v: Twist, f: Wrench) -> Wrench:
-    """v x* f of a twist v and a wrench f (Featherstone, RBDA, eq. 2.32)."""
-    return vec.add(vec.cross(v[0], f[0]), vec.cross(v[1], f[1])), vec.cross(v[0], f[1])
-
-
-def lift(link: Link, wrench: Wrench) -> Wrench:
-    """A wrench on the link, about the parent's origin in parent axes."""
-    push = link.up(wrench[1])
-    return vec.add(link.up(wrench[0]), vec.cross(link.position, push)), push
 
 
 def seen_from(frame: Frame, twist: Twist) -> Twist:
@@ -95,7 +56,7 @@ class FreeBodies:
             self.loads.append(sub(cross_wrench(twist, link.spatial.times(*twist)), applied))
         self.forces = [self.graph.zero] * len(kinematics.v)
         self.along_cut: dict[str, Expr] = {}
-        place = {name: j for j, name in enumerate(kinematics.freedoms)}
+        place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
         for load in (load for terms in kinematics.forces for load in terms.coordinate_loads):
             if load.coordinate in place:
                 self.forces[place[load.coordinate]] = self.forces[place[load.coordinate]] + load.value
@@ -135,7 +96,7 @@ class FreeBodies:
         ]
         for link, reaction in zip(links, reactions, strict=True):
             if link.parent != GROUND:
-                result[link.parent] = add(result[link.parent], lift(link, reaction))
+                result[link.parent] = add(result[link.parent], link.lift(reaction))
         return result
 
     def powers(self, k: int, reaction: Wrench, a: Sequence[Expr], pulls: Sequence[Expr]) -> list[Expr]:
@@ -158,7 +119,7 @@ class FreeBodies:
 
 
 @dataclass(frozen=True)
-class CutJoint:
+class FreeBodyCut:
     """A cut joint between two bodies: rows W of C' = W V with V the twist of S relative to P, in S axes at S."""
 
     outer: int  #: link of the predecessor, GROUND for ground
@@ -210,13 +171,13 @@ class CutJoint:
             balances[self.outer] = sub(balances[self.outer], carried)
 
 
-def cut_joints(bodies: FreeBodies) -> list[CutJoint]:
+def cut_joints(bodies: FreeBodies) -> list[FreeBodyCut]:
     """The joints that close loops, as constraints between two free bodies."""
     kinematics = bodies.kinematics
     return [_cut(bodies, kinematics.mechanism.joints[k]) for k in kinematics.topology.cut]
 
 
-def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
+def _cut(bodies: FreeBodies, spec: JointSpec) -> FreeBodyCut:
     kinematics, graph = bodies.kinematics, bodies.graph
     poses = kinematics.poses
     pose = poses.relative(spec.predecessor, spec.successor)
@@ -227,7 +188,7 @@ def _cut(bodies: FreeBodies, spec: JointSpec) -> CutJoint:
     relative = sub(second, above)
     measured = any(name in bodies.along_cut for name in spec.coordinates) or spec.armature is not None
     kinds, rows, rest = _differentiate(bodies, spec, pose, relative, measured)
-    return CutJoint(
+    return FreeBodyCut(
         outer=links[0],
         inner=links[1],
         holder=holder,

@@ -11,12 +11,12 @@ from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist, Wrench, add, dot, scaled
 from ..graph.substitute import substitute
-from ..kinematics import Kinematics, Twist
-from ..kinematics.inertia import Wrench
-from ..kinematics.units import Units
-from .equations import LinearSystem, TreeEquations, linear_system
-from .free_bodies import CutJoint, FreeBodies, add, dot, lift, scaled
+from ..kinematics import Kinematics
+from ..kinematics.typical_sizes import Units
+from .free_bodies import FreeBodies, FreeBodyCut
+from .tree_equations import LinearSystem, TreeEquations, linear_system
 
 
 def free_body_equations(kinematics: Kinematics, method: str, system: LinearSystem) -> TreeEquations:
@@ -65,7 +65,7 @@ def _inverse_dynamics(bodies: FreeBodies) -> list[Expr]:
         for c, column in enumerate(link.columns):
             result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
         if link.parent != GROUND:
-            wrenches[link.parent] = add(wrenches[link.parent], lift(link, wrenches[k]))
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
     return result
 
 
@@ -93,7 +93,7 @@ class Unknowns:
 class Forces:
     """Multipliers of cut joints and couplings, their equations, and what they do to bodies and joints."""
 
-    def __init__(self, bodies: FreeBodies, cuts: Sequence[CutJoint], unknowns: Unknowns, units: Units) -> None:
+    def __init__(self, bodies: FreeBodies, cuts: Sequence[FreeBodyCut], unknowns: Unknowns, units: Units) -> None:
         self.bodies, self.cuts, self.unknowns = bodies, cuts, unknowns
         self.first = len(unknowns.symbols)
         self.rows = bodies.couplings

@@ -16,7 +16,7 @@ from ..graph.differentiate import gradient, jacobian, vjp
 from ..graph.substitute import substitute
 from ..graph.vectors import Vec3
 from ..kinematics import Kinematics
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -68,8 +68,8 @@ def _forces(kinematics: Kinematics) -> list[Expr]:
             loads += [*load.force, *load.torque]
         for along in terms.coordinate_loads:
             loads.append(along.value)
-            if along.coordinate in kinematics.freedoms:
-                moved.append(kinematics.v[kinematics.freedoms.index(along.coordinate)])
+            if along.coordinate in kinematics.velocity_labels:
+                moved.append(kinematics.v[kinematics.velocity_labels.index(along.coordinate)])
             else:
                 loop = kinematics.loop_coordinates
                 moved.append(loop.rates[loop.names.index(along.coordinate)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..graph.core import Expr
 from ..kinematics import Kinematics
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 GIVEN = "given"  #: what stands where the name of a method would
 

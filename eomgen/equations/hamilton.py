@@ -17,8 +17,8 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
 from ..kinematics.loads import drive_inertias
-from .energies import form_energies, generalized_forces
-from .equations import TreeEquations
+from .analytical import form_energies, generalized_forces
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -57,17 +57,17 @@ def cut_drives(kinematics: Kinematics) -> list[tuple[str, Expr]]:
     return [
         (s.coordinates[0], s.armature)
         for s in joints
-        if s.armature is not None and s.coordinates[0] not in kinematics.freedoms
+        if s.armature is not None and s.coordinates[0] not in kinematics.velocity_labels
     ]
 
 
 def _turned(kinematics: Kinematics, slopes: Sequence[Expr], momenta: Sequence[Expr]) -> list[Expr]:
     """Slopes by q -> generalized forces: N^T slopes, less w x p of turned axes."""
-    if not kinematics.balls:
+    if not kinematics.quaternion_slots:
         return list(slopes)
     graph = kinematics.graph
     result = vjp(list(kinematics.rates), list(slopes), list(kinematics.v))
-    for _, j in kinematics.balls:
+    for _, j in kinematics.quaternion_slots:
         w, p = (vec.vector(graph, x[j : j + 3]) for x in (kinematics.v, momenta))
         result[j : j + 3] = vec.sub(vec.vector(graph, result[j : j + 3]), vec.cross(w, p))
     return result

@@ -39,7 +39,7 @@ class IdleMotion:
 
     def problem(self, kinematics: Kinematics) -> Problem:
         """The fault, at the joint that moves the most."""
-        names, mechanism = kinematics.freedoms, kinematics.mechanism
+        names, mechanism = kinematics.velocity_labels, kinematics.mechanism
         v = self.v / np.abs(self.v).max()
         involved = [j for j in np.argsort(-np.abs(v), kind="stable") if abs(v[j]) > FAINT]
         largest = names[involved[0]]

@@ -12,8 +12,8 @@ from __future__ import annotations
 from ..graph import vectors as vec
 from ..graph.differentiate import gradient, jacobian, jvp, vjp
 from ..kinematics import Kinematics
-from .energies import form_energies, generalized_forces
-from .equations import TreeEquations
+from .analytical import form_energies, generalized_forces
+from .tree_equations import TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:
@@ -25,9 +25,9 @@ def derive(kinematics: Kinematics) -> TreeEquations:
     drift = jvp(momentum, kinematics.flow | kinematics.clock)
     total = kinematics.total_derivative(momentum)
     slope = gradient(kinetic - potential, q)
-    if kinematics.balls:
+    if kinematics.quaternion_slots:
         slope = vjp(list(kinematics.rates), slope, v)
-    for _, j in kinematics.balls:
+    for _, j in kinematics.quaternion_slots:
         w, p = (vec.vector(graph, x[j : j + 3]) for x in (v, momentum))
         slope[j : j + 3] = vec.sub(vec.vector(graph, slope[j : j + 3]), vec.cross(w, p))
     applied = generalized_forces(kinematics)

@@ -8,12 +8,13 @@ the wrench through each joint of the tree, and a multiplier for each equation of
 from __future__ import annotations
 
 from ..graph.core import Expr
+from ..graph.spatial import add, dot, scaled, sub
 from ..graph.symmetric import solve_symmetric
 from ..kinematics import Kinematics
-from ..kinematics.units import Units
-from .equations import LinearSystem, TreeEquations
-from .free_bodies import FreeBodies, add, cut_joints, dot, scaled, sub
+from ..kinematics.typical_sizes import Units
+from .free_bodies import FreeBodies, cut_joints
 from .free_body_system import Forces, Unknowns, free_body_equations
+from .tree_equations import LinearSystem, TreeEquations
 
 
 def derive(kinematics: Kinematics) -> TreeEquations:

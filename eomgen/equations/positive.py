@@ -15,8 +15,8 @@ from ..limits.rounding import TINY
 from ..numeric import algebra
 from ..numeric.definite import correlated, safely_positive
 from ..numeric.partitions import partition
-from .equations import TreeEquations
 from .idle import IdleMotion
+from .tree_equations import TreeEquations
 
 REMEDY = "give the body it moves a mass or an inertia; for kinematics alone, check_inertia: note"
 SHOWN = 8  #: bodies that a message names
@@ -75,7 +75,7 @@ def find_idle(kinematics: Kinematics, mobility: Mobility, tree: TreeEquations) -
     as Euler angles make it, a run that gets there says so.  Each coordinate is measured by its own inertia, so that a
     small mechanism beside a large one is as sound as alone.
     """
-    m, names = kinematics.mechanism, kinematics.freedoms
+    m, names = kinematics.mechanism, kinematics.velocity_labels
     numbers = {p.name: float(p.value or 0.0) for p in m.parameters} | {u.name: u.value for u in m.inputs}
     functions = ConstraintFunctions(kinematics, numbers)
     n, r = len(names), mobility.rank

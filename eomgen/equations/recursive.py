@@ -15,16 +15,18 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.count import count
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist, Wrench, add, dot, scaled
+from ..graph.tensors import add_matrices, rotate, rotate_symmetric, skew, symmetric
 from ..graph.vectors import Mat3
-from ..kinematics import Kinematics, Link, Twist
+from ..kinematics import Kinematics, Link
 from ..kinematics.energies import kinetic_energy, potential_energy
-from ..kinematics.inertia import SpatialInertia, Wrench, add_matrices, rotate, rotate_symmetric, skew, symmetric
+from ..kinematics.joint_rates import JointRates, joint_rates
+from ..kinematics.link_axes import SlidingTriple, falling, turn_back, turn_forces, turn_links
+from ..kinematics.link_inertia import SpatialInertia
 from ..kinematics.loads import applied_wrenches, coordinate_forces, drive_inertias, drives_cut_joint
-from ..kinematics.rates import JointRates, joint_rates
 from ..kinematics.regroup import regroup
-from ..kinematics.turned import Block, falling, turn_back, turn_forces, turn_links
 from ..records import dataclass
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -129,30 +131,6 @@ def _matrix(rows: Sequence[Sequence[Expr]]) -> Mat3:
     return tuple(tuple(row) for row in rows)  # type: ignore[return-value]
 
 
-def _add(a: Twist, b: Twist) -> Twist:
-    return vec.add(a[0], b[0]), vec.add(a[1], b[1])
-
-
-def _scaled(s: Expr, a: Twist) -> Twist:
-    return vec.scale(s, a[0]), vec.scale(s, a[1])
-
-
-def _dot(a: Twist, b: Twist) -> Expr:
-    return vec.dot(a[0], b[0]) + vec.dot(a[1], b[1])
-
-
-def _lift(link: Link, wrench: Wrench) -> Wrench:
-    """A wrench on the link, about the parent's origin in parent axes."""
-    push = link.up(wrench[1])
-    return vec.add(link.up(wrench[0]), vec.cross(link.position, push)), push
-
-
-def _carried(link: Link, motion: Twist) -> Twist:
-    """Acceleration of the parent as the link's origin would have it, velocity products apart."""
-    angular, linear = motion
-    return link.down(angular), link.down(vec.add(linear, vec.cross(angular, link.position)))
-
-
 def _velocity_products(kinematics: Kinematics, rates: list[JointRates]) -> list[Twist]:
     """Acceleration of each link relative to its parent at v' = 0: Coriolis and centripetal terms."""
     graph = kinematics.graph
@@ -195,24 +173,24 @@ def _newton_euler(
     wrenches: list[Wrench] = []
     for k, link in enumerate(links):
         above = motions[link.parent] if link.parent != GROUND else _base(kinematics)
-        motion = _add(_carried(link, above), products[k])
+        motion = add(link.down_twist(above), products[k])
         for c, column in enumerate(link.columns):
-            motion = _add(motion, _scaled(a[link.first + c], column))
+            motion = add(motion, scaled(a[link.first + c], column))
         motions.append(motion)
-        wrenches.append(_add(inertias[k].times(*motion), loads[k]))
+        wrenches.append(add(inertias[k].times(*motion), loads[k]))
     result = [-f for f in coordinate_forces(kinematics)]
     for k in reversed(range(len(links))):
         link = links[k]
         for c, column in enumerate(link.columns):
-            result[link.first + c] = result[link.first + c] + _dot(column, wrenches[k])
+            result[link.first + c] = result[link.first + c] + dot(column, wrenches[k])
         if link.parent != GROUND:
-            wrenches[link.parent] = _add(wrenches[link.parent], _lift(link, wrenches[k]))
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrenches[k]))
     return tuple(result)
 
 
 def _articulated(
     kinematics: Kinematics,
-    blocks: Sequence[Block],
+    blocks: Sequence[SlidingTriple],
     inertias: list[SpatialInertia],
     products: list[Twist],
     loads: list[Wrench],
@@ -231,27 +209,27 @@ def _articulated(
         for c in reversed(range(len(link.columns))):
             column, index = link.columns[c], link.first + c
             felt = body.times(column)
-            pivot = _dot(column, felt) + drives.get(index, graph.zero)
-            release = Release(index, column, felt, pivot, 1.0 / pivot, forces[index] - _dot(column, wrench))
+            pivot = dot(column, felt) + drives.get(index, graph.zero)
+            release = Release(index, column, felt, pivot, 1.0 / pivot, forces[index] - dot(column, wrench))
             releases[k].append(release)
             if link.parent != GROUND or c > 0:
                 body = body.released(column, felt, release.reciprocal, index in drives)
-                wrench = _add(wrench, _scaled(release.force * release.reciprocal, felt))
+                wrench = add(wrench, scaled(release.force * release.reciprocal, felt))
         if link.parent != GROUND:
             bodies[link.parent] = bodies[link.parent].plus(body.lifted(link))
-            wrench = _add(wrench, body.times(products[k]))
-            wrenches[link.parent] = _add(wrenches[link.parent], _lift(link, wrench))
+            wrench = add(wrench, body.times(products[k]))
+            wrenches[link.parent] = add(wrenches[link.parent], link.lift(wrench))
     motions: list[Twist] = []
     accelerations = [graph.zero] * len(kinematics.v)
     pivots = [graph.zero] * len(kinematics.v)
     for k, link in enumerate(links):
         lifted = still if k in afloat else _base(kinematics)[1]
         above = motions[link.parent] if link.parent != GROUND else (still, lifted)
-        motion = _add(_carried(link, above), products[k])
+        motion = add(link.down_twist(above), products[k])
         for release in reversed(releases[k]):
-            rate = (release.force - _dot(release.wrench, motion)) * release.reciprocal
+            rate = (release.force - dot(release.wrench, motion)) * release.reciprocal
             accelerations[release.index], pivots[release.index] = rate, release.pivot
-            motion = _add(motion, _scaled(rate, release.column))
+            motion = add(motion, scaled(rate, release.column))
         motions.append(motion)
     return tuple(turn_back(blocks, accelerations)), tuple(pivots)
 

@@ -12,7 +12,7 @@ from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..kinematics import Kinematics
 from ..kinematics.mobility import Mobility
-from .equations import TreeEquations
+from .tree_equations import TreeEquations
 
 Rows = tuple[tuple[Expr, ...], ...]
 
@@ -28,7 +28,7 @@ def reduce_to_independent(
         Numbers of the parameters, inputs and t, by which pivots are judged.
     """
     graph, n = kinematics.graph, len(kinematics.v)
-    free = [kinematics.freedoms.index(name) for name in mobility.independent]
+    free = [kinematics.velocity_labels.index(name) for name in mobility.independent]
     bound = [j for j in range(n) if j not in free]
     if not bound:
         return equations.mass_matrix, tuple(-h for h in equations.bias)

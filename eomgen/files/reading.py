@@ -10,7 +10,7 @@ import stat
 from typing import BinaryIO
 
 from ..errors import UsageError
-from .paths import as_name
+from .path_names import as_name
 
 #: What a name may stand for that is no plain file.
 KINDS = (

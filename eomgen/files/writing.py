@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import UsageError
-from .paths import as_path
+from .path_names import as_path
 
 TOKEN = 8  #: random digits at the end of a part's name
 TRIES = 3  #: of writing, where others clean up meanwhile

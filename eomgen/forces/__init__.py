@@ -4,11 +4,11 @@ from ..elements.element_type import ElementType, Types
 from . import actuators, attraction, bushing, contact, friction, laws, muscle, springs, stops
 from .actuators import Actuator, BodyTorque, PointForce
 from .attraction import PointGravity
-from .base import CoordinateLoad, Force, Load, MarkerLoad, View
 from .bushing import Bushing
 from .contact import Contact, SpherePlane, SphereSphere
+from .force import CoordinateLoad, Force, Load, MarkerLoad, View
 from .friction import Friction, JointFriction
-from .laws import Element
+from .laws import GeneralElement
 from .muscle import Muscle
 from .normal_laws import HuntCrossley
 from .paths import JointCoordinate, Line, Path, Turn
@@ -28,10 +28,10 @@ __all__ = [
     "Contact",
     "CoordinateLoad",
     "Damper",
-    "Element",
     "ElementType",
     "Force",
     "Friction",
+    "GeneralElement",
     "HuntCrossley",
     "JointCoordinate",
     "JointFriction",

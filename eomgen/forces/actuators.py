@@ -11,7 +11,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN, ON_JOINT, Path, read_coordinate
 from .routes import VIA, read_joint_or_path
 

@@ -10,7 +10,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View
 from .paths import BETWEEN
 
 Row6 = tuple[Expr, Expr, Expr, Expr, Expr, Expr]

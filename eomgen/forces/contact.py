@@ -13,7 +13,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Force, Load, MarkerLoad, View
+from .force import Force, Load, MarkerLoad, View
 from .friction import FRICTION, Friction, read_friction
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
 

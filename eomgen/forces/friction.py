@@ -7,7 +7,7 @@ from ..elements.entry import Entry
 from ..elements.field import MOTION, Field, Fields
 from ..graph.core import Expr
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import ON_JOINT, Path, read_coordinate
 from .springs import Damper
 

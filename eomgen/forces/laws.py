@@ -12,13 +12,13 @@ from ..graph.core import Expr
 from ..graph.differentiate import gradient
 from ..graph.substitute import substitute
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import BETWEEN, ON_JOINT, Path, read_angle
 from .routes import VIA, read_joint_or_path
 
 
 @dataclass(frozen=True)
-class Element(Force):
+class GeneralElement(Force):
     """A generalized force law(value, rate) - dV/dvalue along the path (N or N m).
 
     Positive pushes the ends apart or drives the coordinate.  ``value`` and ``rate`` are the symbols that stand in the
@@ -49,10 +49,10 @@ class Element(Force):
         return [] if self.law.is_zero else self.path.loads(view, self._here(view, self.law))
 
 
-def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], Element | None]:
+def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Entry], GeneralElement | None]:
     """The law knows ``length`` or ``angle``, and ``rate``."""
 
-    def read(e: Entry) -> Element | None:
+    def read(e: Entry) -> GeneralElement | None:
         where = path(e)
         if "law" not in e.values and "potential" not in e.values:
             e.fault("", "has no law", "give law, potential or both")
@@ -61,7 +61,7 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
         value, rate = (e.graph.symbol(f"{name}[{e.name}]") for name in (word, "rate"))
         law = e.law("law", {word: value, "rate": rate}) if "law" in e.values else e.graph.zero
         energy = e.law("potential", {word: value}) if "potential" in e.values else e.graph.zero
-        return None if where is None else Element(e.name, where, value, rate, law, energy)
+        return None if where is None else GeneralElement(e.name, where, value, rate, law, energy)
 
     return read
 

@@ -10,7 +10,7 @@ from ..elements.field import MOTION, Field
 from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import BETWEEN, Path
 from .routes import VIA, read_path
 

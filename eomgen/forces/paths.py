@@ -12,7 +12,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import CoordinateLoad, Load, MarkerLoad, View
+from .force import CoordinateLoad, Load, MarkerLoad, View
 
 #: Keys that say along what a force acts.
 ON_JOINT = Field("joint", "a joint of one degree, or a coordinate")

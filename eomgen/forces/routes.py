@@ -7,13 +7,13 @@ from typing import NamedTuple
 from ..elements.entry import Entry
 from ..elements.field import Field
 from ..elements.looks import Drawn, Points
-from ..frames import Cylinder, Marker
+from ..frames import Marker, WrapCylinder
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Load, MarkerLoad, View
 from .branches import where
+from .force import Load, MarkerLoad, View
 from .paths import Line, Path, read_coordinate
 
 PI = 3.141592653589793
@@ -41,7 +41,7 @@ class Route(Path):
 
     start: Marker
     end: Marker
-    via: tuple[Marker | Cylinder, ...]
+    via: tuple[Marker | WrapCylinder, ...]
 
     def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
         return Drawn((self.start, *self.via, self.end))
@@ -68,11 +68,11 @@ class Route(Path):
                 result.append(MarkerLoad(cylinder.marker, push, turn))
         return result
 
-    def _pieces(self, view: View) -> list[tuple[Marker, Marker, Cylinder | None, Piece]]:
+    def _pieces(self, view: View) -> list[tuple[Marker, Marker, WrapCylinder | None, Piece]]:
         found = []
         last, around = self.start, None
         for stop in (*self.via, self.end):
-            if isinstance(stop, Cylinder):
+            if isinstance(stop, WrapCylinder):
                 around = stop
                 continue
             piece = _straight(view, last, stop) if around is None else _wrap(view, last, stop, around)
@@ -89,7 +89,7 @@ def _straight(view: View, start: Marker, end: Marker) -> Piece:
     return Piece(length, direction, direction, o, o)
 
 
-def _wrap(view: View, start: Marker, end: Marker, around: Cylinder) -> Piece:
+def _wrap(view: View, start: Marker, end: Marker, around: WrapCylinder) -> Piece:
     """The shortest path that turns about a cylinder in the given sense; straight where it does not touch.
 
     Across the axis it is a tangent of length t_a, an arc of r w and a tangent of length t_b.  The surface unrolls into

@@ -12,7 +12,7 @@ from ..elements.looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .paths import BETWEEN, ON_JOINT, Line, Path, read_angle
 from .routes import VIA, read_path
 

@@ -9,7 +9,7 @@ from ..elements.entry import Entry
 from ..elements.field import Field
 from ..graph.core import Expr
 from ..records import dataclass
-from .base import Force, Load, View
+from .force import Force, Load, View
 from .normal_laws import NORMAL, HuntCrossley, read_normal_law
 from .paths import ON_JOINT, Path, read_coordinate
 

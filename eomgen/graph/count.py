@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
+from ..operations import ARITHMETIC, operations_with
 from ..records import dataclass
 from .core import Expr
 from .traverse import LEAVES, common_graph, reachable
-
-CHOICES = frozenset({"abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select"})
 
 
 @dataclass(frozen=True)
@@ -73,14 +72,14 @@ def count(outputs: Sequence[Expr]) -> Operations:
         return Operations()
     nodes = graph.nodes
     found = Counter(nodes[i][0] for i in reachable(graph, (y.id for y in outputs)))
-    arithmetic = {"mul", "add", "sub", "div", "neg"} | LEAVES
+    bends, arithmetic = operations_with(lambda row: row.bends), operations_with(lambda row: row.kind == ARITHMETIC)
     return Operations(
         multiplications=found["mul"],
         additions=found["add"] + found["sub"],
         divisions=found["div"],
         negations=found["neg"],
-        functions={k: found[k] for k in sorted(found) if k not in arithmetic and k not in CHOICES},
-        choices={k: found[k] for k in sorted(found) if k in CHOICES},
+        functions={k: found[k] for k in sorted(found.keys() - bends - arithmetic - LEAVES)},
+        choices={k: found[k] for k in sorted(found.keys() & bends)},
     )
 
 

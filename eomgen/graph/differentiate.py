@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from ..operations import OPERATIONS, operations_with
 from .core import Expr, Graph
-from .slopes import BRANCHING, FLAT, SLOPES, choice, half_power_slope, partials
+from .slopes import half_power_slope, partials
 from .traverse import LEAVES, common_graph, reachable
 
 
@@ -60,18 +61,13 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 d = da
             else:
                 d = g.neg(db) if da is None else sub(da, db)
-        elif operation in LEAVES or operation in FLAT:
+        elif operation in LEAVES:
             continue
         elif operation == "neg":
             da = tangent(node[1])
             if da is None:
                 continue
             d = g.neg(da)
-        elif operation in BRANCHING:
-            if all(k not in tangents for k in node[-2:]):
-                continue
-            c, a, b = choice(g, i)
-            d = g.make("select", c, tangents.get(a, zero), tangents.get(b, zero))
         elif operation == "div":
             a, b = node[1], node[2]
             da, db = tangent(a), tangent(b)
@@ -83,12 +79,19 @@ def _push(g: Graph, order: Iterable[int], tangents: dict[int, int], slopes: dict
                 d = g.neg(mul(mul(i, g.div(one, b)), db))
             else:
                 d = mul(g.div(one, b), sub(da, mul(i, db)))
-        elif operation in SLOPES:
+        elif (row := OPERATIONS.get(operation)) is not None and row.choice is not None:
+            if all(k not in tangents for k in node[-2:]):
+                continue
+            c, a, b = row.choice(g, *node[1:])
+            d = g.make("select", c, tangents.get(a, zero), tangents.get(b, zero))
+        elif row is not None and not row.slopes:
+            continue
+        elif row is not None and len(node) == 2:
             da = tangent(node[1])
             if da is None:
                 continue
             if i not in slopes:
-                slopes[i] = SLOPES[operation](g, i, node[1])
+                slopes[i] = row.slopes[0](g, i, node[1])
             d = mul(slopes[i], da)
         else:
             parts = [tangent(k) for k in node[1:]]
@@ -142,7 +145,7 @@ def _pull(g: Graph, order: Sequence[int], active: set[int], adjoints: dict[int, 
         elif operation == "neg":
             a = node[1]
             adjoints[a] = sub(adjoints[a], w) if a in adjoints else g.neg(w)
-        elif operation in BRANCHING:
+        elif (row := OPERATIONS.get(operation)) is not None and row.choice is not None:
             branches.append(i)
         elif operation == "div" and node[2] not in active and nodes[node[2]][0] == "const":
             a, d = node[1], g.div(w, node[2])
@@ -159,10 +162,11 @@ def _active(g: Graph, order: Iterable[int], sources: Mapping[int, int]) -> dict[
     """Nodes of ``order`` that depend differentiably on the sources, each with the union of their bit masks."""
     nodes = g.nodes
     masks = dict(sources)
+    flat = operations_with(lambda row: not (row.slopes or row.choice)) | LEAVES
     for i in order:
         node = nodes[i]
         operation = node[0]
-        if operation in LEAVES or operation in FLAT:
+        if operation in flat:
             continue
         mask = 0
         for k in node[2:] if operation == "select" else node[1:]:
@@ -292,6 +296,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
     for row, i in enumerate(roots):
         if i in columns:
             rows[i] = rows.get(i, 0) | 1 << row
+    branching = operations_with(lambda row: row.choice is not None)
     forward = reverse = 0
     for i in reversed(order):
         if i not in rows:  # constant, or only behind something flat
@@ -299,7 +304,7 @@ def _reverse_is_cheaper(g: Graph, roots: Sequence[int], wrt: Sequence[Expr]) -> 
         mask, node = rows[i], nodes[i]
         if node[0] in LEAVES:
             continue
-        if node[0] in BRANCHING:
+        if node[0] in branching:
             return False
         cost = 1 if node[0] in ("add", "sub", "neg") else 2
         for k in node[1:]:

@@ -7,61 +7,22 @@ taken, so what happens in the other never shows.
 
 from __future__ import annotations
 
-import math
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..errors import UsageError
+from ..operations import OPERATIONS
 from .core import Expr
-from .elementary import ELEMENTARY
 from .substitute import symbols_of
 from .traverse import common_graph, reachable
 
 Value = Any  # float or ndarray
 
 
-def _minimum(a: float, b: float) -> float:
-    return a if a <= b or math.isnan(a) else b  # NaN wins, as in numpy.minimum
-
-
-def _maximum(a: float, b: float) -> float:
-    return a if a >= b or math.isnan(a) else b
-
-
-def _sign(a: float) -> float:
-    return float((a > 0) - (a < 0)) if not math.isnan(a) else a
-
-
 def _pack(*values: Any) -> tuple[Any, ...]:
     return tuple(x for value in values for x in (value if isinstance(value, tuple) else (value,)))
-
-
-#: operation -> (on floats, on arrays)
-FUNCTIONS: dict[str, tuple[Callable[..., float], Callable[..., Any]]] = {
-    "add": (operator.add, np.add),
-    "sub": (operator.sub, np.subtract),
-    "mul": (operator.mul, np.multiply),
-    "div": (operator.truediv, np.divide),
-    "neg": (operator.neg, np.negative),
-    "pow": (math.pow, np.power),
-    "sqrt": (math.sqrt, np.sqrt),
-    **{name: (f.value, getattr(np, f.array)) for name, f in ELEMENTARY.items()},
-    "atan2": (math.atan2, np.arctan2),
-    "abs": (abs, np.abs),
-    "sign": (_sign, np.sign),
-    "min": (_minimum, np.minimum),
-    "max": (_maximum, np.maximum),
-    "lt": (lambda a, b: 1.0 if a < b else 0.0, lambda a, b: np.less(a, b) * 1.0),
-    "le": (lambda a, b: 1.0 if a <= b else 0.0, lambda a, b: np.less_equal(a, b) * 1.0),
-    "eq": (lambda a, b: 1.0 if a == b else 0.0, lambda a, b: np.equal(a, b) * 1.0),
-    "not": (lambda a: 0.0 if a else 1.0, lambda a: np.logical_not(a) * 1.0),
-    "and": (lambda a, b: 1.0 if a and b else 0.0, lambda a, b: np.logical_and(a, b) * 1.0),
-    "or": (lambda a, b: 1.0 if a or b else 0.0, lambda a, b: np.logical_or(a, b) * 1.0),
-    "select": (lambda c, a, b: a if c else b, lambda c, a, b: np.where(np.asarray(c) != 0.0, a, b)),
-}
 
 
 class Evaluator:
@@ -101,7 +62,7 @@ class Evaluator:
         first = len(self.names) + len(self._constants)
         self._steps: list[tuple[str, int, int, int]] = []  # operation and operand slots, -1 where there is none
         self._functions: dict[str, tuple[Callable[..., Any], Callable[..., Any]]]
-        self._functions = {**FUNCTIONS, "pack": (_pack, _pack)}
+        self._functions = {name: (row.value, row.array) for name, row in OPERATIONS.items()} | {"pack": (_pack, _pack)}
         for operation, (function, orders) in (graph.calls if graph is not None else {}).items():
             implementation = function.implementation(orders)
             self._functions[operation] = (implementation, implementation)
@@ -178,7 +139,7 @@ class Evaluator:
                     append(function(data[a], data[b]))
                 else:
                     append(function(data[a], data[b], data[c]))
-            except (ValueError, ZeroDivisionError, OverflowError):  # NumPy knows the infinity or NaN it should be
+            except (ValueError, ArithmeticError):  # NumPy knows the infinity or NaN it should be
                 with np.errstate(all="ignore"):
                     append(
                         float(

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..errors import ModelError, Problem
-from ..numeric.functions import Curve, Orders, Surface, Twin
+from ..numeric.user_functions import Curve, Orders, Surface, Twin
 from ..records import dataclass
 
 

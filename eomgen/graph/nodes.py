@@ -9,10 +9,12 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from ..limits.rounding import TINY
-from .operations import COMMUTATIVE, EVEN, FOLD, ODD
+from ..limits.rounding import NORMAL, TINY
+from ..operations import OPERATIONS
+from ..operations.row import ODD
 
 if TYPE_CHECKING:
+    from ..operations import Operation
     from .functions import Function
 
 Node = tuple[Any, ...]  # (operation, *operand ids), ("const", value) or ("sym", name)
@@ -42,59 +44,37 @@ class Nodes:
 
     def make(self, operation: str, *ids: int) -> int:
         """The id of ``operation`` on operand ids, simplified.  The rules are exact up to rounding order."""
-        if operation == "add":
-            return self.add(*ids)
-        if operation == "sub":
-            return self.sub(*ids)
-        if operation == "mul":
-            return self.mul(*ids)
-        if operation == "div":
-            return self.div(*ids)
-        if operation == "neg":
-            return self.neg(*ids)
-        if operation in self.calls:
+        row = OPERATIONS.get(operation)
+        if row is None:
+            if operation not in self.calls:
+                raise ValueError(f"unknown operation {operation!r}")
             return self._node((operation, *ids))
-        if operation not in FOLD:
-            raise ValueError(f"unknown operation {operation!r}")
-        nodes = self.nodes
-        if all(nodes[i][0] == "const" for i in ids):
-            folded = self._fold(operation, ids)
-            if folded is not None:
-                return folded
-        if operation == "pow":
-            return self._power(*ids)
-        head = nodes[ids[0]]
-        if operation == "select":
-            if head[0] == "const":
-                return ids[1] if head[1] else ids[2]
-            if ids[1] == ids[2]:
-                return ids[1]
-        elif operation in ("min", "max", "and", "or") and ids[0] == ids[1]:
-            return ids[0] if operation in ("min", "max") else self._node((operation, *ids))
-        elif head[0] == "neg" and operation in ODD:
-            return self.neg(self._node((operation, head[1])))
-        elif head[0] == "neg" and operation in EVEN:
-            return self._node((operation, head[1]))
-        elif operation == "sqrt" and head[0] == "mul" and head[1] == head[2]:
-            return self._node(("abs", head[1]))
-        if operation in COMMUTATIVE and ids[0] > ids[1]:
+        known = row.rule(self, *ids) if row.rule is not None else None
+        if known is None and all(self.nodes[i][0] == "const" for i in ids):
+            known = self._fold(row, ids)
+        if known is not None:
+            return known
+        if row.parity:
+            head = self.nodes[ids[0]]
+            if head[0] == "neg":
+                made = self._node((operation, head[1]))
+                return self.neg(made) if row.parity == ODD else made
+        elif row.commutative and ids[0] > ids[1]:
             ids = (ids[1], ids[0])
         return self._node((operation, *ids))
 
-    def _fold(self, operation: str, ids: Iterable[int]) -> int | None:
+    def _fold(self, row: Operation, ids: Iterable[int]) -> int | None:
         try:
-            value = FOLD[operation](*(self.nodes[i][1] for i in ids))
-        except (ValueError, ZeroDivisionError, OverflowError):
+            value = row.value(*(self.nodes[i][1] for i in ids))
+        except (ValueError, ArithmeticError):
             return None  # outside the domain: keep the node, the error belongs to evaluation
-        if isinstance(value, complex) or not math.isfinite(value):
-            return None
-        return self._const(value)
+        return self._const(value) if math.isfinite(value) else None
 
     def _folded(self, operation: str, value: float, a: int, b: int) -> int:
         """The constant ``value``; if it overflowed, the node that overflows when it is evaluated."""
         if math.isfinite(value):
             return self._const(value)
-        return self._node((operation, b, a) if operation in COMMUTATIVE and a > b else (operation, a, b))
+        return self._node((operation, b, a) if OPERATIONS[operation].commutative and a > b else (operation, a, b))
 
     def neg(self, a: int) -> int:
         """-a"""
@@ -187,7 +167,7 @@ class Nodes:
                 return self.mul(self._const(-value), y[1])
             if y[0] == "mul":  # merge constant factors, unless that would overflow or lose digits
                 u, rest = (y[1], y[2]) if nodes[y[1]][0] == "const" else (y[2], y[1])
-                if nodes[u][0] == "const" and 1e-290 < abs(value * nodes[u][1]) < math.inf:
+                if nodes[u][0] == "const" and NORMAL < abs(value * nodes[u][1]) < math.inf:
                     return self.mul(self._const(value * nodes[u][1]), rest)
             return self._node(("mul", a, b) if a < b else ("mul", b, a))
         if x[0] == "neg":
@@ -219,16 +199,20 @@ class Nodes:
             return self.neg(self.div(a, y[1]))
         return self._node(("div", a, b))
 
-    def _power(self, a: int, b: int) -> int:
+    def power(self, a: int, b: int) -> int:
         """a ** b: integer exponents up to 64 as products, halves through sqrt, the rest as pow."""
         exponent = self.nodes[b]
+        if exponent[0] == "const" and self.nodes[a][0] == "const":
+            folded = self._fold(OPERATIONS["pow"], (a, b))
+            if folded is not None:
+                return folded
         if exponent[0] != "const":
             return self._node(("pow", a, b))
         n = exponent[1]
         if n == 0.0:
             return self._const(1.0)
         if n < 0.0:
-            return self.div(self._const(1.0), self._power(a, self._const(-n)))
+            return self.div(self._const(1.0), self.power(a, self._const(-n)))
         if n == 0.5:
             return self.make("sqrt", a)
         if n == int(n) and n <= 64:

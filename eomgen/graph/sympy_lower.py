@@ -1,16 +1,17 @@
 """Stage graph: a SymPy expression -> the same expression in a graph.
 
-All quantities are real.  What has a meaning: real numbers; ``+ * **``; sin cos tan sec csc cot asin acos atan atan2
-sinh cosh tanh sech csch coth exp log sqrt; Abs sign Min Max Heaviside re im conjugate; Piecewise ending with ``True``;
-``< <= > >= Eq Ne And Or Not Xor ITE Implies Equivalent``; and whatever the caller resolves: symbols, functions of time
-``q(t)``, their derivatives; and the functions that the graph declares, with their derivatives.
+All quantities are real.  What has a meaning: real numbers; ``+ * **``; the classes that rows of
+:mod:`eomgen.operations` name; sec csc cot sech csch coth Heaviside re im conjugate; Piecewise ending with ``True``;
+``> >= Ne Xor ITE Implies Equivalent``; and whatever the caller resolves: symbols, functions of time ``q(t)``, their
+derivatives; and the functions that the graph declares, with their derivatives.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import sympy
@@ -20,18 +21,12 @@ from sympy.logic.boolalg import BooleanFalse, BooleanTrue
 from sympy.matrices.matrixbase import MatrixBase
 
 from ..errors import EomgenError
+from ..operations import FUNCTION, OPERATIONS
 from .core import Expr, Graph
-from .elementary import ELEMENTARY
 from .shown import is_tower, parts_of, shortened
 
 Resolve = Callable[[sympy.Basic], Expr | None]
 Build = Callable[[Graph, Sequence[int]], int]
-
-KNOWN = (
-    f"numbers, + - * / **, sqrt, {' '.join(ELEMENTARY)}, sec csc cot sech csch coth atan2, "
-    "Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
-)
-
 
 #: What else SymPy may differentiate: quantities, derivatives, and what holds them.
 DIFFERENTIABLE = (
@@ -118,6 +113,7 @@ class _Walk:
     def __init__(self, graph: Graph, resolve: Resolve) -> None:
         self.graph = graph
         self.resolve = resolve
+        self.builders = _builders()
         self.unresolved: dict[Any, None] = {}
         self.faults: list[tuple[Any, str]] = []
         # by identity: hashing and comparing deep expressions is recursive in SymPy; the entries keep the parts alive
@@ -152,7 +148,7 @@ class _Walk:
         """The operands of a part and how to combine them once they are lowered."""
         if not isinstance(part, sympy.Basic):
             raise _Fault(f"a SymPy scalar is expected, not {type(part).__name__}")
-        build = BUILD.get(part.func)
+        build = self.builders.get(part.func)
         if build is not None:
             return part.args, build
         if isinstance(part, (sympy.Number, sympy.NumberSymbol)):
@@ -197,7 +193,7 @@ class _Walk:
             along = [i for i, argument in enumerate(part.args) if argument == variable]
             others = [a for a in part.args if a != variable and a.has(variable)]
             if len(along) != 1 or others or not order.is_Integer:
-                other = _worked_out(whole)  # SymPy's own chain rule brings it into the form above
+                other = self._worked_out(whole)  # SymPy's own chain rule brings it into the form above
                 return None if other == whole else ((other,), lambda g, ids: ids[0])
             orders[along[0]] += int(order)
         operands = [argument.xreplace(places) for argument in part.args]
@@ -209,7 +205,7 @@ class _Walk:
             return (), lambda g, ids: g.one.id
         other = part
         if isinstance(part, (sympy.Derivative, sympy.Subs)):
-            other = _worked_out(part)
+            other = self._worked_out(part)
             if other == part and isinstance(part.expr, AppliedUndef):
                 self.unresolved[part] = None
                 return (), lambda g, ids: g.one.id
@@ -217,29 +213,28 @@ class _Walk:
             other = _evaluated(part)
         if other == part or not isinstance(other, sympy.Basic):
             name = part.func.__name__
-            raise _Fault(f"{name} is not among what can be lowered: {KNOWN}")
+            raise _Fault(f"{name} is not among what can be lowered: {_known()}")
         return (other,), lambda g, ids: ids[0]
 
+    def _worked_out(self, part: Any) -> Any:
+        """A derivative or substitution carried out by SymPy; of parts that are known here only.
 
-def _worked_out(part: Any) -> Any:
-    """A derivative or substitution carried out by SymPy; of parts that are known here only.
-
-    Of others (sums, integrals, limits) SymPy searches for a closed form, for any time, and runs texts as code.
-    """
-    for inner in parts_of(part):
-        if not isinstance(inner, sympy.Basic):
-            raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
-        if not (inner.func in BUILD or isinstance(inner, DIFFERENTIABLE)):
-            raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {KNOWN}")
-        if is_tower(inner):
-            raise _Fault("the power of numbers is too large")
-        orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
-        if not all(n.is_Integer for n in orders) or sum(orders) > ORDER:
-            raise _Fault(f"derivatives go up to order {ORDER}, a plain number")
-    try:
-        return part.doit()
-    except Exception as error:  # of many classes: the part may be odd in any way
-        raise _Fault(f"SymPy cannot work it out ({type(error).__name__})") from None
+        Of others (sums, integrals, limits) SymPy searches for a closed form, for any time, and runs texts as code.
+        """
+        for inner in parts_of(part):
+            if not isinstance(inner, sympy.Basic):
+                raise _Fault(f"a SymPy scalar is expected, not {type(inner).__name__}")
+            if not (inner.func in self.builders or isinstance(inner, DIFFERENTIABLE)):
+                raise _Fault(f"the derivative of {inner.func.__name__} is not among what can be lowered: {_known()}")
+            if is_tower(inner):
+                raise _Fault("the power of numbers is too large")
+            orders = [n for _, n in inner.variable_count] if isinstance(inner, sympy.Derivative) else []
+            if not all(n.is_Integer for n in orders) or sum(orders) > ORDER:
+                raise _Fault(f"derivatives go up to order {ORDER}, a plain number")
+        try:
+            return part.doit()
+        except Exception as error:  # of many classes: the part may be odd in any way
+            raise _Fault(f"SymPy cannot work it out ({type(error).__name__})") from None
 
 
 def _evaluated(part: Any) -> Any:
@@ -317,12 +312,18 @@ def _all(g: Graph, ids: Sequence[int]) -> int:
     return reduce(g.mul, ids) if ids else g.one.id
 
 
-def _chain(operation: str) -> Build:
-    return lambda g, ids: reduce(lambda a, b: g.make(operation, a, b), ids)
+def _known() -> str:
+    functions = " ".join(row.name for row in OPERATIONS.values() if row.kind == FUNCTION and row.sympy_class)
+    others = "sec csc cot sech csch coth, Abs sign Min Max Heaviside, Piecewise, relations, And Or Not"
+    return f"numbers, + - * / **, {functions}, {others}"
 
 
-def _function(operation: str) -> Build:
-    return lambda g, ids: g.make(operation, *ids)
+def _operation(name: str, g: Graph, ids: Sequence[int]) -> int:
+    return g.make(name, *ids)
+
+
+def _chain(name: str, g: Graph, ids: Sequence[int]) -> int:
+    return reduce(partial(g.make, name), ids)
 
 
 def _over(operation: str) -> Build:
@@ -335,32 +336,33 @@ def _heaviside(g: Graph, ids: Sequence[int]) -> int:
     return g.make("select", g.make("lt", zero, x), g.one.id, below)
 
 
-#: How each class of SymPy is built from its lowered arguments.
+#: How classes of SymPy that are no operations of their own are built from their lowered arguments.
 BUILD: dict[Any, Build] = {
     sympy.Add: lambda g, ids: reduce(g.add, ids),
     sympy.Mul: _product,
-    sympy.Pow: _function("pow"),
-    **{getattr(sympy, name): _function(name) for name in (*ELEMENTARY, "atan2", "sign")},
-    sympy.Abs: _function("abs"),
+    sympy.Pow: lambda g, ids: g.make("pow", *ids),
     sympy.sec: _over("cos"),
     sympy.csc: _over("sin"),
     sympy.cot: lambda g, ids: g.div(g.make("cos", ids[0]), g.make("sin", ids[0])),
     sympy.sech: _over("cosh"),
     sympy.csch: _over("sinh"),
     sympy.coth: _over("tanh"),
-    sympy.Min: _chain("min"),
-    sympy.Max: _chain("max"),
     sympy.Heaviside: _heaviside,
-    sympy.StrictLessThan: _function("lt"),
-    sympy.LessThan: _function("le"),
     sympy.StrictGreaterThan: lambda g, ids: g.make("lt", ids[1], ids[0]),
     sympy.GreaterThan: lambda g, ids: g.make("le", ids[1], ids[0]),
-    sympy.Equality: _function("eq"),
     sympy.Unequality: lambda g, ids: g.make("not", g.make("eq", *ids)),
-    sympy.And: _chain("and"),
-    sympy.Or: _chain("or"),
-    sympy.Not: _function("not"),
     sympy.re: lambda g, ids: ids[0],
     sympy.im: lambda g, ids: g.zero.id,
     sympy.conjugate: lambda g, ids: ids[0],
 }
+
+
+def _builders() -> dict[Any, Build]:
+    """How each class of SymPy that has a meaning is built."""
+    found = dict(BUILD)
+    codegen = sys.modules.get("sympy.codegen.cfunctions")
+    for row in OPERATIONS.values():
+        cls = getattr(sympy, row.sympy_class, None) or getattr(codegen, row.sympy_class, None)
+        if cls is not None:
+            found[cls] = partial(_chain if row.many else _operation, row.name)
+    return found

@@ -9,24 +9,9 @@ from typing import Any
 
 import sympy
 
+from ..operations import CONDITION, OPERATIONS, operations_with
 from .core import Expr, Graph
-from .elementary import ELEMENTARY
 from .traverse import LEAVES, common_graph, reachable
-
-LOGIC = frozenset({"lt", "le", "eq", "not", "and", "or"})
-
-_FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
-    "neg": lambda a: -a,
-    "pow": lambda a, b: a**b,
-    "abs": sympy.Abs,
-    "min": sympy.Min,
-    "max": sympy.Max,
-    **{name: getattr(sympy, name) for name in (*ELEMENTARY, "sqrt", "atan2", "sign")},
-}
 
 
 def raise_inline(
@@ -102,6 +87,7 @@ def raise_named(
                 uses[k] += 1
     for i in roots:
         uses[i] += 1
+    conditions = operations_with(lambda row: row.kind == CONDITION)
     taken = {nodes[i][1] for i in order if nodes[i][0] == "sym"}
     made: dict[int, Any] = {}
     size: dict[int, int] = {}
@@ -112,7 +98,7 @@ def raise_named(
         made[i] = _raised(graph, i, made, symbols)
         size[i] = 0 if kind in LEAVES else 1 + sum(size[k] for k in args)
         # conditions and signs are read best where they stand
-        if size[i] > (0 if uses[i] > 1 else limit) and kind not in LOGIC and kind != "neg":
+        if size[i] > (0 if uses[i] > 1 else limit) and kind not in conditions and kind != "neg":
             while f"{prefix}{number}" in taken:
                 number += 1
             name = sympy.Symbol(f"{prefix}{number}", real=True)
@@ -143,20 +129,13 @@ def _raised(graph: Graph, i: int, made: Mapping[int, Any], symbols: Callable[[st
         return _raised_number(args[0])
     if kind == "sym":
         return symbols(args[0])
-    if kind in LOGIC:
-        if kind in ("not", "and", "or"):
-            truths = [_as_truth(made[k]) for k in args]
-            return {"not": sympy.Not, "and": sympy.And, "or": sympy.Or}[kind](*truths)
-        left, right = (_as_number(made[k]) for k in args)
-        return {"lt": sympy.Lt, "le": sympy.Le, "eq": sympy.Eq}[kind](left, right)
-    if kind == "select":
-        condition, yes, no = (made[k] for k in args)
-        return sympy.Piecewise((_as_number(yes), _as_truth(condition)), (_as_number(no), True))
-    operands = [_as_number(made[k]) for k in args]
     if kind in graph.calls:
         function, orders = graph.calls[kind]
-        return _call(function.name, orders, operands)
-    return _FUNCTIONS[kind](*operands)
+        return _call(function.name, orders, [_as_number(made[k]) for k in args])
+    row = OPERATIONS[kind]
+    truths = len(args) if row.kind == CONDITION and not row.jumps else int(row.chooses)
+    operands = [_as_truth(made[k]) if n < truths else _as_number(made[k]) for n, k in enumerate(args)]
+    return row.raised(sympy, *operands)
 
 
 def _call(name: str, orders: Sequence[int], operands: Sequence[Any]) -> Any:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ..errors import UsageError
+from ..operations import OPERATIONS
 from .core import Expr
-from .operations import FOLD
 from .traverse import reachable
 
 Instruction = tuple[str, int, int, int]
@@ -42,7 +42,7 @@ def record_tape(expressions: Sequence[Expr], place: Callable[[str], tuple[str, i
                 numbers.append(float(given[0]))
             elif kind == "sym":
                 code.append((*place(given[0]), 0, 0))
-            elif kind in FOLD:
+            elif kind in OPERATIONS:
                 a, b, c = (*(found[k] for k in given), 0, 0)[:3]
                 code.append((kind, a, b, c))
             else:

@@ -16,6 +16,11 @@ def vector(graph: Graph, values: Sequence[Expr | float]) -> Vec3:
     return (x, y, z)
 
 
+def matrix(graph: Graph, rows: Sequence[Sequence[Expr | float]]) -> Mat3:
+    """A matrix from rows of Exprs or numbers."""
+    return tuple(vector(graph, row) for row in rows)  # type: ignore[return-value]
+
+
 def zero(graph: Graph) -> Vec3:
     """The zero vector."""
     return (graph.zero, graph.zero, graph.zero)

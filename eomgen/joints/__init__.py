@@ -1,7 +1,7 @@
 """Joints: one short class a type; :data:`JOINTS` is the literal table of all of them."""
 
-from .base import Ball, Closure, Coordinate, Joint, Shape, Velocity
 from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
+from .joint import Closure, Coordinate, Joint, QuaternionSlot, Shape, Velocity
 from .many_degrees import Cylindrical, Planar, Weld
 from .one_degree import Continuous, Prismatic, Revolute, Screw
 from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
@@ -38,7 +38,6 @@ JOINTS: dict[str, type[Joint]] = {
 
 __all__ = [
     "JOINTS",
-    "Ball",
     "Closure",
     "ConstantVelocity",
     "Continuous",
@@ -57,6 +56,7 @@ __all__ = [
     "PointOnCurve",
     "PointOnSurface",
     "Prismatic",
+    "QuaternionSlot",
     "Revolute",
     "RevoluteSpherical",
     "Screw",

@@ -14,8 +14,8 @@ from ..graph.differentiate import jvp
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import SEQUENCE, Closure, Coordinate, Joint, Shape
-from .rotations import euler, euler_rates
+from .joint import SEQUENCE, Closure, Coordinate, Joint, Shape
+from .rotation_coordinates import euler, euler_rates
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 ALONG_CURVE = (Coordinate("_s", "length"),)
@@ -78,7 +78,7 @@ class Guide(Joint):
         raise TypeError(f"a {self.type_name} joint cannot be cut")
 
 
-class Turning(Guide):
+class TurningGuide(Guide):
     """A guide on which S also turns freely about its origin, in Euler angles."""
 
     sequence: str
@@ -117,7 +117,7 @@ class SurfaceSlider(Guide):
 
 
 @dataclass(frozen=True)
-class PointOnCurve(Turning):
+class PointOnCurve(TurningGuide):
     """The origin of S slides along a curve of P; S turns freely, in Euler angles.  Allows 4, removes 2.
 
     A point on a curve (Shabana, sec. 3.2, point follower): of the curve's point r(s) only s is free.
@@ -135,7 +135,7 @@ class PointOnCurve(Turning):
 
 
 @dataclass(frozen=True)
-class PointOnSurface(Turning):
+class PointOnSurface(TurningGuide):
     """The origin of S slides on a surface of P; S turns freely, in Euler angles.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "point_on_surface"

@@ -12,9 +12,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Closure, Coordinate, Joint
-from .closures import along, parallel_axes, same_orientation
-from .rotations import about, unit
+from .closure_conditions import along, parallel_axes, same_orientation
+from .joint import Closure, Coordinate, Joint
+from .rotation_coordinates import about, unit
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import LENGTH, Closure, Joint
-from .closures import along, parallel_axes, same_orientation
+from .closure_conditions import along, parallel_axes, same_orientation
+from .joint import LENGTH, Closure, Joint
 
 
 @dataclass(frozen=True)
-class Constraint(Joint):
+class RodJoint(Joint):
     """Equations between the poses of two bodies; ``removes`` of the six degrees of freedom go."""
 
     role: ClassVar[str] = "loop"
@@ -45,7 +45,7 @@ def apart(length: Expr, position: Vec3) -> Closure:
 
 
 @dataclass(frozen=True)
-class Distance(Constraint):
+class Distance(RodJoint):
     """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "distance"
@@ -60,7 +60,7 @@ class Distance(Constraint):
 
 
 @dataclass(frozen=True)
-class RevoluteSpherical(Constraint):
+class RevoluteSpherical(RodJoint):
     """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "revolute_spherical"
@@ -74,7 +74,7 @@ class RevoluteSpherical(Constraint):
 
 
 @dataclass(frozen=True)
-class Inline(Constraint):
+class Inline(RodJoint):
     """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "inline"
@@ -86,7 +86,7 @@ class Inline(Constraint):
 
 
 @dataclass(frozen=True)
-class Inplane(Constraint):
+class Inplane(RodJoint):
     """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "inplane"
@@ -98,7 +98,7 @@ class Inplane(Constraint):
 
 
 @dataclass(frozen=True)
-class Parallel(Constraint):
+class Parallel(RodJoint):
     """The z axes stay parallel.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "parallel"
@@ -112,7 +112,7 @@ class Parallel(Constraint):
 
 
 @dataclass(frozen=True)
-class Perpendicular(Constraint):
+class Perpendicular(RodJoint):
     """The z axes stay perpendicular: turn one marker by ``rpy``, as ``axis`` turns both.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "perpendicular"
@@ -123,7 +123,7 @@ class Perpendicular(Constraint):
 
 
 @dataclass(frozen=True)
-class Orientation(Constraint):
+class Orientation(RodJoint):
     """All axes stay parallel, the origins are free: S does not turn against P.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "orientation"

@@ -11,9 +11,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import SEQUENCE, Ball, Closure, Coordinate, Joint
-from .closures import along
-from .rotations import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
+from .closure_conditions import along
+from .joint import SEQUENCE, Closure, Coordinate, Joint, QuaternionSlot
+from .rotation_coordinates import euler, euler_angles, euler_rates, parameter_rotation, parameters_of, unit
 
 ANGLES = tuple(Coordinate(f"_{k}", "angle") for k in (1, 2, 3))
 PARAMETERS = tuple(Coordinate(f"_e{k}", "parameter") for k in range(4))
@@ -27,7 +27,7 @@ PLACE = tuple(Coordinate(f"_{k}", "length") for k in "xyz")
 
 
 @dataclass(frozen=True)
-class Turning(Joint):
+class RotatingJoint(Joint):
     """What spherical and free joints share: how they describe a rotation.
 
     ``rotation`` is ``euler_angles`` (intrinsic, x-y'-z'' unless ``sequence`` says otherwise; singular where the middle
@@ -45,7 +45,7 @@ class Turning(Joint):
         if self.in_parameters:
             n = len(self.place)
             object.__setattr__(self, "coordinates", (*self.place, *PARAMETERS))
-            object.__setattr__(self, "balls", (Ball(n, n),))
+            object.__setattr__(self, "quaternion_slots", (QuaternionSlot(n, n),))
 
     @property
     def in_parameters(self) -> bool:
@@ -70,7 +70,7 @@ class Turning(Joint):
 
 
 @dataclass(frozen=True)
-class Spherical(Turning):
+class Spherical(RotatingJoint):
     """Turns about a point.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "spherical"
@@ -91,7 +91,7 @@ class Spherical(Turning):
 
 
 @dataclass(frozen=True)
-class Free(Turning):
+class Free(RotatingJoint):
     """Six degrees of freedom: position of S in P axes, then its rotation.  Removes none."""
 
     type_name: ClassVar[str] = "free"

@@ -10,9 +10,9 @@ from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, sqrt
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .base import Closure, Coordinate, Joint
-from .closures import along
-from .rotations import euler, euler_rates
+from .closure_conditions import along
+from .joint import Closure, Coordinate, Joint
+from .rotation_coordinates import euler, euler_rates
 
 TWO_ANGLES = (Coordinate("_1", "angle"), Coordinate("_2", "angle"))
 

@@ -3,7 +3,7 @@
 from .kinematics import ForceTerms, Kinematics, LoopCoordinates, analyse
 from .loops import Constraints
 from .topology import Branch, Topology, find_topology
-from .tree import Link, Poses, Twist
+from .tree import Link, Poses
 
 __all__ = [
     "Branch",
@@ -14,7 +14,6 @@ __all__ = [
     "LoopCoordinates",
     "Poses",
     "Topology",
-    "Twist",
     "analyse",
     "find_topology",
 ]

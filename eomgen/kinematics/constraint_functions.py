@@ -16,7 +16,7 @@ from ..numeric import (
     assemble,
 )
 from ..numeric.assembly import RESTARTS
-from ..numeric.closure import Equations, System, close
+from ..numeric.closure import ClosureSystem, WantedValues, close
 from ..numeric.scales import Space
 from ..numeric.space import settle
 from .kinematics import Kinematics
@@ -34,7 +34,7 @@ class ConstraintFunctions:
         c, loop = kinematics.constraints, kinematics.loop_coordinates
         self.n, self.m, self.k = len(kinematics.v), len(c.labels), len(loop.names)
         self.h = len(c.values)
-        space = Space.of(self.n, kinematics.balls)
+        space = Space.of(self.n, kinematics.quaternion_slots)
         self.neutral = np.zeros(len(kinematics.names)) if space is None else space.neutral()
         self._names = (*kinematics.names, *self.values)
         self._rest = list(self.values.values())
@@ -107,7 +107,7 @@ class ConstraintFunctions:
         k, loop = self.kinematics, self.kinematics.loop_coordinates
         return settle((*k.names, *loop.names), (*k.kinds, *loop.kinds), values)
 
-    def _equations(self, wanted: Mapping[str, float]) -> Equations | None:
+    def _equations(self, wanted: Mapping[str, float]) -> WantedValues | None:
         """Values for coordinates of cut joints as equations."""
         loop = self.kinematics.loop_coordinates
         picked = [j for j, n in enumerate(loop.names) if n in wanted]
@@ -119,7 +119,7 @@ class ConstraintFunctions:
             y, y_q = self.loop(q)
             return y[picked], y_q[picked]
 
-        return Equations(
+        return WantedValues(
             measure,
             np.array([wanted[loop.names[j]] for j in picked]),
             np.array([scale[loop.kinds[j]] for j in picked]),
@@ -138,7 +138,7 @@ class ConstraintFunctions:
         if rough is not None:  # come near the guessed coordinates of cut joints first
             free = np.ones(len(self.place.q))
             free[self.place.velocities(held)] = 0.0
-            start = close(System(self.place_position, self.place, free, rough), start)[0]
+            start = close(ClosureSystem(self.place_position, self.place, free, rough), start)[0]
         for (name, _), value in zip(k.hints, self._hints(start), strict=True):
             if name not in given and name not in guess and np.isfinite(value):
                 start[k.names.index(name)] = value

@@ -9,11 +9,11 @@ import numpy as np
 from ..constraints import RollingDisc
 from ..constraints.rolling import LYING
 from ..errors import AssemblyError, ModelError
-from ..graph.rounding import vanishing
+from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
 from .constraint_functions import Array, ConstraintFunctions
-from .flaws import place_of
 from .kinematics import Kinematics
+from .undefined_rows import place_of
 
 IDLE = "holds nothing"  #: what is said of rows without slopes
 

@@ -13,17 +13,18 @@ from ..forces import CoordinateLoad, Force, JointCoordinate, Load, MarkerLoad, T
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
+from ..graph.spatial import Twist
 from ..graph.substitute import substitute, symbols_of
-from ..joints import Ball
+from ..joints import QuaternionSlot
 from ..records import dataclass
-from .couplings import couple
-from .flaws import find_flaws, refuse_rows_of_time
+from .constraint_equations import couple
 from .length import length_scale
 from .loops import Constraints, close_loop, differentiate_constraints, own_rows
-from .motion import Motion
-from .state import State, acceleration_name, lay_out
+from .motion import MarkerMotion
+from .state import MotionSymbols, acceleration_name, lay_out
 from .topology import Topology, find_topology
-from .tree import Link, Poses, Twist, build_links, link_twists
+from .tree import Link, Poses, build_links, link_twists
+from .undefined_rows import find_flaws, refuse_rows_of_time
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Kinematics:
     kinds: tuple[str, ...]  #: 'angle', 'length' or 'parameter' per coordinate
     velocity_names: tuple[str, ...]
     velocity_kinds: tuple[str, ...]
-    balls: tuple[Ball, ...]  #: where Euler parameters stand in q, and their angular velocity in v
+    quaternion_slots: tuple[QuaternionSlot, ...]  #: where Euler parameters stand in q, and their angular velocity in v
     q: tuple[Expr, ...]
     v: tuple[Expr, ...]
     a: tuple[Expr, ...]
@@ -81,7 +82,7 @@ class Kinematics:
     links: tuple[Link, ...]
     poses: Poses
     twists: tuple[Twist, ...]
-    motion: Motion
+    motion: MarkerMotion
     constraints: Constraints
     loop_coordinates: LoopCoordinates
     forces: tuple[ForceTerms, ...]
@@ -115,7 +116,7 @@ class Kinematics:
         return clock(self.graph, self.mechanism.inputs)
 
     @cached_property
-    def freedoms(self) -> tuple[str, ...]:
+    def velocity_labels(self) -> tuple[str, ...]:
         """What each velocity is called where coordinates are chosen: the coordinate whose rate it is, or itself."""
         if self.mechanism.given is not None:
             places = self.coordinate_of
@@ -154,7 +155,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
     a = tuple(graph.symbol(acceleration_name(n)) for n in layout.velocity_names)
     t = graph.symbol("t")
     rates = layout.rates(graph, q, v)
-    state = State(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
+    state = MotionSymbols(q, v, a, t, rates, clock(graph, mechanism.inputs), not layout.given)
     links = build_links(mechanism, topology, dict(zip(names, q, strict=True)))
     poses = Poses(mechanism, links)
     twists = tuple(link_twists(graph, links, v))
@@ -174,10 +175,10 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         loop_kinds += ["turn" if spec.joint.counts_turns else c.kind for c in spec.joint.coordinates]
         loop_values += loop_part.measured
     loop = _loop_coordinates(graph, (loop_names, loop_kinds, loop_values), state)
-    second = jvp(list(rates), state.along) if layout.balls or layout.given else a
+    second = jvp(list(rates), state.along) if layout.quaternion_slots or layout.given else a
     coordinates = {n: (q[j], rates[j], second[j]) for j, n in enumerate(names)}
     coordinates |= dict(zip(loop.names, zip(loop.values, loop.rates, loop.accelerations, strict=True), strict=True))
-    motion = Motion(poses, twists, state, coordinates, _turning(mechanism, topology))
+    motion = MarkerMotion(poses, twists, state, coordinates, _turning(mechanism, topology))
     coupled = couple(mechanism, motion)
     length = length_scale(mechanism)
     constraints = differentiate_constraints(graph, rows + coupled.rows, aligned + coupled.aligned, state, length)
@@ -190,7 +191,7 @@ def analyse(mechanism: Mechanism, independent: Collection[str] = ()) -> Kinemati
         kinds=kinds,
         velocity_names=layout.velocity_names,
         velocity_kinds=layout.velocity_kinds,
-        balls=layout.balls,
+        quaternion_slots=layout.quaternion_slots,
         q=q,
         v=v,
         a=a,
@@ -214,7 +215,7 @@ def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker
     """Angular velocities that cut joints in Euler parameters would have as velocities."""
     found = {}
     for spec in (mechanism.joints[k] for k in topology.cut):
-        for ball in spec.joint.balls:
+        for ball in spec.joint.quaternion_slots:
             for axis, name in enumerate(spec.velocities[ball.velocity : ball.velocity + 3]):
                 found[name] = (spec.predecessor, spec.successor, axis)
     return found
@@ -223,7 +224,7 @@ def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker
 def _loop_coordinates(
     graph: Graph,
     measured: tuple[list[str], list[str], list[Expr]],
-    state: State,
+    state: MotionSymbols,
 ) -> LoopCoordinates:
     names, kinds, values = measured
     along = {symbol: rate for symbol, rate in state.along.items() if symbol not in state.clock}
@@ -240,7 +241,7 @@ def _loop_coordinates(
     )
 
 
-def _resolve_force(force: Force, motion: Motion, mechanism: Mechanism) -> ForceTerms:
+def _resolve_force(force: Force, motion: MarkerMotion, mechanism: Mechanism) -> ForceTerms:
     """Evaluate a force element and write its loads in terms of the tree's own symbols."""
     loads = force.loads(motion)
     potential = force.potential(motion)
@@ -264,7 +265,7 @@ def _sorted(loads: Sequence[Load]) -> tuple[tuple[MarkerLoad, ...], tuple[Coordi
     )
 
 
-def _refuse_undefined_angles(mechanism: Mechanism, motion: Motion, wrapping: Sequence[str]) -> None:
+def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrapping: Sequence[str]) -> None:
     """Refuse force laws of an angle that is not defined, or jumps by a full turn: the force would jump with it.
 
     Raises
@@ -310,7 +311,7 @@ def _expressions(value: object) -> list[Expr]:
     return []
 
 
-def _coordinate_symbols(motion: Motion) -> list[tuple[str, Expr]]:
+def _coordinate_symbols(motion: MarkerMotion) -> list[tuple[str, Expr]]:
     return [(name, triple[0]) for name, triple in motion.coordinates.items()]
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 from ..describe.mechanism import Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from ..graph.rounding import settled_vector, size_of
+from ..graph.rounding_bounds import settled_vector, size_of
 from ..graph.vectors import Vec3
 from ..joints.rods import Distance, RevoluteSpherical
 from ..limits.descriptions import NO_LENGTH

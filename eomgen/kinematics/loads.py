@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
-from .inertia import Wrench
+from ..graph.spatial import Wrench
 from .kinematics import Kinematics
 
 
@@ -30,7 +30,7 @@ def coordinate_forces(kinematics: Kinematics) -> list[Expr]:
     """Force elements along coordinates, those of cut joints through their y_q."""
     graph, loop = kinematics.graph, kinematics.loop_coordinates
     total = [graph.zero] * len(kinematics.v)
-    place = {name: j for j, name in enumerate(kinematics.freedoms)}
+    place = {name: j for j, name in enumerate(kinematics.velocity_labels)}
     for terms in kinematics.forces:
         for load in terms.coordinate_loads:
             if load.coordinate in place:
@@ -46,8 +46,8 @@ def drive_inertias(kinematics: Kinematics) -> dict[int, Expr]:
     """Inertias of drives on coordinates of the tree, by the index of the velocity."""
     found: dict[int, Expr] = {}
     for spec in kinematics.mechanism.joints:
-        if spec.armature is not None and spec.coordinates[0] in kinematics.freedoms:
-            found[kinematics.freedoms.index(spec.coordinates[0])] = spec.armature
+        if spec.armature is not None and spec.coordinates[0] in kinematics.velocity_labels:
+            found[kinematics.velocity_labels.index(spec.coordinates[0])] = spec.armature
     return found
 
 

@@ -9,13 +9,13 @@ from ..describe.mechanism import JointSpec, Mechanism
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian, jvp
-from ..graph.rounding import vanishing
+from ..graph.rounding_bounds import vanishing
 from ..graph.substitute import substitute, symbols_of
 from ..limits.rounding import ROUNDED
 from ..records import dataclass
-from .state import State
+from .angle_sums import sum_of_turns
+from .state import MotionSymbols
 from .tree import Poses
-from .turns import sum_of_turns
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def close_loop(spec: JointSpec, poses: Poses, q: Sequence[Expr]) -> ClosedLoop:
 
 
 def differentiate_constraints(
-    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: State, length: Expr
+    graph: Graph, rows: Sequence[Row], aligned: Sequence[tuple[str, Expr]], state: MotionSymbols, length: Expr
 ) -> Constraints:
     """Form C_q, C_t, C' and gamma of the rows that do not vanish identically; ``length`` is that of the mechanism."""
     sizes = {"length": length.value or 0.0, "angle": 1.0}

@@ -100,7 +100,7 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
         The chosen independent coordinates are too many, unknown or cannot move the mechanism.
     """
     mechanism = kinematics.mechanism
-    named = dict(zip(kinematics.velocity_names, kinematics.freedoms, strict=True)) if mechanism.given else {}
+    named = dict(zip(kinematics.velocity_names, kinematics.velocity_labels, strict=True)) if mechanism.given else {}
     wanted = tuple(named.get(name, name) for name in tuple(independent) or mechanism.independent)
     _check_names(kinematics, wanted)
     values = {p.name: p.value for p in mechanism.parameters} | {u.name: u.value for u in mechanism.inputs}
@@ -122,16 +122,16 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
 
 def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
     problems = []
-    known = (*kinematics.freedoms, *kinematics.loop_coordinates.names)
+    known = (*kinematics.velocity_labels, *kinematics.loop_coordinates.names)
     for name in wanted:
-        if name in kinematics.freedoms:
+        if name in kinematics.velocity_labels:
             continue
         if name in kinematics.names:
             message = f"{name!r} is an Euler parameter, which cannot vary on its own"
-            remedy = f"choose the angular velocity instead, of {', '.join(kinematics.freedoms)}"
+            remedy = f"choose the angular velocity instead, of {', '.join(kinematics.velocity_labels)}"
             if kinematics.given_rates:
                 message = f"{name!r} is no velocity's own coordinate: its rate is given as a function of velocities"
-                remedy = f"choose of {', '.join(kinematics.freedoms)}"
+                remedy = f"choose of {', '.join(kinematics.velocity_labels)}"
             problems.append(kinematics.mechanism.problem("independent", message, remedy))
             continue
         if name in known:
@@ -191,7 +191,7 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
 
 def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], wanted: Sequence[str]) -> Mobility:
     kinematics = functions.kinematics
-    names, labels = kinematics.freedoms, kinematics.constraints.labels
+    names, labels = kinematics.velocity_labels, kinematics.constraints.labels
     n = len(names)
     q = configurations[0]
     jacobians = [functions.scaled_jacobian(x) if functions.m else np.empty((0, n)) for x in configurations]
@@ -239,7 +239,7 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
 
 
 def _choose(kinematics: Kinematics, jacobians: Sequence[Array], r: int, wanted: Sequence[str]) -> tuple[int, ...]:
-    names = kinematics.freedoms
+    names = kinematics.velocity_labels
     n_dof = len(names) - r
     picked = [names.index(name) for name in wanted]
     if len(picked) == n_dof:

@@ -12,10 +12,10 @@ from functools import cached_property
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Expr
+from ..graph.spatial import Twist
+from ..graph.tensors import add_matrices, rotate_symmetric, shift_tensor
 from ..graph.vectors import Mat3, Vec3
-from ..solids import shift_tensor, turn_tensor
-from ..solids.properties import add_tensors
-from .tree import Link, Poses, Twist
+from .tree import Link, Poses
 
 
 class Momentum:
@@ -89,14 +89,14 @@ class Momentum:
         o = vec.zero(self.graph)
         total: Mat3 = (o, o, o)
         for k, link in enumerate(self.links):
-            own = turn_tensor(self.poses.link(k).rotation, link.inertia)
+            own = rotate_symmetric(self.poses.link(k).rotation, link.inertia)
             arm = vec.sub(self._centre(k), self.centre)
-            total = add_tensors(total, add_tensors(own, shift_tensor(link.mass, arm)))
+            total = add_matrices(total, add_matrices(own, shift_tensor(link.mass, arm)))
         return total
 
     def inertia_about(self, point: Vec3) -> Mat3:
         """Inertia about a point (kg m^2)."""
-        return add_tensors(self.inertia, shift_tensor(self.mass, vec.sub(self.centre, point)))
+        return add_matrices(self.inertia, shift_tensor(self.mass, vec.sub(self.centre, point)))
 
     def jacobian(self, n: int) -> tuple[tuple[Expr, ...], ...]:
         """Velocity of the centre of mass for each generalized velocity, (3, n).

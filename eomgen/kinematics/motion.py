@@ -10,16 +10,17 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2
 from ..graph.differentiate import jvp
+from ..graph.spatial import Twist
 from ..graph.vectors import Mat3, Vec3
+from .angle_sums import sum_of_turns
 from .momentum import Momentum
-from .state import State
-from .tree import Poses, Twist
-from .turns import sum_of_turns
+from .state import MotionSymbols
+from .tree import Poses
 
 COORDINATE_SUFFIXES = ("", "_dot", "_ddot")
 
 
-class Motion:
+class MarkerMotion:
     """Implements the views of forces and constraints, and resolves every derived symbol of a mechanism.
 
     Parameters
@@ -34,7 +35,7 @@ class Motion:
         self,
         poses: Poses,
         twists: Sequence[Twist],
-        state: State,
+        state: MotionSymbols,
         coordinates: Mapping[str, tuple[Expr, Expr, Expr]],
         turning: Mapping[str, tuple[Marker, Marker, int]] | None = None,
     ) -> None:

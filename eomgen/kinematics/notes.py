@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from ..constraints import Driver
 from ..graph.traverse import reachable
+from ..operations import CHOICE, OPERATIONS
 from .kinematics import Kinematics
 from .mobility import Mobility
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
 SHOWN = 6
-#: Operations that may make a corner -> what people write.
-CORNERS = {"abs": "abs", "sign": "sign", "min": "min", "max": "max", "select": "where"}
 
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
@@ -63,7 +62,7 @@ def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]
         if isinstance(constraint, Driver):
             graph = constraint.value.graph
             operations = {graph.nodes[i][0] for i in reachable(graph, [constraint.value.id])}
-            corners = [word for operation, word in CORNERS.items() if operation in operations]
+            corners = [row.word for row in OPERATIONS.values() if row.kind == CHOICE and row.name in operations]
             found += [(constraint.name, corners)] if corners else []
     return found
 

@@ -12,12 +12,14 @@ from dataclasses import fields, replace
 
 from ..frames import GROUND
 from ..graph import vectors as vec
-from ..graph.core import Expr, Graph, cos, sin
+from ..graph.core import Expr, Graph
+from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
+from ..joints.rotation_coordinates import about
 from ..records import dataclass
-from .inertia import SpatialInertia, Wrench
-from .rates import JointRates
-from .tree import Link, Twist, link_twists
+from .joint_rates import JointRates
+from .link_inertia import SpatialInertia
+from .tree import Link, link_twists
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ def resolve_parallel(
             constant = vec.product(constants[link.parent], link.turn)
             constants.append(constant)
             sums.append(total)
-            axes.append(vec.product(constant, _turn(graph, total)))
+            axes.append(vec.product(constant, about(graph, 2, total)))
             position = link.position if holder is None else vec.times(holder, link.position)
             resolved.append(replace(link, turn=still, joint_rotation=still, position=position))
             continue
@@ -127,8 +129,3 @@ def _about_z(rotation: Mat3) -> bool:
     """Whether a rotation leaves the z axis alone."""
     others = (rotation[0][2], rotation[1][2], rotation[2][0], rotation[2][1])
     return rotation[2][2].value == 1.0 and all(x.is_zero for x in others)
-
-
-def _turn(graph: Graph, angle: Expr) -> Mat3:
-    c, s, o = cos(angle), sin(angle), graph.zero
-    return ((c, -s, o), (s, c, o), (o, o, graph.one))

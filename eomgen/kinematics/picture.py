@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from ..errors import MissingDependencyError, UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import save_figure
 
 TREE, CUT, ELEMENT, BODY = "#1f4e79", "#c0392b", "#7d5ba6", "#eaf1f8"

@@ -12,8 +12,9 @@ from __future__ import annotations
 from ..frames import GROUND
 from ..graph import vectors as vec
 from ..graph.core import Graph
+from ..graph.tensors import subtract_matrices, symmetric
 from ..graph.vectors import Mat3
-from .inertia import SpatialInertia, no_inertia, subtract_matrices, symmetric
+from .link_inertia import SpatialInertia, no_inertia
 from .tree import Link
 
 

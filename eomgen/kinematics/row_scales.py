@@ -5,8 +5,8 @@ length scale of the mechanism or 1.  That of a loop far smaller than the mechani
 of its own scaled gradient, or its rows would be lost beside the others.  A relation written by a user may be multiplied
 by anything, areas in m^2 or numbers of teeth; its size is the length of its scaled gradient, so that a factor does not
 matter (row equilibration: A. van der Sluis, Numerische Mathematik 14, 1969).  A gradient that is not told from rounding
-of the terms that were added in it (:mod:`~..graph.rounding`) is no size: such a row counts as nothing beside those
-terms.  Factors that are parameters stay symbols.
+of the terms that were added in it (:mod:`~..graph.rounding_bounds`) is no size: such a row counts as nothing beside
+those terms.  Factors that are parameters stay symbols.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..graph.core import Expr
-from ..graph.rounding import is_rounding, terms_of, with_bounds
+from ..graph.rounding_bounds import is_rounding, terms_of, with_bounds
 from ..graph.substitute import substitute, symbols_of
 from ..graph.traverse import reachable
 from ..limits.descriptions import BY_CHANCE, SMALL_LOOP
@@ -106,7 +106,7 @@ def _places(kinematics: Kinematics) -> list[dict[Expr, Expr]]:
     unit = {"length": kinematics.length_scale, "angle": graph.one}
     first: dict[Expr, Expr] = {}
     second: dict[Expr, Expr] = {}
-    real = {i for i, _ in kinematics.balls}
+    real = {i for i, _ in kinematics.quaternion_slots}
     for j, (symbol, name, kind) in enumerate(zip(kinematics.q, kinematics.names, kinematics.kinds, strict=True)):
         first[symbol] = known.get(name, graph.one if j in real else graph.zero)
         second[symbol] = first[symbol] + unit.get(kind, graph.one) * (0.3 + 0.07 * j)

@@ -9,8 +9,8 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jacobian
-from ..joints import Ball
-from ..joints.rotations import parameter_rates
+from ..joints import QuaternionSlot
+from ..joints.rotation_coordinates import parameter_rates
 from ..records import dataclass
 from .topology import Topology
 
@@ -24,9 +24,9 @@ def acceleration_name(velocity: str) -> str:
 class StateLayout:
     """Names and kinds of the tree's coordinates and velocities.
 
-    ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``balls`` says where Euler
-    parameters are, the other velocities being the rates of the other coordinates in the same order.  ``given`` is q' of
-    given equations where it is not v itself.
+    ``parent`` is per velocity the branch-induced parent (Featherstone, RBDA, sec. 6.4); ``quaternion_slots`` says where
+    Euler parameters are, the other velocities being the rates of the other coordinates in the same order.  ``given`` is
+    q' of given equations where it is not v itself.
     """
 
     names: tuple[str, ...]
@@ -34,18 +34,18 @@ class StateLayout:
     velocity_names: tuple[str, ...]
     velocity_kinds: tuple[str, ...]
     parent: tuple[int, ...]
-    balls: tuple[Ball, ...] = ()
+    quaternion_slots: tuple[QuaternionSlot, ...] = ()
     given: tuple[Expr, ...] = ()
 
     def rates(self, graph: Graph, q: Sequence[Expr], v: Sequence[Expr]) -> tuple[Expr, ...]:
         """q' = N(q) v."""
         if self.given:
             return self.given
-        if not self.balls:
+        if not self.quaternion_slots:
             return tuple(v)
-        turning = {k for ball in self.balls for k in range(ball.velocity, ball.velocity + 3)}
+        turning = {k for ball in self.quaternion_slots for k in range(ball.velocity, ball.velocity + 3)}
         plain = iter([x for k, x in enumerate(v) if k not in turning])
-        starts = {ball.coordinate: ball.velocity for ball in self.balls}
+        starts = {ball.coordinate: ball.velocity for ball in self.quaternion_slots}
         result: list[Expr] = []
         while len(result) < len(q):
             i = len(result)
@@ -57,7 +57,7 @@ class StateLayout:
 
 
 @dataclass(frozen=True)
-class State:
+class MotionSymbols:
     """The symbols of the motion: coordinates, velocities, accelerations, time; and q' in terms of them."""
 
     q: tuple[Expr, ...]
@@ -97,11 +97,13 @@ def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
     velocity_names: list[str] = []
     velocity_kinds: list[str] = []
     parent: list[int] = []
-    balls: list[Ball] = []
+    quaternion_slots: list[QuaternionSlot] = []
     last = {GROUND: -1}  # the velocity next to a body towards ground
     for branch in topology.branches:
         spec = mechanism.joints[branch.joint]
-        balls += [Ball(len(names_list) + i, len(velocity_names) + j) for i, j in spec.joint.balls]
+        quaternion_slots += [
+            QuaternionSlot(len(names_list) + i, len(velocity_names) + j) for i, j in spec.joint.quaternion_slots
+        ]
         names_list += spec.coordinates
         kinds_list += [coordinate.kind for coordinate in spec.joint.coordinates]
         above = last[branch.parent]
@@ -117,5 +119,5 @@ def lay_out(mechanism: Mechanism, topology: Topology) -> StateLayout:
         tuple(velocity_names),
         tuple(velocity_kinds),
         tuple(parent),
-        tuple(balls),
+        tuple(quaternion_slots),
     )

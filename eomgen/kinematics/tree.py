@@ -10,13 +10,12 @@ from ..describe.mechanism import Mechanism
 from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
-from ..graph.rounding import settled_rotation
+from ..graph.rounding_bounds import settled_rotation
+from ..graph.spatial import Twist, Wrench
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .inertia import SpatialInertia, body_inertia, place_point, settled_matrix
+from .link_inertia import SpatialInertia, body_inertia, place_point, settled_matrix
 from .topology import Topology
-
-Twist = tuple[Vec3, Vec3]
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,11 @@ class Link:
         """A twist of the parent, seen in this link's frame."""
         angular, linear = twist
         return self.down(angular), self.down(vec.add(linear, vec.cross(angular, self.position)))
+
+    def lift(self, wrench: Wrench) -> Wrench:
+        """A wrench on the link, about the parent's origin in parent link axes."""
+        push = self.up(wrench[1])
+        return vec.add(self.up(wrench[0]), vec.cross(self.position, push)), push
 
 
 def place(frame: Frame, marker: Frame) -> Frame:

@@ -16,14 +16,15 @@ from ..frames import GROUND, Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..graph.differentiate import jacobian
+from ..graph.spatial import Twist
 from ..graph.substitute import substitute
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
-from .couplings import couple
+from .angle_sums import sum_of_turns
+from .constraint_equations import couple
 from .kinematics import Kinematics
-from .motion import Motion
-from .tree import Poses, Twist
-from .turns import sum_of_turns
+from .motion import MarkerMotion
+from .tree import Poses
 
 Row6 = tuple[Expr, ...]  # force, moment
 
@@ -265,8 +266,8 @@ class JointWrenches:
         placed = {n: (y + changes[n] if n in changes else y, r, a) for n, (y, r, a) in known.items()}
         moving = {n: (y, r + changes[n] if n in changes else r, a) for n, (y, r, a) in known.items()}
         plain, state, turning = kinematics.poses, kinematics.motion.state, kinematics.motion.turning
-        displaced = Motion(_Displaced(kinematics, self.origins, moves), kinematics.twists, state, placed, turning)
-        pushed = Motion(plain, self._pushed_twists(moves), state, moving, turning)
+        displaced = MarkerMotion(_Displaced(kinematics, self.origins, moves), kinematics.twists, state, placed, turning)
+        pushed = MarkerMotion(plain, self._pushed_twists(moves), state, moving, turning)
         rows = [r for r in couple(self.mechanism, displaced).rows if r.level == "position"]
         rows += [r for r in couple(self.mechanism, pushed).rows if r.level != "position"]
         every = [s for six in symbols for s in six]

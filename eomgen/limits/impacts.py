@@ -42,3 +42,5 @@ FOUND = 1e-7
 #: Part of C_p along the direction of lost rank that opens a change point: the direction is known to the singular
 #: value at a point that was found, 1e-4.
 OPENS = 1e-3
+#: Change of a state by which an input is asked whether it depends on it.
+ELSEWHERE = 1e-3

@@ -39,3 +39,5 @@ NULL = 1e-13
 ASTRAY = 1e-5
 #: Volume of a cell, in units of its edges, below which it is flat.
 FLAT_CELL = 1e-12
+#: Scaled way to either side over which the rate of a led coordinate is differenced where it turns back.
+EXTREME = 1e-4

@@ -12,6 +12,8 @@ SUMMED = 4.0 * EPS
 ROW = 2.0 * EPS
 #: Stands for a size that is zero, where it divides: far below any size, far above the least number (2.2e-308).
 TINY = 1e-300
+#: A product above this keeps all digits: numbers below 2.2e-308 do not.
+NORMAL = 1e-290
 #: The same of sizes that are squared.
 TINY_ROOT = 1e-150
 LARGE_ROOT = 1e150  #: a number whose square is beyond double precision

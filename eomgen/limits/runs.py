@@ -6,7 +6,18 @@ from .rounding import EPS
 
 # -- tolerances ------------------------------------------------------------------------------------------------------
 RTOL, ATOL = 1e-8, 1e-10  #: of a run, where nothing is said
+SCIPY_RTOL, SCIPY_ATOL = 1e-3, 1e-6  #: of SciPy's solvers, where they are called as SciPy calls them
+SENSITIVITY_RTOL, SENSITIVITY_ATOL = 1e-9, 1e-11  #: of runs whose derivatives are asked for
 LEAST_RTOL = 100.0 * EPS  #: as in SciPy: nothing smaller can be kept
+
+# -- steps -----------------------------------------------------------------------------------------------------------
+#: The first step (Hairer, Norsett and Wanner, Solving ODEs I, sec. II.4): norms of y and y' below which it is that of
+#: nothing known, that step (s), norms of y' and y'' below which both are nothing, and the growth then.
+UNKNOWN, FIRST, STRAIGHT, GROWTH = 1e-5, 1e-6, 1e-15, 1e-3
+FINE = 2.5e-15  #: a step above this part of the time is longer than the spacing of numbers: eleven of it
+SAME = 1e-9  #: part of a step by which two count as one
+SLOPE, SIZE = 1.5e-8, 1e-3  #: part of a variable over which its slope is differenced, the root of eps; its least size
+SLOW = 1e-3  #: rate of Newton's iterations in a Radau step above which the Jacobian is renewed
 
 # -- runs that stall -------------------------------------------------------------------------------------------------
 SHORT = 5e-9  #: mean step relative to the span below which a run does not get on: 2e8 steps to its end
@@ -33,6 +44,7 @@ RESTING = 1000.0  #: times that, at both ends of a step, of a value that stays a
 SAMPLED, HALVED = 16, 50  #: parts of a step in which a touch is looked for; times that it is halved after a reset
 TOUCHING = 1e-9  #: part of its size at which the value of an event counts as zero, and its rate as none
 INSTANT = 1e-14  #: part of the time within which two are one: 50 roundings of a step's end
+EARLIEST = 1e-3  #: (s) stands for the time where that is less
 AHEAD = 1e-8  #: part of the run over which the rate of an event's value is taken: the root of its rounding
 
 # -- inputs ----------------------------------------------------------------------------------------------------------

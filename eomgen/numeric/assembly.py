@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import AssemblyError
-from ..limits.constraints import CONTRADICTION, MEASURED
-from . import algebra
+from ..errors import AssemblyError, UnavailableError
 from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
-from .closure import FAR, Equations, System, close, closed, remoteness
+from .closure import ClosureSystem, WantedValues, close, closed
 from .projection import largest
-from .ranks import rank
 from .scales import Array, Indices, Position, Scales
+from .starts import starts
 
-__all__ = ["Assembly", "Equations", "Rates", "VelocityEquations", "assemble", "assemble_velocity", "starts"]
+__all__ = ["Assembly", "Rates", "VelocityEquations", "WantedValues", "assemble", "assemble_velocity"]
 
 RESTARTS = 24  #: further starts near the guess
-RADII = (0.05, 0.2, 0.5, 1.0, 1.6, 2.4)  #: scaled distance of the starts, each used for a few
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 
 
 class Assembly(NamedTuple):
@@ -39,7 +35,7 @@ def assemble(
     scales: Scales,
     *,
     held: Sequence[int] | Indices = (),
-    equations: Equations | None = None,
+    equations: WantedValues | None = None,
     alignment: Callable[[Array], Array] | None = None,
     names: Sequence[str] = (),
     labels: Sequence[str] = (),
@@ -56,7 +52,7 @@ def assemble(
     scales : Scales
     held : sequence of int
         Coordinates that must not move.
-    equations : Equations, optional
+    equations : WantedValues, optional
         Values of functions of q to reach exactly.
     alignment : callable, optional
         q -> (n_a,) numbers that are positive unless a loop closes with a joint's axes flipped.
@@ -79,7 +75,7 @@ def assemble(
     held = scales.velocities(held)
     free = np.ones(len(scales.q))
     free[held] = 0.0
-    system = System(position, scales, free, equations)
+    system = ClosureSystem(position, scales, free, equations)
     best, least, flipped = guess, np.inf, False
     for attempt, start in enumerate(starts(guess, free, scales, restarts)):
         with np.errstate(all="ignore"):
@@ -91,129 +87,14 @@ def assemble(
             flipped = True
         else:
             return Assembly(q, residual, attempt, largest(scales.distance(q, guess)))
-    failure = _Failure(system, guess, held, best, flipped, names, labels, restarts)
-    raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])
+    raise _failed(system, guess, held, best, flipped, names, labels, restarts)
 
 
-def starts(guess: Array, free: Array, scales: Scales, restarts: int) -> Iterator[Array]:
-    """The guess, then `restarts` places around it, ever farther away; the same ones every time."""
-    yield guess
-    for k in range(restarts):
-        radius = RADII[min(k * len(RADII) // restarts, len(RADII) - 1)]
-        # Halton sequence; the shifted index keeps later coordinates from repeating earlier ones
-        unit = [_halton(k + 1 + 7 * (i // len(PRIMES)), PRIMES[i % len(PRIMES)]) for i in range(len(free))]
-        yield scales.move(guess, radius * free * (2.0 * np.array(unit) - 1.0))
-
-
-def _halton(index: int, base: int) -> float:
-    value, part = 0.0, 1.0
-    while index:
-        part /= base
-        value += part * (index % base)
-        index //= base
-    return value
-
-
-class _Failure(NamedTuple):
-    """Everything needed to say why an assembly failed."""
-
-    system: System
-    guess: Array
-    held: Indices
-    best: Array
-    flipped: bool
-    names: Sequence[str]
-    labels: Sequence[str]
-    restarts: int
-
-    def message(self) -> str:
-        given = self._given(self.guess, self.system.equations.values if self.system.equations else np.empty(0))
-        if self.flipped:
-            return (
-                f"the loops close only with the axes of a joint flipped{self._with(given)}; "
-                "give initial values nearer to the wanted position"
-            )
-        gaps = "the largest gaps are " + ", ".join(f"{label} {gap:.3g}" for label, gap in self.open_rows())
-        contradiction = self._contradiction()
-        if contradiction:
-            return contradiction
-        if not given:
-            tried = f"({self.restarts + 1} starts tried)"
-            return f"the loops do not close from the given guess {tried}: {gaps}; {self._advice()}"
-        free = System(self.system.position, self.system.scales, np.ones_like(self.system.free))
-        for start in starts(self.best, free.free, free.scales, self.restarts // 2):
-            with np.errstate(all="ignore"):
-                q, residual = close(free, start)
-            if closed(residual):
-                break
-        else:
-            return (
-                f"the loops do not close{self._with(given)}, nor with these values left free "
-                f"({self.restarts + 1} starts tried): {gaps}; {self._advice()}"
-            )
-        near = self._given(q, self.system.equations.evaluate(q)[0] if self.system.equations else np.empty(0))
-        dof = len(free.free) - rank(free.evaluate(q)[1]).rank
-        if len(given) > dof:
-            return (
-                f"the given values {', '.join(given)} are inconsistent: {len(given)} values for {dof} "
-                f"degree{'s' if dof != 1 else ''} of freedom, and with all of them held {gaps}; "
-                f"give fewer, or consistent ones such as {', '.join(near)}"
-            )
-        return f"the loops cannot close{self._with(given)}: {gaps}; a closed position nearby has {', '.join(near)}"
-
-    def _contradiction(self) -> str:
-        """Words for open rows that no position can satisfy together: they depend on each other everywhere."""
-        m = len(self.system.position(self.best)[0])
-        labels = (list(self.labels) or [f"C[{i}]" for i in range(m)])[:m]
-        gaps = [(labels.index(label), label, gap) for label, gap in self.open_rows() if label in labels]
-        rows = [i for i, _, _ in gaps]
-        if not rows:
-            return ""
-        for start in starts(self.best, np.ones_like(self.system.free), self.system.scales, 3):
-            C, C_q = self.system.position(start)
-            J, e = self.system.scales.jacobian(C_q)[rows], self.system.scales.residual(C)[rows]
-            if not np.isfinite(J).all():
-                return ""
-            out_of_reach = algebra.svd(J)[0][:, rank(J).rank :]
-            if largest(out_of_reach.T @ e) <= MEASURED:
-                return ""
-        names = ", ".join(f"{label} (off by {gap:.3g})" for _, label, gap in gaps)
-        if len(gaps) == 1:
-            return (
-                f"the constraint {names} can never hold: no coordinate changes it; take it away, or correct its values"
-            )
-        return (
-            f"the constraints {names} contradict each other: they restrict the same motion and cannot hold together; "
-            "take one away, or make their values agree"
-        )
-
-    def _advice(self) -> str:
-        e, J = self.system.evaluate(self.guess)
-        far = remoteness(e, np.sqrt((J * J).sum(axis=1)))
-        if far > FAR:
-            away = f"the guess is far away (about {far:.2g} times the mechanism's size)"
-            return f"{away}: give a better one, or check the dimensions"
-        return "check the dimensions, or give a better guess"
-
-    def _with(self, given: list[str]) -> str:
-        return f" with {', '.join(given)}" if given else ""
-
-    def _given(self, q: Array, y: Array) -> list[str]:
-        names = self.names or [f"q[{i}]" for i in range(len(q))]
-        coordinates = [f"{names[i]} = {q[i]:.6g}" for i in self.system.scales.coordinates(self.held)]
-        functions = self.system.equations.names if self.system.equations else ()
-        return coordinates + [f"{name} = {value:.6g}" for name, value in zip(functions, y, strict=True)]
-
-    def open_rows(self) -> list[tuple[str, float]]:
-        """The three rows that stay open the most: label and gap."""
-        C = self.system.position(self.best)[0]
-        e, found = self.system.scales.residual(C), list(C)
-        labels = list(self.labels) or [f"C[{i}]" for i in range(len(C))]
-        if self.system.equations:
-            y = self.system.equations.difference(self.system.equations.evaluate(self.best)[0])
-            e = np.concatenate([e, y / self.system.equations.scales])
-            found += list(y)
-            labels += list(self.system.equations.names)
-        worst = np.argsort(-np.abs(e), kind="stable")[:3].tolist()
-        order = [i for i in worst if not abs(e[i]) <= CONTRADICTION] or worst[:1]
-        return [(labels[i], abs(float(found[i]))) for i in order]
+def _failed(system: ClosureSystem, *found: Any) -> AssemblyError:
+    """The error that says why; a slim package says only that."""
+    try:
+        from .assembly_failure import AssemblyFailure
+    except UnavailableError:
+        return AssemblyError("the loops do not close with the given values; give others, or check the dimensions")
+    failure = AssemblyFailure(system, *found)
+    return AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])

@@ -17,12 +17,13 @@ from .scales import Array, Position, Scales
 
 STEPS = 80  #: damped steps at most
 DAMPING = 1e-3  #: relative to the largest diagonal entry of J J^T, at first
+LEAST, MOST = 1e-8, 1e8  #: the same after a step that gained nothing, and where the search ends
 LONGEST = 0.5  #: largest scaled step
 FAR = 10.0  #: scaled distance above which steps grow with it
 STEEP = 10.0  #: length of a row's scaled gradient above which the row counts less, lest it drown the others
 
 
-class Equations(NamedTuple):
+class WantedValues(NamedTuple):
     """Values wanted for functions y(q), such as the coordinates of cut joints."""
 
     evaluate: Callable[[Array], tuple[Array, Array]]  #: q (n,) -> y (k,), y_q (k, n)
@@ -37,13 +38,13 @@ class Equations(NamedTuple):
         return np.where(self.angles, np.remainder(gap + np.pi, 2.0 * np.pi) - np.pi, gap)
 
 
-class System(NamedTuple):
+class ClosureSystem(NamedTuple):
     """C(q) = 0 and y(q) = values with some coordinates held."""
 
     position: Position
     scales: Scales
     free: Array  #: (n,) 1.0 for a velocity of a coordinate that may move, 0.0 for a held one
-    equations: Equations | None = None
+    equations: WantedValues | None = None
 
     def evaluate(self, q: Array) -> tuple[Array, Array]:
         """Scaled residual e (m + k,) and its scaled Jacobian (m + k, n), zero in the columns of held coordinates."""
@@ -57,7 +58,7 @@ class System(NamedTuple):
         return e, J * self.free
 
 
-def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING) -> tuple[Array, float]:
+def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = DAMPING) -> tuple[Array, float]:
     """Minimise the scaled residual from q.
 
     Damping at first: none where q is near a closed position, so that directions that hardly count do not creep.
@@ -97,8 +98,8 @@ def close(system: System, q: Array, steps: int = STEPS, damping: float = DAMPING
         if not gained > 0.0:  # NaN included
             if size <= SETTLED:
                 break
-            damping = max(10.0 * damping, 1e-8)
-            if damping > 1e8:
+            damping = max(10.0 * damping, LEAST)
+            if damping > MOST:
                 break
             continue
         settled = size <= SETTLED and largest(e_trial) > 0.5 * size

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import AssemblyError
-from .closure import DAMPING, Equations, System, close, closed
+from .closure import DAMPING, ClosureSystem, WantedValues, close, closed
 from .projection import largest
 from .scales import Array, Indices, Position, Scales
 
@@ -29,7 +29,7 @@ def follow(
     scales: Scales,
     held: Indices,
     values: Array,
-    equations: Equations | None = None,
+    equations: WantedValues | None = None,
 ) -> Array:
     """Move held coordinates, and functions y(q), from where they are to new values; the others follow.
 
@@ -43,7 +43,7 @@ def follow(
         Coordinates that are led; all four Euler parameters of a rotation or none.
     values : (k,) array
         Their values at the end, reached exactly.
-    equations : Equations, optional
+    equations : WantedValues, optional
         Functions of q that are led to values as well.
 
     Returns
@@ -76,7 +76,7 @@ def follow(
         trial = np.array(q)
         trial[held] = values if reached == 1.0 else scales.move(start, reached * way)[held]
         part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
-        system = System(position, scales, free, part)
+        system = ClosureSystem(position, scales, free, part)
         for damping in (0.0, DAMPING):
             moved, residual = close(system, trial, steps=15, damping=damping)
             if closed(residual):
@@ -125,7 +125,7 @@ def follow_time(position: Callable[[float], Position], start: Array, scales: Sca
             return q
         reached = end if abs(end - t) <= abs(step) else t + step
         ahead = scales.move(q, slope * (reached - t))
-        trial, residual = close(System(position(reached), scales, free), ahead, steps=15)
+        trial, residual = close(ClosureSystem(position(reached), scales, free), ahead, steps=15)
         change = scales.distance(trial, q)
         if closed(residual) and largest(change) <= TIMED:
             q, t, slope = trial, reached, change / (reached - t)

@@ -8,6 +8,8 @@ from typing import Any
 from ..errors import UsageError
 from ..texts import shown
 
+MOST = 10**15  #: all whole numbers up to here are doubles, and their products with sizes of models no infinities
+
 
 def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -> int:
     """A whole number within limits.
@@ -17,8 +19,9 @@ def read_count(what: str, given: Any, least: int = 0, most: int | None = None) -
     UsageError
     """
     found = as_count(given)
-    if found is None or found < least or (most is not None and found > most):
-        limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+    if found is None or found < least or found > (MOST if most is None else most):
+        endless = most is None and (found is None or found < least)
+        limits = f"of at least {least}" if endless else f"from {least} to {MOST if most is None else most}"
         raise UsageError(f"{what} must be a whole number {limits}, not {shown(given)}")
     return found
 

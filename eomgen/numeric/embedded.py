@@ -153,7 +153,7 @@ def rhs(
     return motion(terms, position, rate, q, v, scales, rank, independent, given)[0][len(q) + len(v) :]
 
 
-class Residuals(NamedTuple):
+class DynamicsSlopes(NamedTuple):
     """Derivatives of r1 = M a + h + C_q^T l, r2 = C_q a + gamma, r3 = C_q v + C_t at fixed a, l."""
 
     r1_q: Array  #: (n, n_q)
@@ -165,7 +165,7 @@ class Residuals(NamedTuple):
 
 def jacobian(
     terms: Callable[[Array, Array], Terms],
-    residuals: Callable[[Array, Array, Array, Array], Residuals],
+    residuals: Callable[[Array, Array, Array, Array], DynamicsSlopes],
     position: Position,
     rate: Rate,
     q: Array,
@@ -180,7 +180,7 @@ def jacobian(
     Parameters
     ----------
     terms, residuals, position, rate : callables
-        (q, v) -> Terms; (q, v, a, l) -> Residuals; q -> C, C_q; q -> C_t.
+        (q, v) -> Terms; (q, v, a, l) -> DynamicsSlopes; q -> C, C_q; q -> C_t.
     q, v : (n,) arrays
         A state on the manifold, where the result is exact; others are projected first.
     """

@@ -90,7 +90,7 @@ class Around(NamedTuple):
         return (change if space is None else space.velocities(self.q, change)) / self.scales.q
 
 
-class Curve:
+class ClosedCurve:
     """Closed points on either side of a state, whose distance from it, as T sees it, is linear.
 
     Raises
@@ -183,7 +183,7 @@ def _interpolate(
 ) -> tuple[Array, float]:
     """The value in the middle, and its error in accelerations."""
     scales, n_q, n = around.scales, len(around.q), len(around.v)
-    curve, pairs = Curve(around, reach), []
+    curve, pairs = ClosedCurve(around, reach), []
     for k in range(1, PAIRS + 1):
         ahead, behind = curve.find(k), curve.find(-k)
         if k == 1 and not sum(curve.pivots) >= MIDDLE * here:

@@ -85,7 +85,7 @@ class Scales(NamedTuple):
             return chosen
         space = self.space
         found = [int(space.plain_q[np.searchsorted(space.plain_v, k)]) for k in chosen if k in space.plain_v]
-        found += [k for i, j in space.balls if j in chosen for k in range(i, i + 4)]
+        found += [k for i, j in space.quaternion_slots if j in chosen for k in range(i, i + 4)]
         return np.array(found, dtype=np.intp)
 
     def velocities(self, coordinates: Sequence[int] | Indices) -> Indices:
@@ -95,5 +95,5 @@ class Scales(NamedTuple):
             return chosen
         space = self.space
         found = [int(space.plain_v[np.searchsorted(space.plain_q, k)]) for k in chosen if k in space.plain_q]
-        found += [k for i, j in space.balls if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
+        found += [k for i, j in space.quaternion_slots if any(i <= c < i + 4 for c in chosen) for k in range(j, j + 3)]
         return np.array(found, dtype=np.intp)

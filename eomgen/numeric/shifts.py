@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import NonFiniteError
-from .embedded import Residuals, Terms, accelerate, embed
+from .embedded import DynamicsSlopes, Terms, accelerate, embed
 from .projection import minimum_norm, project
 from .scales import Array, Indices, Position, Rate, Scales
 
@@ -28,7 +28,7 @@ class Shifts(NamedTuple):
 
 def shift_jacobian(
     terms: Callable[[Array, Array], Terms],
-    residuals: Callable[[Array, Array, Array, Array], Residuals],
+    residuals: Callable[[Array, Array, Array, Array], DynamicsSlopes],
     shifts: Callable[[Array, Array, Array, Array], Shifts],
     position: Position,
     rate: Rate,
@@ -43,7 +43,7 @@ def shift_jacobian(
     Parameters
     ----------
     terms, residuals, shifts, position, rate : callables
-        (q, v) -> Terms; (q, v, a, l) -> Residuals and Shifts; q -> C, C_q; q -> C_t.
+        (q, v) -> Terms; (q, v, a, l) -> DynamicsSlopes and Shifts; q -> C, C_q; q -> C_t.
     q, v : (n,) arrays
         A state on the manifold, where the result is exact; others are projected first.
     """

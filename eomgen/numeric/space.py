@@ -21,18 +21,18 @@ Indices: TypeAlias = NDArray[np.intp]
 
 
 class Space(NamedTuple):
-    """Where balls are in q and v, and what goes with what elsewhere."""
+    """Where quaternion_slots are in q and v, and what goes with what elsewhere."""
 
-    balls: tuple[tuple[int, int], ...]  #: first entries in q and in v
+    quaternion_slots: tuple[tuple[int, int], ...]  #: first entries in q and in v
     plain_q: Indices  #: coordinates that are in no ball
     plain_v: Indices  #: their velocities
 
     @classmethod
-    def of(cls, n_v: int, balls: Sequence[Sequence[int]]) -> Space | None:
+    def of(cls, n_v: int, quaternion_slots: Sequence[Sequence[int]]) -> Space | None:
         """The space of n_v velocities; None where q' = v throughout."""
-        if not balls:
+        if not quaternion_slots:
             return None
-        pairs = tuple((int(i), int(j)) for i, j in balls)
+        pairs = tuple((int(i), int(j)) for i, j in quaternion_slots)
         q = np.setdiff1d(np.arange(n_v + len(pairs)), [k for i, _ in pairs for k in range(i, i + 4)])
         v = np.setdiff1d(np.arange(n_v), [k for _, j in pairs for k in range(j, j + 3)])
         return cls(pairs, q.astype(np.intp), v.astype(np.intp))
@@ -41,22 +41,22 @@ class Space(NamedTuple):
         """q' = N(q) v, (n_q,) or (n_q, k)."""
         result = np.empty((len(q), *v.shape[1:]))
         result[self.plain_q] = v[self.plain_v]
-        for i, j in self.balls:
+        for i, j in self.quaternion_slots:
             result[i : i + 4] = _turn(q[i : i + 4], v[j : j + 3])
         return result
 
     def change(self, q: Array, dq: Array, v: Array, dv: Array) -> Array:
         """The change of N(q) v."""
         result = self.rates(q, dv)
-        for i, j in self.balls:
+        for i, j in self.quaternion_slots:
             result[i : i + 4] += _turn(dq[i : i + 4], v[j : j + 3])
         return result
 
     def velocities(self, q: Array, dq: Array) -> Array:
         """The smallest v whose N v differs from dq only along the Euler parameters; (n_v,) or (n_v, k)."""
-        result = np.empty((len(q) - len(self.balls), *dq.shape[1:]))
+        result = np.empty((len(q) - len(self.quaternion_slots), *dq.shape[1:]))
         result[self.plain_v] = dq[self.plain_q]
-        for i, j in self.balls:
+        for i, j in self.quaternion_slots:
             e, d = q[i : i + 4], dq[i : i + 4]
             scale = 2.0 / (e @ e)
             result[j] = scale * (e[0] * d[1] - e[1] * d[0] + e[3] * d[2] - e[2] * d[3])
@@ -67,7 +67,7 @@ class Space(NamedTuple):
     def stretch(self, q: Array, dq: Array) -> Array:
         """The part of dq along the Euler parameters."""
         result = np.zeros(dq.shape)
-        for i, _ in self.balls:
+        for i, _ in self.quaternion_slots:
             e = q[i : i + 4]
             result[i : i + 4] = np.multiply.outer(e, e @ dq[i : i + 4]) / (e @ e)
         return result
@@ -76,16 +76,16 @@ class Space(NamedTuple):
         """q after moving with velocities d (n_v,) for unit time."""
         result = np.array(q)
         result[self.plain_q] += d[self.plain_v]
-        for i, j in self.balls:
+        for i, j in self.quaternion_slots:
             half = 0.5 * float(np.sqrt(d[j : j + 3] @ d[j : j + 3]))
             result[i : i + 4] = np.cos(half) * q[i : i + 4] + np.sinc(half / np.pi) * _turn(q[i : i + 4], d[j : j + 3])
         return result
 
     def difference(self, a: Array, b: Array) -> Array:
         """The d (n_v,) with move(b, d) = a but for lengths and signs of Euler parameters."""
-        result = np.empty(len(a) - len(self.balls))
+        result = np.empty(len(a) - len(self.quaternion_slots))
         result[self.plain_v] = a[self.plain_q] - b[self.plain_q]
-        for i, j in self.balls:
+        for i, j in self.quaternion_slots:
             e, f = a[i : i + 4], b[i : i + 4]
             w = np.array([f @ e, *_relative(f, e)])
             w = -w if w[0] < 0.0 else w
@@ -96,14 +96,14 @@ class Space(NamedTuple):
     def normalised(self, q: Array) -> Array:
         """q with Euler parameters of length 1."""
         result = np.array(q)
-        for i, _ in self.balls:
+        for i, _ in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt(q[i : i + 4] @ q[i : i + 4])
         return result
 
     def neutral(self) -> Array:
         """Zero, with the identity for each rotation."""
-        result = np.zeros(len(self.plain_q) + 4 * len(self.balls))
-        result[[i for i, _ in self.balls]] = 1.0
+        result = np.zeros(len(self.plain_q) + 4 * len(self.quaternion_slots))
+        result[[i for i, _ in self.quaternion_slots]] = 1.0
         return result
 
 

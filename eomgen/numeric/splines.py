@@ -127,7 +127,7 @@ def _end(h0: float, h1: float, r0: float, r1: float) -> float:
 
 
 def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
-    """Coefficients (n + 1, 4) of :class:`eomgen.numeric.functions.Curve` from values and slopes at the points."""
+    """Coefficients (n + 1, 4) of :class:`eomgen.numeric.user_functions.Curve` from values and slopes at the points."""
     h = np.diff(x)
     rise = np.diff(y) / h
     t = (s[:-1] + s[1:] - 2.0 * rise) / h
@@ -138,7 +138,7 @@ def curve_coefficients(x: Array, y: Array, s: Array, linear: bool) -> Array:
 
 
 def surface_nodes(x: Array, y: Array, z: Array, kind: str) -> Array:
-    """Values and derivatives (n_x, n_y, 4) of :class:`eomgen.numeric.functions.Surface`: a tensor product spline."""
+    """Values and derivatives (n_x, n_y, 4) of a :class:`~.user_functions.Surface`: a tensor product spline."""
     along_x = slopes(x, z, kind)
     along_y = slopes(y, z.T, kind).T
     both = slopes(y, along_x.T, kind).T

@@ -1,16 +1,16 @@
 """Stage program: SystemTerms -> Program (functions with typed ports, hoisted and counted)."""
 
 from ..kernel_table import KERNELS, Kernel, Sizes
-from .build import ABI, build_program
-from .program import Block, Driver, Limits, Port, Program
+from .build_program import ABI, build_program
+from .program import Block, KernelDriver, Limits, Port, Program
 from .terms import SystemTerms
 
 __all__ = [
     "ABI",
     "KERNELS",
     "Block",
-    "Driver",
     "Kernel",
+    "KernelDriver",
     "Limits",
     "Port",
     "Program",

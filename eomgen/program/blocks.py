@@ -13,9 +13,9 @@ from ..graph.traverse import reachable
 from ..kernel_table import DAE, NAMED, Sizes
 from .derivatives import assembly_jacobian, by_everything, derivatives, output_derivatives, strike_rows
 from .factor import exceeding, factorize, is_unrolled, outward, positivity, solve
-from .loops import LoopBlocks
+from .jacobian_blocks import ResidualSlopes, unrolled_jacobian, unrolled_shift
+from .loop_blocks import LoopBlocks
 from .program import Block, Limits, Port
-from .slopes import ResidualSlopes, unrolled_jacobian, unrolled_shift
 from .terms import Row, SystemTerms
 
 RATES = ("rates", "moved", "rates_along", "slopes_along")  #: blocks of given q' = N v + b
@@ -124,7 +124,7 @@ class BlockMaker:
     @cached_property
     def _squares(self) -> list[Expr]:
         """|e|^2 of each set of Euler parameters, as rotations have it."""
-        sets = (self._symbols(self.terms.q[i : i + 4]) for i, _ in self.terms.balls)
+        sets = (self._symbols(self.terms.q[i : i + 4]) for i, _ in self.terms.quaternion_slots)
         return [e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3] for e in sets]
 
     @property
@@ -157,7 +157,7 @@ class BlockMaker:
     def _normalised(self) -> list[Expr]:
         """q with Euler parameters of length 1."""
         q = self._symbols(self.terms.q)
-        for (i, _), square in zip(self.terms.balls, self._squares, strict=True):
+        for (i, _), square in zip(self.terms.quaternion_slots, self._squares, strict=True):
             length = self.terms.graph.apply("sqrt", square)
             q[i : i + 4] = [x / length for x in q[i : i + 4]]
         return q

@@ -7,8 +7,8 @@ from typing import Any
 
 from ..describe.input_names import rate_of, split_rate
 from ..describe.mechanism import Input, Output, Parameter
-from ..equations.equations import TreeEquations
-from ..equations.slopes import ForceSlopes, can_differentiate
+from ..equations.tree_equations import TreeEquations
+from ..equations.tree_slopes import ForceSlopes, can_differentiate
 from ..errors import UsageError
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
@@ -23,10 +23,10 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
-from .discs import describe_discs
 from .drawn import describe_picture
 from .given_multipliers import multiplier_values
 from .program import Limits
+from .rolling_discs import describe_discs
 from .soundness import flag_forces
 from .terms import SystemTerms
 
@@ -65,11 +65,11 @@ def collect_terms(kinematics: Kinematics, mobility: Mobility, equations: TreeEqu
         coordinate_scales=tuple(scale[kind] for kind in kinematics.velocity_kinds),
         constraint_scales=row_scales(kinematics),
         n_dof=mobility.n_dof,
-        preferred=tuple(kinematics.freedoms.index(n) for n in mobility.independent),
+        preferred=tuple(kinematics.velocity_labels.index(n) for n in mobility.independent),
         parent=_pattern(kinematics),
         centroidal=tuple(_centroidal(kinematics)),
-        balls=kinematics.balls,
-        rates=kinematics.rates if kinematics.balls or kinematics.given_rates else (),
+        quaternion_slots=kinematics.quaternion_slots,
+        rates=kinematics.rates if kinematics.quaternion_slots or kinematics.given_rates else (),
         given_rates=kinematics.given_rates,
         paired=kinematics.coordinate_of if kinematics.given_rates else (),
         coordinate_slopes=c.slopes,
@@ -168,7 +168,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         units |= {name: unit, f"{name}_dot": f"{unit}/s", f"{name}_ddot": f"{unit}/s^2"}
         if kind == "parameter":
             del units[name]
-    for _, j in kinematics.balls:
+    for _, j in kinematics.quaternion_slots:
         for name in velocities[j : j + 3]:
             units |= {name: "rad/s", acceleration_name(name): "rad/s^2"}
     if m.bare:
@@ -202,7 +202,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "loop_kinds": list(loop.kinds),
         "coordinate_kinds": list(kinematics.kinds),
         "velocity_kinds": list(kinematics.velocity_kinds),
-        "balls": [list(ball) for ball in kinematics.balls],
+        "quaternion_slots": [list(slot) for slot in kinematics.quaternion_slots],
         **({"coordinate_of": list(kinematics.coordinate_of)} if m.given is not None else {}),
         **({"energy_known": False} if m.given is not None and m.given.kinetic_energy.is_zero else {}),
         "constraint_labels": list(c.labels),
@@ -214,7 +214,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "u_values": [u.value for u in m.inputs],
         "units": units,
         "docs": docs,
-        "independent": [kinematics.freedoms.index(n) for n in mobility.independent],
+        "independent": [kinematics.velocity_labels.index(n) for n in mobility.independent],
         "independent_rows": list(rows),
         "redundant_rows": [i for i in range(len(c.labels)) if i not in rows],
         "q_reference": list(mobility.q_reference),
@@ -334,7 +334,7 @@ def _euler_angles(kinematics: Kinematics) -> list[list[Any]]:
     for branch in kinematics.topology.branches:
         spec = kinematics.mechanism.joints[branch.joint]
         sequence = getattr(spec.joint, "sequence", None)
-        if sequence is not None and not spec.joint.balls:
+        if sequence is not None and not spec.joint.quaternion_slots:
             vanishing = "sin" if sequence[0] == sequence[2] else "cos"
             found.append([spec.name, kinematics.names.index(spec.coordinates[-2]), vanishing])
     return found

@@ -12,7 +12,7 @@ from typing import Any
 from ..describe.mechanism import JointSpec, Mechanism
 from ..elements.looks import Contour, Drawn, PitchCircles, Seen, Wheel
 from ..errors import UsageError
-from ..frames import Cylinder, Frame, Marker
+from ..frames import Frame, Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
@@ -145,7 +145,7 @@ def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:
     return owners.get(str(x.node[1])) if x is not None and x.node[0] == "sym" else None
 
 
-def _stop(n: _Numbers, stop: Marker | Cylinder) -> dict[str, Any]:
-    if isinstance(stop, Cylinder):
+def _stop(n: _Numbers, stop: Marker | WrapCylinder) -> dict[str, Any]:
+    if isinstance(stop, WrapCylinder):
         return {**n.marker(stop.marker), "radius": n.number(stop.radius), "sense": stop.sense}
     return n.marker(stop)

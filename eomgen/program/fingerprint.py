@@ -11,7 +11,7 @@ import numpy as np
 from ..graph.core import Expr, Graph
 from ..graph.functions import Function, NativeCode
 from ..graph.traverse import reachable
-from ..numeric.functions import Curve, Surface
+from ..numeric.user_functions import Curve, Surface
 from .program import Program
 
 #: Types that say what they are by their fields, besides the dataclasses of programs.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..equations.equations import TreeEquations
+from ..equations.tree_equations import TreeEquations
 from ..graph.core import Expr
 from ..kinematics import Kinematics
 from .factor import factorize, solve

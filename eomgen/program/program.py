@@ -7,7 +7,7 @@ from dataclasses import field
 from math import prod
 from typing import Any
 
-from ..equations.equations import LinearSystem
+from ..equations.tree_equations import LinearSystem
 from ..graph.core import Expr, Graph
 from ..graph.count import Operations
 from ..kernel_table import Sizes
@@ -74,7 +74,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Driver:
+class KernelDriver:
     """A public function that target code with loops and Newton iterations computes from blocks.
 
     Attributes
@@ -127,13 +127,13 @@ class Program:
     inputs: tuple[str, ...]
     sizes: Sizes
     blocks: tuple[Block, ...]
-    drivers: tuple[Driver, ...]
+    drivers: tuple[KernelDriver, ...]
     hoisted: tuple[Expr, ...]
     parameter_only: frozenset[int]
     preferred: tuple[int, ...]
     parent: tuple[int, ...]
     counts: Mapping[str, Operations]
-    balls: tuple[tuple[int, int], ...] = ()
+    quaternion_slots: tuple[tuple[int, int], ...] = ()
     given_rates: bool = False
     coordinate_of: tuple[int, ...] = ()
     limits: Limits = field(default_factory=Limits)
@@ -173,8 +173,8 @@ class Program:
         return not self.block_names.isdisjoint(BY_COLUMNS)
 
     @property
-    def kernels(self) -> tuple[Block | Driver, ...]:
+    def kernels(self) -> tuple[Block | KernelDriver, ...]:
         """The public functions, in the order of the metadata."""
-        found: dict[str, Block | Driver] = {b.name: b for b in self.blocks if b.public}
+        found: dict[str, Block | KernelDriver] = {b.name: b for b in self.blocks if b.public}
         found.update((d.name, d) for d in self.drivers)
         return tuple(found[name] for name in self.metadata["kernels"])

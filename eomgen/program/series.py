@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from ..graph.nodes import Node
 from ..graph.traverse import reachable
+from ..operations import CONDITION, OPERATIONS
 from .program import Block, Program
 
 #: Highest order that a step may have; enough for tolerances near the rounding of doubles.
@@ -20,15 +22,6 @@ MOST_ORDER = 23
 MOST_TERMS = 600
 #: Integer powers up to this are products.
 MOST_FACTORS = 16
-#: Functions whose rates are made of each other; each needs the other.
-PARTNERS = {"sin": "cos", "cos": "sin", "sinh": "cosh", "cosh": "sinh"}
-#: Operations with a recurrence.
-SMOOTH = frozenset(
-    {"add", "sub", "mul", "div", "neg", "sqrt", "exp", "log", "tan", "tanh", "asin", "acos", "atan", "atan2", "pow"}
-).union(PARTNERS)
-
-#: Operations that have values at least.
-VALUES = SMOOTH | {"abs", "sign", "min", "max", "lt", "le", "eq", "not", "and", "or", "select"}
 
 
 class Term(NamedTuple):
@@ -40,9 +33,10 @@ class Term(NamedTuple):
         An operation of the graph, or "number", "given" (constant along the motion), "time", "state".
     operands : tuple of int
         Earlier terms.
-    other : int
-        A term that the recurrence needs besides: the partner of sin, cos, sinh and cosh, 1 + tan^2 and 1 - tanh^2, and
-        for the inverse functions what their rate is divided by.  It may be a later one.
+    numerators : tuple of (int, int)
+        Of functions, one an operand: sign, and the term that multiplies the operand's rate, -1 for 1; the sum of these
+        products is the rate, or is divided by the term `divisor`.  They may be later ones.
+    divisor : int
     node : int
         Id in the graph of what is given.
     value : float
@@ -53,7 +47,8 @@ class Term(NamedTuple):
 
     kind: str
     operands: tuple[int, ...] = ()
-    other: int = -1
+    numerators: tuple[tuple[int, int], ...] = ()
+    divisor: int = -1
     node: int = -1
     value: float = 0.0
     varies: bool = False
@@ -86,7 +81,8 @@ def behind(terms: Sequence[Term], roots: Iterable[int], *, changing: bool = Fals
         term = terms[i]
         if i not in found and (term.varies or not changing):
             found.add(i)
-            open_ends += [*term.operands, *([term.other] if term.other >= 0 else [])]
+            more = (term.divisor, *(k for _, k in term.numerators))
+            open_ends += [*term.operands, *(k for k in more if k >= 0)]
     return found
 
 
@@ -111,8 +107,6 @@ class NoSeriesError(Exception):
 
 
 TOO_LONG = f"its right-hand side has more than some {MOST_TERMS} operations"
-#: Operations that have none, in users' words.
-CORNERS = {"abs": "abs", "sign": "sign", "min": "min", "max": "max", "select": "a condition"}
 
 
 class _Terms:
@@ -143,7 +137,11 @@ class _Terms:
         place = {i: k for k, i in enumerate(live)}
         terms = (self._terms[i] for i in live)
         moved = (
-            term._replace(operands=tuple(place[k] for k in term.operands), other=place.get(term.other, -1))
+            term._replace(
+                operands=tuple(place[k] for k in term.operands),
+                numerators=tuple((sign, place.get(k, -1)) for sign, k in term.numerators),
+                divisor=place.get(term.divisor, -1),
+            )
             for term in terms
         )
         return Series(tuple(moved), tuple(place[i] for i in rates), tuple(place[i] for i in checks))
@@ -189,27 +187,47 @@ class _Terms:
     def _apply(self, kind: str, *operands: int) -> int:
         """The term of an operation, with what its recurrence needs."""
         varies = any(self._terms[k].varies for k in operands)
-        if kind not in VALUES:
+        row = OPERATIONS.get(kind)
+        if row is None:
             raise NoSeriesError("a table or a function of your own has no series")
-        if self._smooth and varies and kind not in SMOOTH:
-            raise NoSeriesError(f"{CORNERS.get(kind, 'a comparison')} of what moves has corners or jumps")
+        if self._smooth and varies and row.bends:
+            word = "a condition" if row.chooses else "a comparison" if row.kind == CONDITION else kind
+            raise NoSeriesError(f"{word} of what moves has corners or jumps")
         if self._smooth and varies and kind == "pow" and self._terms[operands[1]].varies:
             raise NoSeriesError("a power whose exponent moves has no series")
-        if not self._smooth or not varies or kind not in (*PARTNERS, "tan", "tanh", "asin", "acos", "atan", "atan2"):
-            return self._add(Term(kind, operands, varies=varies))
-        if kind in ("asin", "acos"):  # a' = u' sqrt(1 - a^2)
-            rest = self._apply("sub", self._number(1.0), self._apply("mul", operands[0], operands[0]))
-            return self._add(Term(kind, operands, self._apply("sqrt", rest), varies=True))
-        if kind in ("atan", "atan2"):  # a' = u' (1 + a^2); y' x - x' y = u' (x^2 + y^2)
-            first, second = (self._apply("mul", k, k) for k in (operands[0], operands[-1]))
-            size = self._apply("add", first, self._number(1.0) if kind == "atan" else second)
-            return self._add(Term(kind, operands, size, varies=True))
-        place = self._add(Term(kind, operands, varies=True))
-        if kind in ("tan", "tanh"):  # u' = (1 +- u^2) a'
-            square = self._apply("mul", place, place)
-            other = self._apply("add" if kind == "tan" else "sub", self._number(1.0), square)
-        else:
-            other = self._add(Term(PARTNERS[kind], operands, varies=True))
-            self._terms[other] = self._terms[other]._replace(other=place)
-        self._terms[place] = self._terms[place]._replace(other=other)
+        made = len(self._terms)
+        place = self._add(Term(kind, operands, varies=varies))
+        if place == made and self._smooth and varies and row.recurrence is not None:
+            numerators, divisor = row.recurrence(_Algebra(self), place, *operands)
+            self._terms[place] = self._terms[place]._replace(
+                numerators=tuple(map(self._signed, numerators)), divisor=-1 if divisor is None else divisor
+            )
         return place
+
+    def _signed(self, numerator: int) -> tuple[int, int]:
+        """A sign and a term, -1 for the number 1."""
+        sign, term = 1, self._terms[numerator]
+        if term.kind == "neg":
+            sign, numerator = -1, term.operands[0]
+        return sign, -1 if self._terms[numerator] == self._one else numerator
+
+
+class _Algebra:
+    """Terms by the operations that a graph has, for recurrences of the table of operations."""
+
+    def __init__(self, terms: _Terms) -> None:
+        self.make = make = terms._apply
+        self.add, self.sub, self.mul, self.div, self.neg = (
+            partial(make, k) for k in ("add", "sub", "mul", "div", "neg")
+        )
+        self._number = terms._number
+
+    def constant(self, value: float) -> _Algebra:
+        """A number, whose :attr:`id` is its term."""
+        self.id = self._number(value)
+        return self
+
+    @property
+    def one(self) -> _Algebra:
+        """The number 1."""
+        return self.constant(1.0)

@@ -6,9 +6,8 @@ from ..graph.core import Expr
 from ..graph.traverse import reachable
 from ..kinematics import Kinematics
 from ..kinematics.kinematics import ForceTerms
+from ..operations import operations_with
 
-#: Operations that can give a result that is not finite.
-FRAGILE = frozenset({"div", "sqrt", "log", "exp", "pow", "tan", "asin", "acos", "sinh", "cosh"})
 LARGEST = 1e300
 
 
@@ -32,7 +31,8 @@ def _size(terms: ForceTerms) -> Expr | None:
     if not entries:
         return None
     graph = entries[0].graph
-    if not any(graph.nodes[i][0] in FRAGILE for i in reachable(graph, [e.id for e in entries])):
+    fragile = operations_with(lambda row: row.fragile)
+    if not any(graph.nodes[i][0] in fragile for i in reachable(graph, [e.id for e in entries])):
         return None
     total = graph.zero
     for entry in entries:

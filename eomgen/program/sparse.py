@@ -92,7 +92,7 @@ def fill(pattern: Sequence[Mapping[int, object]]) -> int:
 
 
 @dataclass(frozen=True)
-class Factor:
+class SparseFactor:
     """P A P^T = L D L^T: ``columns[i]`` holds column i of L below its pivot, in the original indices."""
 
     order: tuple[int, ...]
@@ -116,7 +116,7 @@ class Factor:
         return x
 
 
-def factorize(matrix: Sequence[Mapping[int, Expr]]) -> Factor:
+def factorize(matrix: Sequence[Mapping[int, Expr]]) -> SparseFactor:
     """Factor a symmetric positive definite matrix given by both triangles, without square roots."""
     work = [dict(row) for row in matrix]
     order = minimum_degree(matrix)
@@ -134,4 +134,4 @@ def factorize(matrix: Sequence[Mapping[int, Expr]]) -> Factor:
             for j in below[: a + 1]:
                 change = columns[i][k] * work[i][j]
                 work[k][j] = work[j][k] = work[k][j] - change if j in work[k] else -change
-    return Factor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals))
+    return SparseFactor(tuple(order), tuple(columns), tuple(pivots), tuple(reciprocals))

@@ -1,14 +1,14 @@
-"""Stage program: the input of :func:`~.build.build_program`: every expression and name that functions are made of."""
+"""Stage program: what :func:`~.build_program.build_program` takes: all expressions and names of the functions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..equations.equations import LinearSystem
-from ..equations.slopes import ForceSlopes
+from ..equations.tree_equations import LinearSystem
+from ..equations.tree_slopes import ForceSlopes
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
-from ..kinematics.turned import Turned
+from ..kinematics.link_axes import Turned
 from ..kinematics.wrenches import JointWrenches
 from ..records import dataclass
 
@@ -56,8 +56,10 @@ class SystemTerms:
     n_dof: int  #: degrees of freedom; n - n_dof is the rank of C_q
     preferred: tuple[int, ...]  #: n_dof indices into v: independent velocities, in the order of v_i
     parent: tuple[int, ...]  #: per velocity the next one towards ground (-1: none), always a smaller index
-    balls: tuple[tuple[int, int], ...] = ()  #: where Euler parameters start in q, and their angular velocity in v
-    rates: Row = ()  #: q' where there are balls, or where it is given
+    quaternion_slots: tuple[
+        tuple[int, int], ...
+    ] = ()  #: where Euler parameters start in q, and their angular velocity in v
+    rates: Row = ()  #: q' where there are Euler parameters, or where it is given
     given_rates: bool = False  #: whether q' = N(q, t) v + b(q, t) is given; then n_q and n have nothing to do with
     #: each other
     paired: tuple[int, ...] = ()  #: with ``given_rates``: per velocity the coordinate whose rate it is, -1 for none
@@ -92,11 +94,11 @@ class SystemTerms:
 
     @property
     def coordinate_of(self) -> tuple[int, ...]:
-        """Per velocity the coordinate whose rate it is, -1 for angular velocities of balls."""
+        """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints."""
         if self.given_rates:
             return self.paired
-        turning = {k for _, j in self.balls for k in range(j, j + 3)}
-        parameters = {k for i, _ in self.balls for k in range(i, i + 4)}
+        turning = {k for _, j in self.quaternion_slots for k in range(j, j + 3)}
+        parameters = {k for i, _ in self.quaternion_slots for k in range(i, i + 4)}
         plain = iter([k for k in range(len(self.q)) if k not in parameters])
         return tuple(-1 if k in turning else next(plain) for k in range(self.n_v))
 
@@ -129,7 +131,7 @@ class SystemTerms:
         """
         n, m = self.n_v, self.n_c
         sizes = {
-            "q": (len(self.rates) if self.given_rates else n + len(self.balls), len(self.q)),
+            "q": (len(self.rates) if self.given_rates else n + len(self.quaternion_slots), len(self.q)),
             "a": (len(self.a), n),
             "multipliers": (len(self.multipliers), m),
             "mass_matrix": (len(self.mass_matrix), 0 if self.by_columns else n),

@@ -21,7 +21,7 @@ INSIDE = "**"  #: any attribute and all that is inside
 SHOWN = 6  #: constructs that one note names
 
 
-class Row(NamedTuple):
+class ConstructRow(NamedTuple):
     """What becomes of some attributes of an element; without attributes of the element itself."""
 
     element: str  #: path of tags, e.g. ``link/inertial``
@@ -30,8 +30,8 @@ class Row(NamedTuple):
     why: str
 
 
-Table = Mapping[str, tuple[Row, ...]]
-Find = Callable[[str, str], Row | None]
+Table = Mapping[str, tuple[ConstructRow, ...]]
+Find = Callable[[str, str], ConstructRow | None]
 Met = Counter[tuple[str, str]]  #: (path, attribute or nothing) -> how often
 
 
@@ -44,26 +44,28 @@ def table_of(text: str, reasons: Mapping[str, tuple[str, str]]) -> Table:
     reasons : mapping
         Word -> fate and reason.
     """
-    rows: dict[str, list[Row]] = {}
+    rows: dict[str, list[ConstructRow]] = {}
     for line in filter(None, map(str.strip, text.splitlines())):
         elements, _, rest = line.partition(": ")
         word, *attributes = rest.split()
         for element in map(str.strip, elements.split(",")):
-            rows.setdefault(element, []).append(Row(element, reasons[word][0], tuple(attributes), reasons[word][1]))
+            rows.setdefault(element, []).append(
+                ConstructRow(element, reasons[word][0], tuple(attributes), reasons[word][1])
+            )
     return {element: tuple(found) for element, found in rows.items()}
 
 
-def find_row(table: Table, path: str, attribute: str = "") -> Row | None:
+def find_row(table: Table, path: str, attribute: str = "") -> ConstructRow | None:
     """What a table says of an attribute of an element, or of the element itself; None if nothing."""
     for row in table.get(path, ()):
         if not attribute or attribute in row.attributes or ANY in row.attributes or INSIDE in row.attributes:
             return row
     if attribute.startswith("xmlns"):
-        return Row(path, HARMLESS, (attribute,), "names of other dialects")
+        return ConstructRow(path, HARMLESS, (attribute,), "names of other dialects")
     return None
 
 
-def is_whole(row: Row | None) -> bool:
+def is_whole(row: ConstructRow | None) -> bool:
     """Whether all that is inside an element shares its fate."""
     return row is not None and INSIDE in row.attributes
 
@@ -74,7 +76,7 @@ def notes_of(find: Find, met: Met) -> list[str]:
     Parameters
     ----------
     find : callable
-        (path, attribute) -> Row or None.
+        (path, attribute) -> ConstructRow or None.
     met : Counter
     """
     left: dict[str, list[str]] = {}

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from ..errors import ModelError, Problem, UsageError
 from ..files.reading import open_plain
 from ..limits.files import NAME
-from .xml_text import Element
+from .xml_text import XmlElement
 
 _ELSEWHERE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:/")  # a drive, or the scheme of a URL
 
@@ -38,12 +38,14 @@ class Folder:
         """Whether a path without links is this folder or lies in it."""
         return path == self.path or path.startswith(os.path.join(self.path, ""))
 
-    def find(self, element: Element, name: str, bases: Iterable[Sequence[str]], needed: bool = True) -> str | Problem:
+    def find(
+        self, element: XmlElement, name: str, bases: Iterable[Sequence[str]], needed: bool = True
+    ) -> str | Problem:
         """Where a file is that an element names.
 
         Parameters
         ----------
-        element : Element
+        element : XmlElement
         name : str
             As the element has it.
         bases : iterable of sequences of str
@@ -71,7 +73,7 @@ class Folder:
                 return place
         return element.problem(path, f"{name!r} cannot be read: no plain file has that name", remedy) if needed else ""
 
-    def read(self, element: Element, path: str, most: int) -> bytes:
+    def read(self, element: XmlElement, path: str, most: int) -> bytes:
         """The bytes of a file that :meth:`find` found.
 
         Raises
@@ -88,5 +90,5 @@ class Folder:
             raise self._refusal(element, path, "is too large", f"at most {most:,} bytes are left for it")
         return data
 
-    def _refusal(self, element: Element, path: str, message: str, remedy: str = "") -> ModelError:
+    def _refusal(self, element: XmlElement, path: str, message: str, remedy: str = "") -> ModelError:
         return ModelError([element.problem(f"{element.tag}.file", f"{path} {message}", remedy)])

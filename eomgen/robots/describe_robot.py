@@ -13,17 +13,17 @@ from ..errors import ModelError, Problem
 from ..joints import JOINTS
 from ..limits.files import FREEDOMS, LAWS, TIES
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
-from .names import Names, clean_model_name
-from .placement import Inertia, Placement, numbers
-from .robot import Drive, Joint, Options, Range, Robot
+from .link_names import RobotNames, clean_model_name
+from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied
+from .robot import Drive, Range, Robot, RobotJoint, RobotOptions
+from .robot_frames import Inertia, Placement, numbers
 from .ties import Sum, Tie, describe_tie
-from .tree import GROUND, Bodies, Body, build_bodies, find_tied
 
 SHOWN = 8  #: joints that a note names
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
 
-def describe_robot(robot: Robot, options: Options) -> Description:
+def describe_robot(robot: Robot, options: RobotOptions) -> Description:
     """The raw data of a robot.
 
     Raises
@@ -37,7 +37,7 @@ def describe_robot(robot: Robot, options: Options) -> Description:
 class _Writer:
     """Fills one Description."""
 
-    def __init__(self, robot: Robot, options: Options, found: Bodies) -> None:
+    def __init__(self, robot: Robot, options: RobotOptions, found: Bodies) -> None:
         self.robot, self.options, self.found = robot, options, found
         gravity = robot.gravity if options.gravity is None else options.gravity
         self.out = Description(
@@ -47,7 +47,7 @@ class _Writer:
         check = "note" if found.massless and options.check_inertia == "error" else options.check_inertia
         if check != "error":
             self.out.values["check_inertia"] = check
-        self.names = Names()
+        self.names = RobotNames()
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
@@ -93,7 +93,7 @@ class _Writer:
         self.out.lines[entry.path] = place
 
     # -- bodies ---------------------------------------------------------------------------------------------------
-    def _body(self, body: Body) -> None:
+    def _body(self, body: RobotBody) -> None:
         name = GROUND_NAME if body.name == GROUND else self.names.link(body.name)
         self.bodies[body.name] = name
         values: Values = {} if body.name == GROUND else self._inertia(name, body.inertia())
@@ -143,7 +143,7 @@ class _Writer:
         turning = {"rotation": self.options.rotation} if "rotation" in kind.options else {}
         return [c.suffix for c in (kind(**turning) if turning else kind).coordinates]
 
-    def _joint(self, body: Body) -> None:
+    def _joint(self, body: RobotBody) -> None:
         joint = body.joint
         assert joint is not None
         name = self.joints[joint.name]
@@ -194,11 +194,11 @@ class _Writer:
             turn = euler_angles_from_matrix("xyz", pose.rotation)
         return [*numbers(pose.position), *numbers(turn)]
 
-    def _force(self, kind: str, joint: Joint, what: str, values: Values) -> None:
+    def _force(self, kind: str, joint: RobotJoint, what: str, values: Values) -> None:
         name = self.joints[joint.name]
         self._add("forces", self.names.made(f"{name}_{what}"), {"type": kind, "joint": name, **values}, joint.place)
 
-    def _spring(self, joint: Joint) -> None:
+    def _spring(self, joint: RobotJoint) -> None:
         if joint.type == "revolute":
             rest = {"angle": joint.rest} if joint.rest else {}
             self._force("torsional_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
@@ -303,7 +303,7 @@ class _Writer:
             names = self._few(rubbing)
             self.out.notes.append(f"dry friction of joints is data and does not act ({names}); friction=0.01 lets it")
 
-    def _few(self, joints: list[Joint]) -> str:
+    def _few(self, joints: list[RobotJoint]) -> str:
         names = [self.joints[joint.name] for joint in joints]
         return ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
 

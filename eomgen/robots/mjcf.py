@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import UsageError
+from ..numeric.rotation_matrices import about, from_quaternion
 from .constructs import notes_of
 from .mjcf_actuators import read_actuators
 from .mjcf_compile import compile_mjcf
@@ -21,14 +22,14 @@ from .mjcf_equalities import read_equalities
 from .mjcf_fields import NOTED
 from .mjcf_files import Scan
 from .mjcf_text import Text
-from .placement import IDENTITY, Inertia, Placement, about, from_quaternion, moved, numbers
-from .robot import Joint, Link, Options, Robot
-from .xml_text import Element
+from .robot import Robot, RobotJoint, RobotLink, RobotOptions
+from .robot_frames import IDENTITY, Inertia, Placement, moved, numbers
+from .xml_text import XmlElement
 
 _TYPES = ("free", "spherical", "prismatic", "revolute")  # mjtJoint
 
 
-def read_mjcf(root: Element, options: Options) -> Robot:
+def read_mjcf(root: XmlElement, options: RobotOptions) -> Robot:
     """The robot of an MJCF file.
 
     Raises
@@ -42,13 +43,13 @@ def read_mjcf(root: Element, options: Options) -> Robot:
         raise UsageError(f"{root.file}: an MJCF file says itself which bodies float; leave floating out")
     scan = Scan(root, options.assets)
     compiled = compile_mjcf(Text(scan.trees, scan.folder, scan.problems), root)
-    robot = _Reader(compiled, root, scan.lines).read()
+    robot = _MjcfReader(compiled, root, scan.lines).read()
     robot.notes += notes_of(find_mjcf, scan.met)
     robot.notes[:0] = [f"MuJoCo warns: {' '.join(text.split())}" for text in compiled.warnings]
     return robot
 
 
-class _Reader(Compiled):
+class _MjcfReader(Compiled):
     """Reads a compiled model into a Robot."""
 
     def read(self) -> Robot:
@@ -57,7 +58,7 @@ class _Reader(Compiled):
         gravity = np.zeros(3) if self.off("GRAVITY") else m.opt.gravity
         robot.gravity = tuple(numbers(gravity))  # type: ignore[assignment]
         world = self.names["body"][0]
-        robot.links[world] = Link(world, (self.root.file, self.root.line))
+        robot.links[world] = RobotLink(world, (self.root.file, self.root.line))
         for k in range(1, m.nbody):
             self._body(k)
         read_equalities(self)
@@ -76,24 +77,24 @@ class _Reader(Compiled):
         at = Placement(from_quaternion(*m.body_quat[k]), np.array(m.body_pos[k]))
         joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
         if not joints:
-            robot.joints[f"{name} weld"] = Joint(f"{name} weld", "weld", parent, name, place, outer=at)
+            robot.joints[f"{name} weld"] = RobotJoint(f"{name} weld", "weld", parent, name, place, outer=at)
         for j in joints:
             last = j == joints[-1]
             child = name if last else f"{name}.{self.names['joint'][j]}"
             if not last:
-                robot.links[child] = Link(child, place)
+                robot.links[child] = RobotLink(child, place)
             joint = self._joint(j, parent, child, at if j == joints[0] else IDENTITY)
             robot.joints[joint.name] = joint
             parent = child
-        robot.links[name] = Link(name, place, inertia)
+        robot.links[name] = RobotLink(name, place, inertia)
 
-    def _joint(self, j: int, parent: str, child: str, at: Placement) -> Joint:
+    def _joint(self, j: int, parent: str, child: str, at: Placement) -> RobotJoint:
         m, name = self.m, self.names["joint"][j]
         kind = _TYPES[m.jnt_type[j]]
         dof, start = m.jnt_dofadr[j], m.jnt_qposadr[j]
         place = self.place(name, "joint", "freejoint")
         anchor = moved(m.jnt_pos[j])
-        joint = Joint(name, kind, parent, child, place, outer=at @ anchor, inner=anchor)
+        joint = RobotJoint(name, kind, parent, child, place, outer=at @ anchor, inner=anchor)
         size = {"free": 6, "spherical": 3}.get(kind, 1)
         if size > 1:
             if m.dof_armature[dof : dof + size].any():

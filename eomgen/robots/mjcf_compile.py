@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import MissingDependencyError, ModelError
 from ..limits.files import MEMORY, SECONDS, WAIT
 from .mjcf_text import Text
-from .xml_text import Element
+from .xml_text import XmlElement
 
 _PROGRAM = Path(__file__).with_name("mjcf_child.py")
 _MISSING = "MJCF files need mujoco: pip install 'eomgen[robots]'"
@@ -33,7 +33,7 @@ _KEPT = ("SYSTEMROOT", "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 _SMALLER = "use fewer bodies, and meshes with fewer triangles"
 
 
-def compile_mjcf(text: Text, root: Element) -> SimpleNamespace:
+def compile_mjcf(text: Text, root: XmlElement) -> SimpleNamespace:
     """A compiled model.
 
     Returns

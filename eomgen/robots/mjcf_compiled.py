@@ -11,13 +11,13 @@ from ..limits.files import LARGEST
 from .mjcf_fields import FINITE
 from .mjcf_files import Lines
 from .robot import Place, Robot
-from .xml_text import Element
+from .xml_text import XmlElement
 
 
 class Compiled:
     """A compiled model, and the robot that it becomes."""
 
-    def __init__(self, m: Any, root: Element, lines: Lines) -> None:
+    def __init__(self, m: Any, root: XmlElement, lines: Lines) -> None:
         self.m, self.root, self.lines = m, root, lines
         self.robot = Robot(root.attributes.get("model") or "robot", root.file)
         self.names = {kind: [self.name(kind, k) for k in range(len(m.names[kind]))] for kind in ("body", "joint")}

@@ -6,7 +6,7 @@ An element stands under its parent's tag.  What is in ``default`` is looked up a
 
 from __future__ import annotations
 
-from .constructs import DATA, HARMLESS, LEFT, SEEN, TAKEN, Row, find_row, table_of
+from .constructs import DATA, HARMLESS, LEFT, SEEN, TAKEN, ConstructRow, find_row, table_of
 
 _REASONS = {
     "taken": (TAKEN, "as MuJoCo's compiler has it"),
@@ -127,10 +127,10 @@ def path_of(parent: str, tag: str) -> str:
     return f"{'body' if parent in _BODIES else 'mujoco' if parent == 'mujocoinclude' else parent}/{tag}"
 
 
-def find_mjcf(path: str, attribute: str = "") -> Row | None:
+def find_mjcf(path: str, attribute: str = "") -> ConstructRow | None:
     """What becomes of an attribute of an element, or of the element itself; None if it is not known."""
     row = find_row(MJCF, path, attribute)
     if row is None and path in MJCF and attribute in _EVERYWHERE:
         fate, why = _REASONS[_EVERYWHERE[attribute]]
-        return Row(path, fate, (attribute,), why)
+        return ConstructRow(path, fate, (attribute,), why)
     return row

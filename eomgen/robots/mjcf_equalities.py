@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..numeric.rotation_matrices import from_quaternion
 from .mjcf_actuators import fixed_tendon
-from .placement import Placement, from_quaternion, moved
 from .robot import Loop
+from .robot_frames import Placement, moved
 from .ties import Sum, Tie
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from .constructs import Met, count_all, is_whole
 from .contained import Folder
 from .mjcf_constructs import find_mjcf, path_of
 from .mjcf_include import Trees
-from .xml_text import Element
+from .xml_text import XmlElement
 
 _COUNTED = ("replicate", "composite", "flexcomp")
 _SIZES = ("width", "height", "nrow", "ncol")
@@ -29,7 +29,7 @@ class Scan:
 
     Parameters
     ----------
-    root : Element
+    root : XmlElement
         The model's own file.
     folder : str, optional
         Where all files must lie; the folder of the model's file by default.
@@ -50,7 +50,7 @@ class Scan:
         The model does not lie in the folder, has too many files or elements, or one of its files is no XML.
     """
 
-    def __init__(self, root: Element, folder: str | None) -> None:
+    def __init__(self, root: XmlElement, folder: str | None) -> None:
         main = os.path.dirname(os.path.realpath(root.file))
         self.folder = Folder(main if folder is None else folder)
         if not self.folder.holds(main):
@@ -68,7 +68,7 @@ class Scan:
             self.held[path] = self.bodies - before
         self._elements(self.trees.main)
 
-    def _elements(self, root: Element) -> None:
+    def _elements(self, root: XmlElement) -> None:
         """Take in the elements of one tree."""
         models: dict[str, int] = {}  # name -> bodies
         for element in root.walk():
@@ -77,7 +77,7 @@ class Scan:
                 held, tree = self.held[path], self.trees.models[path]
                 for name in (element.attributes.get("name"), tree.attributes.get("model"), Path(path).stem):
                     models[name or ""] = max(held, models.get(name or "", 0))
-        waiting: list[tuple[Element, int, str | None]] = [(root, 1, "")]
+        waiting: list[tuple[XmlElement, int, str | None]] = [(root, 1, "")]
         while waiting:
             element, copies, parent = waiting.pop()
             below = None
@@ -89,7 +89,7 @@ class Scan:
             copies = self._element(element, copies, models)
             waiting += [(child, copies, below) for child in reversed(element.children)]
 
-    def _element(self, element: Element, copies: int, models: dict[str, int]) -> int:
+    def _element(self, element: XmlElement, copies: int, models: dict[str, int]) -> int:
         """Take in one element, copied so often; returns how often what it holds is copied."""
         given = element.attributes
         if "name" in given:
@@ -113,11 +113,11 @@ class Scan:
                 self._too_large(element, key, f"at most {ENTRIES:,}; it is no part of the motion and may be left out")
         return copies
 
-    def _too_large(self, element: Element, key: str, remedy: str) -> None:
+    def _too_large(self, element: XmlElement, key: str, remedy: str) -> None:
         message = f"{element.attributes[key][:20]} is too large"
         self.problems.append(element.problem(f"{element.tag}.{key}", message, remedy))
 
-    def _make(self, element: Element, bodies: int) -> None:
+    def _make(self, element: XmlElement, bodies: int) -> None:
         """Count bodies that copying makes, of siblings and of all files; one problem tells of too many."""
         if self.made <= COPIES < self.made + bodies:
             self.problems.append(element.problem(element.tag, "makes too many bodies", f"at most {COPIES:,} in all"))

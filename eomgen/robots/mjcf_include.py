@@ -12,7 +12,7 @@ from dataclasses import replace
 from ..errors import ModelError, Problem
 from ..limits.files import DEPTH, ELEMENTS, FILES, SIZE
 from .contained import Folder
-from .xml_text import Element, parse_xml
+from .xml_text import XmlElement, parse_xml
 
 
 class Trees:
@@ -20,7 +20,7 @@ class Trees:
 
     Attributes
     ----------
-    main : Element
+    main : XmlElement
         The model's own.
     models : dict of str to Element
         Path of a file -> tree of a model that is attached.
@@ -28,15 +28,15 @@ class Trees:
         Files that are outside, not there, or part of themselves.
     """
 
-    def __init__(self, root: Element, folder: Folder) -> None:
+    def __init__(self, root: XmlElement, folder: Folder) -> None:
         self.folder = folder
-        self.models: dict[str, Element] = {}
+        self.models: dict[str, XmlElement] = {}
         self.problems: list[Problem] = []
         self.bytes = self.files = self.elements = 0
         self.open: list[str] = []  # files that are being put together, the outermost first
         self.main = self._tree(root, os.path.realpath(root.file), 0)
 
-    def _tree(self, root: Element, path: str, depth: int) -> Element:
+    def _tree(self, root: XmlElement, path: str, depth: int) -> XmlElement:
         """A file with what it includes."""
         self.open.append(path)
         seen = {path}
@@ -44,7 +44,7 @@ class Trees:
         self.open.pop()
         return tree
 
-    def _copy(self, element: Element, home: str, seen: set[str], depth: int) -> Element:
+    def _copy(self, element: XmlElement, home: str, seen: set[str], depth: int) -> XmlElement:
         """An element of a tree whose files are in ``home``; ``seen`` are those that are part of it."""
         self.elements += 1
         if self.elements > ELEMENTS:
@@ -62,7 +62,7 @@ class Trees:
             self._attach(made, home, depth + 1)
         return made
 
-    def _include(self, element: Element, home: str, seen: set[str], depth: int) -> list[Element]:
+    def _include(self, element: XmlElement, home: str, seen: set[str], depth: int) -> list[XmlElement]:
         """The elements that stand where a file is included."""
         path = self._find(element, home)
         if path is None:
@@ -80,7 +80,7 @@ class Trees:
         self.open.pop()
         return found
 
-    def _attach(self, element: Element, home: str, depth: int) -> None:
+    def _attach(self, element: XmlElement, home: str, depth: int) -> None:
         """Take in a model that others attach; the element then names it by the path of its file."""
         path = self._find(element, home)
         if path is None:
@@ -93,7 +93,7 @@ class Trees:
             self.models[path] = self._tree(self._read(element, path), path, depth)
         element.attributes["file"] = path
 
-    def _find(self, element: Element, home: str) -> str | None:
+    def _find(self, element: XmlElement, home: str) -> str | None:
         name = element.attributes.get("file", "")
         found = self.folder.find(element, name, [(home,), (os.path.dirname(os.path.realpath(element.file)),)])
         if isinstance(found, Problem):
@@ -101,7 +101,7 @@ class Trees:
             return None
         return found
 
-    def _read(self, element: Element, path: str) -> Element:
+    def _read(self, element: XmlElement, path: str) -> XmlElement:
         self.files += 1
         if self.files >= FILES:
             raise ModelError([element.problem(element.tag, "too many files", f"at most {FILES} make a model")])

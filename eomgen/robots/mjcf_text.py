@@ -15,7 +15,7 @@ from ..errors import ModelError, Problem
 from ..limits.files import MESHES
 from .contained import Folder, plain, stem
 from .mjcf_include import Trees
-from .xml_text import Element
+from .xml_text import XmlElement
 
 #: Elements that say nothing of the motion, below the root or where they stand.
 _UNUSED = {"size", "statistic", "visual", "sensor", "keyframe", "custom"}
@@ -58,7 +58,7 @@ class Text:
         if problems:
             raise ModelError(problems)
 
-    def refusal(self, said: str, root: Element) -> ModelError:
+    def refusal(self, said: str, root: XmlElement) -> ModelError:
         """The error of what MuJoCo says, its lines led back to the user's files."""
         place = None
         for number in _LINE.findall(said):
@@ -76,7 +76,7 @@ class Text:
         file, line = self.places[number - 1]
         return f"line {line}" if file == main else f"line {line} of {os.path.basename(file)}"
 
-    def _tree(self, root: Element) -> str:
+    def _tree(self, root: XmlElement) -> str:
         base = os.path.dirname(os.path.realpath(root.file))
         folder = {"mesh": "", "texture": ""}
         bare = False
@@ -86,7 +86,7 @@ class Text:
                 folder[kind] = given.get(f"{kind}dir", given.get("assetdir", folder[kind]))
             bare = given.get("strippath", "true" if bare else "") == "true"
         lines: list[str] = []
-        waiting: list[tuple[Element, str] | str] = [(root, "")]
+        waiting: list[tuple[XmlElement, str] | str] = [(root, "")]
         while waiting:
             step = waiting.pop()
             if isinstance(step, str):
@@ -105,7 +105,7 @@ class Text:
             waiting += [(child, tag) for child in reversed(element.children)]
         return "\n".join(lines)
 
-    def _attributes(self, element: Element, base: str, folder: str, bare: bool) -> dict[str, str]:
+    def _attributes(self, element: XmlElement, base: str, folder: str, bare: bool) -> dict[str, str]:
         """Those of an element that MuJoCo gets."""
         tag, given = element.tag, element.attributes
         kept = {key: value for key, value in given.items() if key != "user" and not key.startswith("file")}
@@ -125,11 +125,11 @@ class Text:
         unread = {key: "" for key in given if key.startswith("file")}  # which MuJoCo does not know
         return {**kept, **unread}
 
-    def _places(self, element: Element, base: str, folder: str) -> list[tuple[str, str]]:
+    def _places(self, element: XmlElement, base: str, folder: str) -> list[tuple[str, str]]:
         """Where the names of files start: at the model's folder, then at that of the file included."""
         return [(base, folder), (os.path.dirname(os.path.realpath(element.file)), folder)]
 
-    def _seen(self, element: Element, base: str, folder: str, bare: bool) -> None:
+    def _seen(self, element: XmlElement, base: str, folder: str, bare: bool) -> None:
         """Refuse files outside also where nothing reads them."""
         for key, name in element.attributes.items():
             if key.startswith("file"):
@@ -138,7 +138,7 @@ class Text:
                 if isinstance(found, Problem):
                     self.problems.append(found)
 
-    def _mesh(self, element: Element, base: str, folder: str, bare: bool) -> str:
+    def _mesh(self, element: XmlElement, base: str, folder: str, bare: bool) -> str:
         """The name under which MuJoCo gets a mesh, which is read."""
         name = element.attributes["file"]
         name = plain(name).rpartition("/")[2] if bare else name

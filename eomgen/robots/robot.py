@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import Problem
 from ..records import dataclass
-from .placement import IDENTITY, NOTHING, Inertia, Placement
+from .robot_frames import IDENTITY, NOTHING, Inertia, Placement
 from .ties import Tie
 
 Place = tuple[str, int]  # file, line
@@ -16,7 +16,7 @@ Range = tuple[float, float]  # lowest and highest value
 
 
 @dataclass(frozen=True)
-class Options:
+class RobotOptions:
     """What ``eomgen.load`` and the command line may say about a robot file.
 
     Attributes
@@ -88,7 +88,7 @@ class Mimic:
 
 
 @dataclass(frozen=True)
-class Link:
+class RobotLink:
     """A link: its inertia in its own frame, and shapes to draw as (placement, data)."""
 
     name: str
@@ -98,7 +98,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Joint:
+class RobotJoint:
     """A joint of the tree; ``outer`` is its frame on the parent, ``inner`` on the child.
 
     ``type`` is a word of eomgen's; the coordinate's law (damping, spring, drive's inertia) is that of a joint of one
@@ -163,8 +163,8 @@ class Robot:
     name: str
     file: str
     root: str = ""
-    links: dict[str, Link] = field(default_factory=dict)
-    joints: dict[str, Joint] = field(default_factory=dict)
+    links: dict[str, RobotLink] = field(default_factory=dict)
+    joints: dict[str, RobotJoint] = field(default_factory=dict)
     loops: list[Loop] = field(default_factory=list)
     ties: list[Tie] = field(default_factory=list)
     drives: list[Drive] = field(default_factory=list)

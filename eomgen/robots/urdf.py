@@ -14,11 +14,11 @@ import numpy as np
 
 from ..errors import ModelError
 from ..limits.files import LARGEST
-from ..numeric.inertia import SWITCH
-from .placement import IDENTITY, NOTHING, Inertia, Placement, placed
-from .robot import Joint, Link, Mimic, Options, Robot
+from ..numeric.rigid_inertia import SWITCH
+from .robot import Mimic, Robot, RobotJoint, RobotLink, RobotOptions
+from .robot_frames import IDENTITY, NOTHING, Inertia, Placement, placed
 from .urdf_constructs import note_urdf
-from .xml_text import Element
+from .xml_text import XmlElement
 
 #: Type of a joint in URDF -> eomgen's.
 TYPES = {
@@ -35,15 +35,15 @@ _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\Z", re.
 _SPECIAL = {"inf", "-inf", "+inf", "infinity", "-infinity", "nan", "-nan"}
 
 
-def read_urdf(root: Element, options: Options) -> Robot:
+def read_urdf(root: XmlElement, options: RobotOptions) -> Robot:
     """The robot of a URDF file; its faults are in ``problems``."""
-    return _Reader(root, options).read()
+    return _UrdfReader(root, options).read()
 
 
-class _Reader:
+class _UrdfReader:
     """Reads elements into a Robot, noting faults as it goes."""
 
-    def __init__(self, root: Element, options: Options) -> None:
+    def __init__(self, root: XmlElement, options: RobotOptions) -> None:
         self.root, self.options = root, options
         self.robot = Robot(root.attributes.get("name") or "robot", root.file)
 
@@ -67,11 +67,11 @@ class _Reader:
         return robot
 
     # -- values ---------------------------------------------------------------------------------------------------
-    def fault(self, element: Element, path: str, message: str, remedy: str = "") -> None:
+    def fault(self, element: XmlElement, path: str, message: str, remedy: str = "") -> None:
         self.robot.problems.append(element.problem(path, message, remedy))
 
     def number(
-        self, element: Element, key: str, path: str, default: float | None = None, most: float = LARGEST
+        self, element: XmlElement, key: str, path: str, default: float | None = None, most: float = LARGEST
     ) -> float:
         """A finite number in an attribute, at most so large."""
         text = element.attributes.get(key)
@@ -82,7 +82,7 @@ class _Reader:
             return default or 0.0
         return self._finite(element, where, text, most)
 
-    def _finite(self, element: Element, path: str, text: str, most: float = LARGEST) -> float:
+    def _finite(self, element: XmlElement, path: str, text: str, most: float = LARGEST) -> float:
         value = float(text) if _NUMBER.match(text.strip()) else math.nan
         if most < abs(value) < math.inf:
             self.fault(element, path, f"{value:g} is too large", f"at most {most:g}, so that products stay finite")
@@ -94,7 +94,9 @@ class _Reader:
             return 0.0
         return value
 
-    def triple(self, element: Element, key: str, path: str, default: tuple[float, ...]) -> tuple[float, float, float]:
+    def triple(
+        self, element: XmlElement, key: str, path: str, default: tuple[float, ...]
+    ) -> tuple[float, float, float]:
         """Three numbers in an attribute."""
         text = element.attributes.get(key)
         if text is None:
@@ -106,7 +108,7 @@ class _Reader:
         x, y, z = (self._finite(element, f"{path}.{key}", part) for part in parts)
         return (x, y, z)
 
-    def origin(self, element: Element, path: str) -> Placement:
+    def origin(self, element: XmlElement, path: str) -> Placement:
         """The placement that ``<origin xyz rpy>`` gives."""
         origin = element.find("origin")
         if origin is None:
@@ -115,7 +117,7 @@ class _Reader:
         position = self.triple(origin, "xyz", f"{path}.origin", o)
         return placed(position, self.triple(origin, "rpy", f"{path}.origin", o), self.options.snap)
 
-    def name(self, element: Element) -> str | None:
+    def name(self, element: XmlElement) -> str | None:
         """The name of a link or joint, if it is given and new."""
         name = element.attributes.get("name")
         known = self.robot.links if element.tag == "link" else self.robot.joints
@@ -131,7 +133,7 @@ class _Reader:
         return name
 
     # -- elements -------------------------------------------------------------------------------------------------
-    def _link(self, element: Element) -> None:
+    def _link(self, element: XmlElement) -> None:
         name = self.name(element)
         if name is None:
             return
@@ -139,11 +141,11 @@ class _Reader:
         inertial = element.find("inertial")
         inertia = NOTHING if inertial is None else self._inertial(inertial, f"{path}.inertial")
         shapes = [self._shape(visual, f"{path}.visual") for visual in element.all("visual")]
-        self.robot.links[name] = Link(
+        self.robot.links[name] = RobotLink(
             name, (element.file, element.line), inertia, tuple(shape for shape in shapes if shape is not None)
         )
 
-    def _inertial(self, element: Element, path: str) -> Inertia:
+    def _inertial(self, element: XmlElement, path: str) -> Inertia:
         frame = self.origin(element, path)
         weight, tensor = element.find("mass"), element.find("inertia")
         mass = 0.0
@@ -161,7 +163,7 @@ class _Reader:
         matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return Inertia(mass, np.zeros(3), matrix).seen(frame)
 
-    def _shape(self, element: Element, path: str) -> tuple[Placement, dict[str, Any]] | None:
+    def _shape(self, element: XmlElement, path: str) -> tuple[Placement, dict[str, Any]] | None:
         """A visual: what it looks like, as data that is never read."""
         geometry = element.find("geometry")
         given = geometry.children[0] if geometry is not None and geometry.children else None
@@ -185,13 +187,13 @@ class _Reader:
             return None
         return self.origin(element, path), shape
 
-    def _check_scale(self, element: Element, path: str, factors: list[float]) -> None:
+    def _check_scale(self, element: XmlElement, path: str, factors: list[float]) -> None:
         if not all(factors) and not any(problem.path == path for problem in self.robot.problems):
             self.fault(element, path, "a scale of 0 leaves nothing of the mesh", "negative factors mirror it")
         elif min(factors) < 0.0:
             self.robot.notes.append(f"{path}: negative factors mirror the mesh")
 
-    def _joint(self, element: Element) -> None:
+    def _joint(self, element: XmlElement) -> None:
         name = self.name(element)
         if name is None:
             return
@@ -218,7 +220,7 @@ class _Reader:
             left = [tag for tag in ("dynamics", "mimic") if element.find(tag) is not None]
             self.robot.notes += [f"left out: <{tag}> of the {given} joint {name}" for tag in left]
         dynamics = element.find("dynamics") if one_degree else None
-        self.robot.joints[name] = Joint(
+        self.robot.joints[name] = RobotJoint(
             name=name,
             type=kind or "weld",
             parent=ends["parent"],
@@ -232,7 +234,7 @@ class _Reader:
             mimic=self._mimic(element, path) if one_degree else None,
         )
 
-    def _limits(self, element: Element, path: str, kind: str) -> dict[str, float]:
+    def _limits(self, element: XmlElement, path: str, kind: str) -> dict[str, float]:
         limit = element.find("limit")
         result: dict[str, float] = {}
         for key in ("lower", "upper", "velocity", "effort") if limit is not None else ():
@@ -251,7 +253,7 @@ class _Reader:
             self.robot.notes.append(f"{path}.limit: lower {lower:g} is above upper {upper:g}; taken as no limit")
         return result
 
-    def _mimic(self, element: Element, path: str) -> Mimic | None:
+    def _mimic(self, element: XmlElement, path: str) -> Mimic | None:
         mimic = element.find("mimic")
         if mimic is None:
             return None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .constructs import DATA, HARMLESS, LEFT, TAKEN, Row, count_all, find_row, is_whole, notes_of, table_of
-from .xml_text import Element
+from .constructs import DATA, HARMLESS, LEFT, TAKEN, ConstructRow, count_all, find_row, is_whole, notes_of, table_of
+from .xml_text import XmlElement
 
 _REASONS = {
     "taken": (TAKEN, "becomes part of the model"),
@@ -56,12 +56,12 @@ URDF = table_of(
 )
 
 
-def find_urdf(path: str, attribute: str = "") -> Row | None:
+def find_urdf(path: str, attribute: str = "") -> ConstructRow | None:
     """What becomes of an attribute of an element, or of the element itself; None if it is not known."""
     return find_row(URDF, path, attribute)
 
 
-def walk_urdf(root: Element) -> Iterator[tuple[str, Element]]:
+def walk_urdf(root: XmlElement) -> Iterator[tuple[str, XmlElement]]:
     """Elements with their paths in the table; not into those whose inside shares their fate, or is not known."""
     waiting = [("robot", root)]
     while waiting:
@@ -74,7 +74,7 @@ def walk_urdf(root: Element) -> Iterator[tuple[str, Element]]:
         waiting += [(f"{inside}{child.tag}", child) for child in reversed(element.children)]
 
 
-def note_urdf(root: Element) -> list[str]:
+def note_urdf(root: XmlElement) -> list[str]:
     """Notes on what a file has that the model has not."""
     notes = notes_of(find_urdf, count_all((path, element.attributes) for path, element in walk_urdf(root)))
     for path, element in walk_urdf(root):

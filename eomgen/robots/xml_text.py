@@ -18,24 +18,24 @@ from ..limits.files import DEPTH, ELEMENTS, LONGEST, PIECE, SIZE
 
 
 @dataclass
-class Element:
+class XmlElement:
     """One element: its tag, attributes and children, and where it starts."""
 
     tag: str
     attributes: dict[str, str]
     file: str
     line: int
-    children: list[Element] = field(default_factory=list)
+    children: list[XmlElement] = field(default_factory=list)
 
-    def find(self, tag: str) -> Element | None:
+    def find(self, tag: str) -> XmlElement | None:
         """The first child of a tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
-    def all(self, tag: str) -> list[Element]:
+    def all(self, tag: str) -> list[XmlElement]:
         """All children of a tag."""
         return [child for child in self.children if child.tag == tag]
 
-    def walk(self) -> Iterator[Element]:
+    def walk(self) -> Iterator[XmlElement]:
         """This element and everything in it, in the order of the file."""
         waiting = [self]
         while waiting:
@@ -48,7 +48,7 @@ class Element:
         return Problem(path, message, remedy, self.file, self.line)
 
 
-def read_xml(path: str | os.PathLike[str]) -> Element:
+def read_xml(path: str | os.PathLike[str]) -> XmlElement:
     """The root element of an XML file.
 
     Raises
@@ -70,7 +70,7 @@ def read_xml(path: str | os.PathLike[str]) -> Element:
     return parse_xml(data, name)
 
 
-def parse_xml(data: bytes, file: str) -> Element:
+def parse_xml(data: bytes, file: str) -> XmlElement:
     """The root element of the bytes of an XML file; ``file`` is the name that messages bear."""
     try:
         from defusedxml.common import DefusedXmlException
@@ -102,7 +102,7 @@ def parse_xml(data: bytes, file: str) -> Element:
         raise ModelError([Problem("file", f"not XML: {error}", "", file, 1)]) from None
     if handler.root is None:
         raise ModelError([Problem("file", "is empty", "", file, 1)])
-    root: Element = handler.root
+    root: XmlElement = handler.root
     return root
 
 
@@ -114,8 +114,8 @@ def _handler(parser: Any, file: str) -> Any:
 
         def __init__(self) -> None:
             super().__init__()
-            self.root: Element | None = None
-            self.open: list[Element] = []
+            self.root: XmlElement | None = None
+            self.open: list[XmlElement] = []
             self.count = 0
 
         def stop(self, message: str, remedy: str) -> ModelError:
@@ -130,7 +130,7 @@ def _handler(parser: Any, file: str) -> Any:
             given = dict(attributes.items())
             if any(len(value) > LONGEST for value in given.values()):
                 raise self.stop("has an attribute that is too long", f"at most {LONGEST:,} characters")
-            element = Element(tag, given, file, parser.getLineNumber() or 1)
+            element = XmlElement(tag, given, file, parser.getLineNumber() or 1)
             if self.open:
                 self.open[-1].children.append(element)
             else:

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from .quaternions import euler_parameters_from_matrix, multiply_quaternions
-from .scalars import Scalar, atan2, cos, entries, half, shaped, sin, sqrt, times, where_less
+from .scalars import Scalar, about, atan2, cos, entries, half, shaped, sin, sqrt, times, where_less
 
 AXES = {"x": 0, "y": 1, "z": 2}
 
@@ -21,12 +21,7 @@ def axes_of(sequence: str) -> tuple[int, int, int]:
 
 def elementary(axis: int, angle: Scalar) -> list[list[Scalar]]:
     """Rotation about axis 0, 1 or 2."""
-    c, s = cos(angle), sin(angle)
-    if axis == 0:
-        return [[1, 0, 0], [0, c, -s], [0, s, c]]
-    if axis == 1:
-        return [[c, 0, s], [0, 1, 0], [-s, 0, c]]
-    return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+    return about(axis, cos(angle), sin(angle))
 
 
 def matrix_from_euler_angles(sequence: str, angles: Any) -> Any:

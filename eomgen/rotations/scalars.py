@@ -14,6 +14,7 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..limits.descriptions import UNIT
+from ..numeric.rotation_matrices import quarter_turns
 
 Scalar = Any  #: a number, an :class:`~eomgen.graph.Expr` or a SymPy expression
 Rows = Sequence[Sequence[Scalar]]
@@ -65,6 +66,28 @@ def sqrt(x: Scalar) -> Scalar:
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Angle of the vector (x, y); 0 for numbers that are both 0."""
     return apply("atan2", y, x)
+
+
+def cosine_and_sine(angle: Scalar) -> tuple[Scalar, Scalar]:
+    """cos and sin; exact 0 and +-1 for numeric multiples of pi/2."""
+    value = angle.value if isinstance(angle, Expr) else angle
+    exact = quarter_turns(value) if isinstance(value, int | float) else None
+    return exact or (cos(angle), sin(angle))
+
+
+def about(axis: int, c: Scalar, s: Scalar) -> list[list[Scalar]]:
+    """Rotation about axis 0, 1 or 2 by the angle of this cosine and sine; takes turned axes to the original ones."""
+    if axis == 0:
+        return [[1, 0, 0], [0, c, -s], [0, s, c]]
+    if axis == 1:
+        return [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+    return [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+
+
+def matrix_from_roll_pitch_yaw(angles: Iterable[Scalar]) -> list[list[Scalar]]:
+    """R = Rz(yaw) Ry(pitch) Rx(roll): turned about fixed axes, roll first, as in URDF."""
+    x, y, z = (about(axis, *cosine_and_sine(angle)) for axis, angle in enumerate(angles))
+    return times(z, times(y, x))
 
 
 def half(x: Scalar) -> Scalar:

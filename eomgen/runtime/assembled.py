@@ -14,7 +14,7 @@ from ..numeric.scales import Array
 from .initial import Initial
 from .kernels import Kernels
 from .layout import Layout
-from .names import require_mapping
+from .near_names import require_mapping
 from .room import read_number, read_numbers
 
 

@@ -22,8 +22,8 @@ from .refusals import Refusal
 from .room import read_numbers
 
 if TYPE_CHECKING:
-    from .paths import Path
     from .protocols import Core, Motion, State, Timed
+    from .tree_motion import DependentMotion
 
 
 class BoundModel(Assembled, Momenta):
@@ -165,10 +165,10 @@ class BoundModel(Assembled, Momenta):
     # kinematics
 
     @cached_property
-    def _path(self) -> tuple[Path, Callable[[float], Array]]:
-        from .paths import Path
+    def _path(self) -> tuple[DependentMotion, Callable[[float], Array]]:
+        from .tree_motion import DependentMotion
 
-        return Path(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
+        return DependentMotion(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
 
     def kinematics(
         self,
@@ -209,7 +209,7 @@ class BoundModel(Assembled, Momenta):
         self.layout.require_minimal_form()
         if p is not None or u is not None:
             return self.bind(p, u).kinematics(q_i, v_i, a_i, guess, t)
-        from .paths import motions
+        from .tree_motion import motions
 
         path, reference = self._path
         start = None if guess is None else read_numbers("guess", guess)

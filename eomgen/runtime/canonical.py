@@ -42,7 +42,7 @@ class Canonical:
                 "derive it with method='hamilton'"
             )
         self._module = module
-        self.p_names = tuple(f"p_{name}" for name in layout.freedoms)
+        self.p_names = tuple(f"p_{name}" for name in layout.velocity_labels)
         self.z_names = layout.q + self.p_names
         self.n_z = len(self.z_names)
         self._terms = module.kernels.state("canonical")

@@ -88,7 +88,7 @@ def find_change_points(module: BoundModel, t: Array, x: Array, u: Array) -> list
     return [point for look in looks for point in look.find(DIP * largest)]
 
 
-class Curve:
+class StatesBetween:
     """States between steps: coordinates by Hermite's polynomial, of degree five where accelerations are known.
 
     Parameters
@@ -136,7 +136,7 @@ class Looks:
         self.module, self.t, self.u = module, t, u
         layout = module.layout
         self.rank, self.n_q = layout.rank, layout.n_q
-        self.curve = Curve(module, t, x, u)
+        self.curve = StatesBetween(module, t, x, u)
         ends = scaled_jacobians(module, t[[0, -1]], x[:, [0, -1]], self._inputs(t[[0, -1]]))
         held = np.abs(ends).any(axis=(0, 1))
         speed = np.abs(x[self.n_q :] / layout.scales.q[:, None])[held].max(axis=0, initial=0.0)
@@ -169,7 +169,7 @@ class Looks:
         """The state between two times nearest to a loss of rank, if it is one."""
         ends = np.array([first, last])
         u = np.array([np.interp(ends, *_rising(self.t, row)) for row in self.u]).reshape(-1, 2)
-        curve = Curve(self.module, ends, self._closed(ends), u)
+        curve = StatesBetween(self.module, ends, self._closed(ends), u)
         for _ in range(LEVELS):
             times = np.linspace(first, last, PARTS + 1)
             states = curve(times)

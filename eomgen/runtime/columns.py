@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import UsageError
+from ..errors import UnavailableError, UsageError
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .layout import Layout
-from .origin import origin
 from .signals import Forcing
 from .trajectory import Residuals
 
@@ -143,7 +142,12 @@ def units_of_layout(layout: Layout) -> dict[str, str]:
 
 def describe(module: BoundModel) -> dict[str, Any]:
     """What the columns of any run of a module are called, where it comes from, and its parameters."""
-    return {**_described(module.layout), "origin": origin(module), "parameters": dict(module._parameters)}
+    known = {**_described(module.layout), "parameters": dict(module._parameters)}
+    try:
+        from .origin import origin
+    except UnavailableError:  # a slim package does not say
+        return known
+    return known | {"origin": origin(module)}
 
 
 @lru_cache(maxsize=64)
@@ -178,7 +182,7 @@ def project(module: BoundModel, t: Array, raw: Array, forcing: Forcing | None = 
     position = module.constraints.every
     velocity = module.kernels.state("velocity_constraints")
     correction = np.abs(x - raw)
-    for i, _ in module.layout.balls:  # their length means nothing
+    for i, _ in module.layout.quaternion_slots:  # their length means nothing
         e = raw[i : i + 4]
         correction[i : i + 4] = np.abs(x[i : i + 4] - e / np.sqrt((e * e).sum(axis=0)))
     return Residuals(

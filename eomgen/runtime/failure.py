@@ -114,7 +114,7 @@ class Fail:
 
 def no_rotation(layout: Layout, x: Array) -> tuple[str, str] | None:
     """Euler parameters whose squares are all zero at a state, and the remedy; None if there are none."""
-    for i, _ in layout.balls:
+    for i, _ in layout.quaternion_slots:
         if not np.abs(x[i : i + 4]).max() > TINY_ROOT:
             four = f"{layout.q[i]} .. {layout.q[i + 3]}"
             return f"the Euler parameters {four} are all zero", f"give a rotation; none is {layout.q[i]} = 1"

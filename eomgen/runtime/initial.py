@@ -17,17 +17,18 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity, starts
-from ..numeric.closure import Equations, System, close, closed
+from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
+from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.continuation import follow, follow_time
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
 from ..numeric.space import settle
+from ..numeric.starts import starts
 from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
-from .names import UnknownNameError, unknown
+from .near_names import UnknownNameError, unknown
 
 
 class Given(NamedTuple):
@@ -69,7 +70,7 @@ class Initial:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")
             if name in layout.parameter_rates:
                 wanted = ", ".join(n for n in layout.v if not n.endswith("_dot"))
-                what = "angular velocity; give that" if layout.balls else "velocities; give those"
+                what = "angular velocity; give that" if layout.quaternion_slots else "velocities; give those"
                 raise UnknownNameError(f"{name!r} follows from the {what} instead, of {wanted}")
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates)
@@ -107,7 +108,7 @@ class Initial:
         """A position with coordinates of the tree replaced; loops are not closed."""
         return self._with(q, values)
 
-    def _equations(self, values: Mapping[str, float]) -> Equations | None:
+    def _equations(self, values: Mapping[str, float]) -> WantedValues | None:
         layout = self.layout
         names = [name for name in values if name in layout.loops]
         if not names:
@@ -119,7 +120,7 @@ class Initial:
             return y[chosen], y_q[chosen]
 
         wanted = np.array([values[name] for name in names])
-        return Equations(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
+        return WantedValues(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
 
     # positions
 
@@ -206,7 +207,7 @@ class Initial:
         layout = self.layout
         if not layout.n_h:
             return self.assembled(guess)
-        favoured = [layout.freedoms[i] for i in layout.independent]
+        favoured = [layout.velocity_labels[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
             try:
@@ -228,7 +229,7 @@ class Initial:
         layout = self.layout
         free = np.ones(len(self.place.q))
         free[self.place.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
-        system = System(self.position, self.place, free, self._equations(given))
+        system = ClosureSystem(self.position, self.place, free, self._equations(given))
         found = [first]
         for start in starts(first, free, self.place, tries):
             with np.errstate(all="ignore"):
@@ -356,7 +357,9 @@ class Initial:
             else:
                 basis = added
                 kept[name] = value
-        whole = [layout.q[i : i + 4] for i, _ in layout.balls]  # Euler parameters are held together or not at all
+        whole = [
+            layout.q[i : i + 4] for i, _ in layout.quaternion_slots
+        ]  # Euler parameters are held together or not at all
         torn = {name for four in whole if not all(name in kept for name in four) for name in four}
         return {name: value for name, value in kept.items() if name not in torn}
 
@@ -367,7 +370,7 @@ class Initial:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
         if name in layout.q:
             index, unit = layout.q.index(name), np.eye(len(self.place.q))
-            if any(i < index < i + 4 for i, _ in layout.balls):
+            if any(i < index < i + 4 for i, _ in layout.quaternion_slots):
                 return []
             return [unit[k] for k in self.place.velocities([index])]
         index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)

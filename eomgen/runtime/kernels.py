@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
-from ..limits.inertia import SINGULAR
-from ..numeric import algebra
-from ..numeric.definite import correlated
+from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
 from .failure import Fail
 from .layout import Layout
@@ -85,7 +82,7 @@ class Kernels:
             if layout.shape(name)[0] == 0:
                 return Constant(np.zeros(layout.shape(name)), layout.inputs(name))
             if layout.n_c == 0 and name == "project":
-                return Identity(layout.n_x, [i for i, _ in layout.balls])
+                return Identity(layout.n_x, [i for i, _ in layout.quaternion_slots])
             if layout.rank == 0 and name == "embedded_mass_matrix":
                 return Selected(self.state("mass_matrix", nan), layout.independent)
         kernel: State = self._make(self.core.state, name, nan)
@@ -108,53 +105,12 @@ class Kernels:
         return self.state("poses", nan=True)(q, t=t, p=p)
 
     def _culprit(self, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None) -> str:
-        """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
-        layout, q = self.layout, x[: self.layout.n_q]
-        if status == 1:
-            return self._not_finite(t, x, p, u)
-        if status == 2:
-            M = self.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
-            if not np.isfinite(M).all():
-                return ""
-            values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
-            if layout.metadata.get("indefinite"):
-                return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
-            if values[0] > SINGULAR:
-                return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
-            weights = np.abs(vectors[:, 0])
-            moved = zip(layout.independent, weights, strict=True)
-            names = [layout.freedoms[i] for i, w in moved if w > 0.1 * weights.max()]
-            moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
-            size = "negative" if values[0] < -SINGULAR else "no"
-            return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
-        if status == 3:
-            e = self.state("constraints", nan=True)(q, t=t, p=p, u=u)
-            if not np.isfinite(e).all() or not e.size:
-                return ""
-            worst = int(np.abs(layout.scales.residual(e)).argmax())
-            return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
-        if status == 4:
-            return f"independent are {', '.join(layout.freedoms[i] for i in layout.independent)}"
-        return ""
-
-    def _not_finite(self, t: float, x: Array, p: Array | None, u: Array | None) -> str:
-        """Names what makes a result that is no number: inputs, loads of elements, the mass matrix."""
-        layout = self.layout
-        inputs = self.context.u if u is None else u
-        bad = [name for name, value in zip(layout.u, inputs, strict=True) if not np.isfinite(value).all()]
-        if bad:
-            return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
-        if layout.n_e and "finite_forces" in self.core.names and x.size >= layout.n_x:
-            finite = self.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
-            loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
-            if loads:
-                why = "ends that meet or lie inside the cylinder, or a law outside its domain"
-                return f"the loads of {loads} are not ({why})"
-        if "mass_matrix" in self.core.names and x.size >= layout.n_q:
-            M = self.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
-            if not np.isfinite(M).all():
-                return "the mass matrix is not (a mass, an inertia or a length outside the domain of its law)"
-        return ""
+        """Names what a failure at a state is due to, as far as it can be told; a slim package does not look for it."""
+        try:
+            from .culprit import find_culprit
+        except UnavailableError:
+            return ""
+        return find_culprit(self, status, t, x, p, u)
 
 
 class Missing:
@@ -296,11 +252,11 @@ class Nothing:
 
 
 class Identity(Constant):
-    """The projection of a tree: nothing to do but for the length of Euler parameters, which start at ``balls``."""
+    """The projection of a tree: nothing to do but for the length of Euler parameters."""
 
-    def __init__(self, n_in: int, balls: Sequence[int] = ()) -> None:
+    def __init__(self, n_in: int, quaternion_slots: Sequence[int] = ()) -> None:
         super().__init__(np.zeros(n_in), n_in)
-        self.balls = balls
+        self.quaternion_slots = quaternion_slots
 
     def __call__(
         self,
@@ -312,7 +268,7 @@ class Identity(Constant):
     ) -> Array:
         """A copy of x."""
         result = _write(super().__call__(x, out=out), read_numbers("x", x))
-        for i in self.balls:
+        for i in self.quaternion_slots:
             result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
         return result
 

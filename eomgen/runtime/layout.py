@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
-from .names import check_names
+from .near_names import check_names
 from .room import read_number, read_numbers
 
 ABI = 1  #: layout of the metadata this file reads
@@ -51,12 +51,14 @@ class Layout:
         self.n_u, self.n_p, self.n_y = len(self.u), len(self.p), len(self.y)
         self.n_c: int = data.get("n_c", 0)
         self.n_h: int = data.get("n_h", self.n_c)
-        self.balls: tuple[tuple[int, int], ...] = tuple((int(i), int(j)) for i, j in data.get("balls", ()))
-        self.space = Space.of(self.n_v, self.balls)
-        self.freedoms = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
+        self.quaternion_slots: tuple[tuple[int, int], ...] = tuple(
+            (int(i), int(j)) for i, j in data.get("quaternion_slots", ())
+        )
+        self.space = Space.of(self.n_v, self.quaternion_slots)
+        self.velocity_labels = tuple(n[:-4] if n.endswith("_dot") and n[:-4] in self.q else n for n in self.v)
         coordinate_of: list[int] | None = data.get("coordinate_of")
         if coordinate_of is not None:  # given equations name their velocities as they like
-            self.freedoms = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
+            self.velocity_labels = tuple(n if k < 0 else self.q[k] for n, k in zip(self.v, coordinate_of, strict=True))
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
         self.energy_known: bool = data.get("energy_known", True)
@@ -64,7 +66,7 @@ class Layout:
         self.n_s: int = data.get("n_s", 0)
         self.n_w: int = data.get("n_w", 0)
         #: rates of Euler parameters, which are in q' but not in v
-        self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.balls for name in self.q[i : i + 4])
+        self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])
         if coordinate_of is not None:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
@@ -144,7 +146,7 @@ class Layout:
         ------
         UsageError
         """
-        turning = [self.v[i] for i in self.independent if self.freedoms[i] == self.v[i]]
+        turning = [self.v[i] for i in self.independent if self.velocity_labels[i] == self.v[i]]
         if self.given_rates:
             reason = "the rates of its coordinates are given as functions of velocities"
         elif self.n_h < self.n_c:

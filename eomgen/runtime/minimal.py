@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import PartitionError, UsageError
 from ..numeric.scales import Array
-from .paths import STEP, Path
 from .room import read_number, read_numbers
+from .tree_motion import STEP, DependentMotion
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -60,7 +60,7 @@ class Minimal:
         layout.require_minimal_form()
         self._module = module
         self._layout = layout
-        self._path = Path(module.kernels)
+        self._path = DependentMotion(module.kernels)
         self.q_names = tuple(layout.q[i] for i in layout.independent_q)
         self.v_names = tuple(layout.v[i] for i in layout.independent)
         self.x_names = self.q_names + self.v_names

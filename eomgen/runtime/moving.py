@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import UsageError
 from ..numeric.scales import Array
 from .drawing import load_show
-from .names import unknown
+from .near_names import unknown
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

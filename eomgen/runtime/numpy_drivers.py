@@ -132,7 +132,9 @@ class Drivers:
         indefinite = bool(self.layout.metadata.get("indefinite"))
         return embedded.unpack_terms(flat, self.layout.n_v, self.layout.n_c, indefinite)
 
-    def residuals(self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array) -> embedded.Residuals:
+    def residuals(
+        self, t: float, u: Array, c: Array, q: Array, v: Array, a: Array, l: Array
+    ) -> embedded.DynamicsSlopes:
         """The derivatives of the residuals."""
         n, m, n_q = self.layout.n_v, self.layout.n_c, self.layout.n_q
         x = np.concatenate([q, v, a, l])
@@ -140,12 +142,12 @@ class Drivers:
         if "residual_jacobian" in self.blocks:
             flat = np.asarray(self.blocks["residual_jacobian"](t, x, u, c), dtype=float)
             parts = np.split(flat, np.cumsum([k * width for k, width in shapes[:-1]]))
-            return embedded.Residuals(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
+            return embedded.DynamicsSlopes(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
         directions = np.eye(n_q + n)
         x = np.vstack([np.repeat(x[:, None], n_q + n, axis=1), directions])
         flat = np.asarray(self.blocks["residual_tangent"](t, x, u, c), dtype=float)
         r1, r2, r3 = np.split(flat, [n, n + m])
-        return embedded.Residuals(r1[:, :n_q], r1[:, n_q:], r2[:, :n_q], r2[:, n_q:], r3[:, :n_q])
+        return embedded.DynamicsSlopes(r1[:, :n_q], r1[:, n_q:], r2[:, :n_q], r2[:, n_q:], r3[:, :n_q])
 
     def _bound(self, t: float, u: Array, c: Array) -> tuple[Any, Any, Any]:
         return (partial(f, t, u, c) for f in (self.terms, self.position, self.rate))  # type: ignore[return-value]

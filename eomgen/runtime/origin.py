@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .identity import digest
-from .late import eager
+from .input_kinds import Expressed
 from .signals import Signal
-from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -40,7 +39,7 @@ def origin(module: BoundModel) -> dict[str, Any]:
             "eomgen": facts.get("eomgen"),
             "python": sys.version.partition(" ")[0],
             "numpy": np.__version__,
-            "compiler": getattr(eager(module.core), "compiler", None),
+            "compiler": getattr(module.core, "compiler", None),
         },
     }
 
@@ -61,10 +60,8 @@ def spell_input(value: Any) -> Any:
             "points": len(value.times), "sha256": digest([value.times, value.values])
         }  # fmt: skip
         return {"interpolation": value.interpolation, "corners": value.corners, **points}
-    if isinstance(value, Formula):
+    if isinstance(value, Expressed):
         return value.text
-    if isinstance(value, DeclaredSignal):
-        return "declared by the model"
     if isinstance(value, (int, float)):
         return float(value)
     named = f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', type(value).__qualname__)}"

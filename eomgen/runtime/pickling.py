@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import ToolchainError, UsageError
-from ..files.entry import MANIFEST, read_entry
+from ..files.build_folder import MANIFEST, read_entry
 from ..files.ownership import read_trusted, require_trusted
 from ..files.source import find_module, load_source
 from ..numeric.scales import Array

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from ..texts import visible
-from .names import require
+from .near_names import require
 
 if TYPE_CHECKING:
-    from .protocols import Columns
+    from .protocols import TrajectoryLike
 
 
-def plot(trajectory: Columns, names: Sequence[str], ax: Any = None) -> Any:
+def plot(trajectory: TrajectoryLike, names: Sequence[str], ax: Any = None) -> Any:
     """Draw columns over time; see :meth:`.trajectory.Trajectory.plot`."""
     rows = {name: trajectory[name] for name in names}  # unknown names fail before a figure opens
     pyplot = require("matplotlib.pyplot", "matplotlib", "plot")

@@ -57,7 +57,7 @@ class Motion(Protocol):
     ) -> Array: ...
 
 
-class Columns(Protocol):
+class TrajectoryLike(Protocol):
     """A trajectory as what draws and writes it sees it; see :class:`~.trajectory.Trajectory`."""
 
     t: Array

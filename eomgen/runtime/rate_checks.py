@@ -12,8 +12,8 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, CONTRADICTS, CONTRADICTS_TABLE, DIFFERENCE
 from ..numeric.scales import Array
+from .input_kinds import Expressed
 from .signal_rates import TableRate, find_jump
-from .tapes import DeclaredSignal, Formula
 
 if TYPE_CHECKING:
     from .protocols import Driven
@@ -73,7 +73,7 @@ def _of_time(forcing: Driven, name: str) -> OfTime | None:
         known = name in forcing.constants and name in forcing.layout.u
         constant = float(forcing.base[forcing.layout.u.index(name)]) if known else value
         return lambda t: constant
-    if isinstance(value, Formula | DeclaredSignal):
+    if isinstance(value, Expressed):
         if value.depends_on_state:
             return None
         function, zero = value.function(forcing.parameters), np.zeros(forcing.layout.n_x)

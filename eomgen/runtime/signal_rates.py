@@ -16,9 +16,10 @@ from ..errors import UsageError
 from ..limits.rounding import TINY
 from ..limits.runs import CONTINUOUS, LOCATED, MOMENT
 from ..numeric.scales import Array
+from .input_kinds import Expressed, Tabulated, of_time
 from .layout import Layout
 from .room import read_number
-from .tapes import DeclaredSignal, Formula
+from .tapes import DeclaredSignal
 
 if TYPE_CHECKING:
     from .protocols import Driven
@@ -26,41 +27,7 @@ if TYPE_CHECKING:
 CELLS = 256  #: intervals of a run in which jumps of a text are looked for
 
 
-class OfTime:
-    """A function of time alone, as f(t, x); its rate is that of the object's own ``derivative()``."""
-
-    def __init__(self, function: Any) -> None:
-        self.function = function
-
-    def __call__(self, t: float, x: Any = None) -> Any:
-        """The value at time t."""
-        return self.function(t)
-
-    def derivative(self) -> Any:
-        """The rate, as the object says it."""
-        found = self.function.derivative()
-        return of_time(found) if callable(found) else found
-
-
-def of_time(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function itself, or as f(t, x) one with ``derivative()`` that takes the time alone.
-
-    So does one of one argument, or whose second has a number by default, as the splines of SciPy have the order of a
-    derivative there.
-    """
-    from inspect import signature
-
-    if not callable(getattr(function, "derivative", None)):
-        return function
-    try:
-        taken = [p for p in signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
-    except (TypeError, ValueError):
-        return function
-    alone = len(taken) == 1 and taken[0].kind is not taken[0].VAR_POSITIONAL
-    return OfTime(function) if alone or (len(taken) > 1 and isinstance(taken[1].default, int | float)) else function
-
-
-class TableRate:
+class TableRate(Tabulated):
     """A derivative of a table by time: cubic pieces that may jump where they meet, 0 before and after.
 
     At the first and the last time it is that of the piece inside, so that a run over just the table sees no jump.
@@ -153,7 +120,7 @@ def require_smooth(forcing: Driven, start: float, end: float) -> None:
     for first, of in layout.input_rates.items():
         for name, rate in pairwise([first, *(rate for rate, _ in of)]):
             f, g = (forcing.values.get(n) for n in (name, rate))
-            if not (isinstance(f, Formula | DeclaredSignal) and isinstance(g, Formula | DeclaredSignal)):
+            if not (isinstance(f, Expressed) and isinstance(g, Expressed)):
                 continue
             follows = rate in forcing.derived or (isinstance(f, DeclaredSignal) and isinstance(g, DeclaredSignal))
             if not follows or not f.branches or start == end:
@@ -300,7 +267,7 @@ def fill_rates(
 
 
 def derive(name: str, rate: str, value: Any) -> Any:
-    """The rate of an input given as a number, Formula, Signal or function.
+    """The rate of an input given as a number, expression, Signal or function.
 
     Raises
     ------
@@ -309,8 +276,8 @@ def derive(name: str, rate: str, value: Any) -> Any:
     """
     if isinstance(value, float):
         return 0.0
-    if isinstance(value, Formula):
-        return value.derivative(name, rate)
+    if isinstance(value, Expressed) and (known := value.rate(name, rate)) is not None:
+        return known
     derivative = getattr(value, "derivative", None)
     found = derivative() if callable(derivative) else None
     if found is not None:

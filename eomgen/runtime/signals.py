@@ -12,21 +12,19 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.runs import CONTINUOUS, DIFFERENCE
 from ..numeric.scales import Array
-from ..numeric.splines import slopes
 from ..texts import shown
+from .input_kinds import Expressed, Tabulated, of_time
+from .input_texts import is_formula, read_formula
 from .layout import Layout
-from .names import check_names, require_mapping, require_time_and_state, unknown
-from .rate_checks import require_agreement
+from .near_names import check_names, require_mapping, require_time_and_state, unknown
 from .room import as_real, read_number, read_numbers
-from .signal_rates import TableRate, derive, fill_rates, jumps, of_time, pieces_of, require_smooth
-from .tapes import DeclaredSignal, Formula, is_formula, record_tape
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
 #: How a table goes on between its times -> the order of its pieces.
 ORDERS = {"linear": 1, "zero-order": 0, "cubic": 3}
 
 
-class Signal:
+class Signal(Tabulated):
     """An input over time by its values at given times, the same as the end values before and after.
 
     Parameters
@@ -81,16 +79,22 @@ class Signal:
         """The value at t of the piece that holds at time ``at``."""
         return self(at if self.order == 0 and self.corners else t)
 
-    def derivative(self) -> TableRate:
+    def derivative(self) -> Tabulated:
         """The rate between the jumps of the value."""
+        from .signal_rates import TableRate
+
         return TableRate(self.times, self._pieces, self.corners).derivative()
 
     def jumps(self, order: int) -> Array:
         """Times at which the derivative of an order jumps; 0: the value."""
+        from .signal_rates import jumps
+
         return jumps(self.times, self._pieces, self.values, order)
 
     @property
     def _pieces(self) -> Array:
+        from .signal_rates import pieces_of
+
         return pieces_of(self.times, self.values, self.coefficients if self.order == 3 else None, self.order)
 
     @cached_property
@@ -99,6 +103,8 @@ class Signal:
         result = np.zeros((len(self.times), 4))
         result[:, 0] = self.values
         if len(self.times) > 1:
+            from ..numeric.splines import slopes
+
             slope, h = slopes(self.times, self.values, "cubic"), np.diff(self.times)
             rise = np.diff(self.values) / h
             bend = (slope[:-1] + slope[1:] - 2.0 * rise) / h
@@ -167,26 +173,27 @@ class Forcing:
         self.constants: dict[str, float] = {}
         self.varying: dict[int, Callable[[float, Array], float]] = {}
         self.feedback = self.foreign = False
-        self.formulas: dict[int, Formula | DeclaredSignal] = {}
+        self.formulas: dict[int, Expressed] = {}
         values = self.values = {name: self._read(name, value) for name, value in given.items()}
-        self.derived = fill_rates(layout, values, derive)
-        for name, (_, _, value) in self.derived.items():
-            values[name] = value
+        self.derived = self._derive(layout, values) if layout.input_rates else {}
+        values |= {name: value for name, (_, _, value) in self.derived.items()}
         for name, tape in layout.metadata.get("signals", {}).items():
             if name not in values:
+                from .tapes import DeclaredSignal
+
                 values[name] = DeclaredSignal(tape, layout.metadata["signal_slopes"][name])
         for name, value in values.items():
             if name not in layout.u:
                 continue  # only its rates stand in the equations
             index = layout.u.index(name)
-            if isinstance(value, Formula | DeclaredSignal):
+            if isinstance(value, Expressed):
                 self.formulas[index] = value
                 self.feedback = self.feedback or value.depends_on_state
             elif isinstance(value, float):
                 self.constants[name] = value
             else:
                 self.varying[index] = value
-                if not isinstance(value, Signal | TableRate):
+                if not isinstance(value, Tabulated):
                     self.feedback = self.foreign = True
         #: whether constraints depend on inputs that vary
         self.constrained = not {*self.varying, *self.formulas}.isdisjoint(layout.constraint_inputs)
@@ -197,6 +204,13 @@ class Forcing:
         self.lapse: Lapse | None = None
         self.unsettled: frozenset[str] = frozenset()  #: numbers that are given later, for each run of an ensemble
 
+    @staticmethod
+    def _derive(layout: Layout, values: Mapping[str, Any]) -> dict[str, tuple[str, int, Any]]:
+        """Rates that the equations need and that follow from what is given."""
+        from .signal_rates import derive, fill_rates
+
+        return fill_rates(layout, values, derive)
+
     def _read(self, name: str, value: Any) -> Any:
         """What a user gives as a number, a Signal, a Formula or a function."""
         if isinstance(value, Signal):
@@ -206,7 +220,7 @@ class Forcing:
             require_time_and_state(f"input {name}: its function", value)
             return value
         if is_formula(value):
-            return Formula(self.layout, value, f"input {name}")
+            return read_formula(self.layout, value, f"input {name}")
         if isinstance(value, (tuple, list)) and len(value) == 2 and isinstance(value[0], (Sequence, np.ndarray)):
             try:
                 return Signal(*value)
@@ -231,8 +245,12 @@ class Forcing:
         """
         self.span = (start, end)
         self.enter(start, end)
-        require_smooth(self, start, end)
-        require_agreement(self, start, end)
+        if self.layout.input_rates:
+            from .rate_checks import require_agreement
+            from .signal_rates import require_smooth
+
+            require_smooth(self, start, end)
+            require_agreement(self, start, end)
 
     def enter(self, start: float, end: float) -> None:
         """Go on with the part of a run between two corners: at its ends tables have the piece inside it."""
@@ -260,12 +278,8 @@ class Forcing:
         """The inputs that vary, as the compiled loop takes them."""
         if not self:
             return []
-        tables: list[tuple[Any, ...]] = [
-            (i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Signal | TableRate)
-        ]
-        for i, formula in self.formulas.items():
-            tables.append((i, formula.tape if isinstance(formula, DeclaredSignal) else record_tape([formula])))
-        return tables
+        tables: list[tuple[Any, ...]] = [(i, *s.encode()) for i, s in self.varying.items() if isinstance(s, Tabulated)]
+        return [*tables, *((i, formula.tape) for i, formula in self.formulas.items())]
 
     def require_finite(self) -> None:
         """Raise UsageError if a value was not finite."""
@@ -282,8 +296,8 @@ class Forcing:
         inside = t if self.within is None else min(max(t, self.within[0]), self.within[1])
         for index, signal in self.varying.items():
             try:
-                beside = inside != t and isinstance(signal, Signal | TableRate)
-                value = signal.beside(t, inside) if beside else signal(t, x)  # type: ignore[attr-defined]
+                inner = inside != t and isinstance(signal, Tabulated)
+                value = signal.beside(t, inside) if inner else signal(t, x)  # type: ignore[attr-defined]
             except Exception as error:
                 error.add_note(f"raised by the function of input {self.names[index]}, called as f({t:.6g}, x)")
                 raise
@@ -309,14 +323,14 @@ class Forcing:
         if not self.base.size:
             return np.empty((0, len(t)))
         u = np.repeat(self.base[:, None], len(t), axis=1)
-        tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Signal | TableRate)}
+        tables = {i: signal for i, signal in self.varying.items() if isinstance(signal, Tabulated)}
         if len(self.varying) > len(tables):
             for j in range(len(t)):
                 u[:, j] = self(float(t[j]), x[:, j])
         edges = None if self.span is None else _inside(*self.span)
         for i, signal in tables.items():
             inner = t if edges is None else np.clip(t, *edges)
-            u[i] = signal.beside(t, inner) if isinstance(signal, TableRate) else signal(t)
+            u[i] = signal(t) if isinstance(signal, Signal) else signal.beside(t, inner)
         return u
 
     def corners(self, start: float, end: float, every_jump: bool = False) -> list[float]:
@@ -331,7 +345,7 @@ class Forcing:
         low, high = min(start, end), max(start, end)
 
         def found(jumps: bool) -> list[float]:
-            tables = (s for s in self.varying.values() if isinstance(s, Signal | TableRate))
+            tables = (s for s in self.varying.values() if isinstance(s, Tabulated))
             signals = (s for s in tables if (s.order == 0) == jumps)
             return sorted({float(t) for signal in signals for t in signal.kinks() if low < t < high})
 

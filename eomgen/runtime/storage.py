@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
-    from .protocols import Columns
+    from .protocols import TrajectoryLike
 
 FORMAT = "eomgen trajectory 1"
 
@@ -60,7 +60,7 @@ def table_path(path: str | Path, what: str) -> Path:
     return target
 
 
-def save(trajectory: Columns, path: str | Path) -> Path:
+def save(trajectory: TrajectoryLike, path: str | Path) -> Path:
     """Write a trajectory; see :meth:`.trajectory.Trajectory.save`."""
     target = table_path(path, "a trajectory is")
     names = trajectory.names
@@ -87,6 +87,6 @@ def save(trajectory: Columns, path: str | Path) -> Path:
     return target
 
 
-def _head(trajectory: Columns, name: str) -> str:
+def _head(trajectory: TrajectoryLike, name: str) -> str:
     unit = trajectory.units.get(name, "")
     return f"{name} [{unit}]" if unit else name

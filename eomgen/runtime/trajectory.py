@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
-from .names import find_lacking, require, unknown
+from .near_names import find_lacking, require, unknown
 from .room import read_numbers
-from .storage import FORMAT, Stored, save
 
 if TYPE_CHECKING:
     import pandas
@@ -183,6 +182,8 @@ class Trajectory:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
+        from .storage import Stored
+
         columns = Stored(self.names, self.to_numpy(), self.energies if self.has_energies else None)
         return type(self), (self.t, self.x, columns, self.metadata, self.t_events, self.x_events)
 
@@ -256,9 +257,10 @@ class Trajectory:
         UsageError
             The trajectory was read from a file, without the model.
         """
-        if not hasattr(self._columns, "change_points"):
+        columns: Any = self._columns
+        if not hasattr(type(columns), "change_points"):
             raise UsageError("change points need the model: ask the trajectory that simulate gave, before it is saved")
-        found: list[ChangePoint] = self._columns.change_points
+        found: list[ChangePoint] = columns.change_points
         return found
 
     @property
@@ -281,6 +283,8 @@ class Trajectory:
         Path
             The file written.
         """
+        from .storage import save
+
         return save(self, path)
 
     def poses(self, model: BoundModel | None = None) -> Array:
@@ -392,6 +396,8 @@ def load_trajectory(path: str | Path) -> Trajectory:
         The file holds something else.
     FileNotFoundError
     """
+    from .storage import FORMAT, Stored
+
     source = as_path("path", path)
     if not source.suffix and not source.exists():
         source = source.with_suffix(".npz")

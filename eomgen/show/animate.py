@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingDependencyError, UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import whole_file
 from .draw import new_artist
 from .flat import figure_size

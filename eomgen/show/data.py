@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..graph.core import Expr, Graph
 from ..graph.evaluate import compile_evaluator
-from ..graph.operations import COMMUTATIVE
+from ..operations import OPERATIONS
 
 Array = NDArray[np.float64]
 GROUND = -1
-TWO = COMMUTATIVE | {"sub", "div", "pow", "atan2", "lt", "le"}  #: operations of two operands
 
 
 class Frame(NamedTuple):
@@ -80,8 +79,7 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
         elif kind in ("p", "s"):
             nodes.append(graph.symbol(f"{kind}{a}"))
         else:
-            count = 3 if kind == "select" else 2 if kind in TWO else 1
-            nodes.append(graph.apply(kind, *(nodes[k] for k in (a, b, c)[:count])))
+            nodes.append(graph.apply(kind, *(nodes[k] for k in (a, b, c)[: OPERATIONS[kind].arity])))
     names = [*(f"p{k}" for k in range(len(p))), "s0", "s1"]
     every = compile_evaluator([nodes[k] for k in out], names) if out else None
     values = [] if every is None else [float(x) for x in every([*map(float, p), 0.0, 0.0])]

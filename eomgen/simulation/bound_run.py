@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import EvaluationError, SimulationError
+from ..errors import EvaluationError, SimulationError, UnavailableError
+from ..limits.runs import SCIPY_ATOL
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
-from .progress import Progress
-from .stalling import Crawling, describe_crawl, steepest
+from .stalled import Crawling
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.protocols import Timed
+    from .progress import Progress
+    from .stalling import Pace
 
 
 class Run:
@@ -59,6 +61,14 @@ class Run:
 
         return told
 
+    def pace(self, start: float, end: float, x: Array, longest: float, kept: int) -> Pace | None:
+        """What ends the run where its steps lead nowhere; a slim package has none."""
+        try:
+            from .stalling import Pace
+        except UnavailableError:
+            return None
+        return Pace(start, end, x, self.module.n_q, longest, self.troubled, kept)
+
     def remember(self, name: str, kernel: Timed) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""
         if kernel.failure is not None and (self.last is None or np.isfinite(kernel.failure[2]).all()):
@@ -89,8 +99,10 @@ class Run:
         """The error for a run whose steps led nowhere."""
         if self.troubled(crawl.t, crawl.x):
             return self.ended(crawl.t, end, method, "", crawl.x)
+        from .stalling import describe_crawl, steepest
+
         with np.errstate(all="ignore"):
-            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", 1e-6))
+            steep = steepest(self.watched(None), crawl, self.module.x_names, options.get("atol", SCIPY_ATOL))
         return SimulationError(describe_crawl(crawl, self.module.x_names, end, method, steep))
 
     def ended(self, t: float, end: float, method: str, words: str, x: Array | None = None) -> SimulationError:
@@ -108,3 +120,14 @@ class Run:
             )
         when = f"t = {cause.time:.6g} s" if cause.time is not None else f"t = {t:.6g} s"
         return SimulationError(f"{method} stopped near {when} of {end:.6g} s. Last failure: {cause}")
+
+
+def watch_run(start: float, end: float, progress: bool | None) -> Progress | None:
+    """What shows the progress of a run: if that is asked for, or by default on a terminal."""
+    try:
+        from .progress import Progress, wanted
+    except UnavailableError:
+        if progress:
+            raise
+        return None
+    return Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_path
+from ..files.path_names import as_path
 from ..files.writing import remove_parts, whole_file
 from ..numeric.scales import Array
 from ..runtime.arrays import BROKEN, read_arrays
 from ..runtime.identity import code_digest, differences, digest
+from ..runtime.input_kinds import Expressed
 from ..runtime.room import read_number
-from ..runtime.tapes import DeclaredSignal, Formula
+from ..runtime.tapes import DeclaredSignal
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -129,8 +130,8 @@ def identify(
     """All that the steps of a run depend on; parameters, inputs and options by name."""
     inputs: dict[str, Any] = dict(zip(module.u_names, module.u.tolist(), strict=True))
     for name, value in forcing.values.items():
-        if isinstance(value, (Formula, DeclaredSignal)):
-            inputs[name] = value.text if isinstance(value, Formula) else "declared"
+        if isinstance(value, Expressed):
+            inputs[name] = "declared" if isinstance(value, DeclaredSignal) else value.text
         else:
             inputs[name] = value if isinstance(value, float) else digest(value)
     return {

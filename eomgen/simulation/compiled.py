@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.signals import Forcing
 from .events import Events, warn_of_unknown
 from .integrate import KEPT, Solution
@@ -86,7 +87,7 @@ def stepper_options(n: int, span: float, options: Mapping[str, Any], checked: bo
         An unknown option or a value that cannot be.
     """
     check_names("option of simulate", options, OPTIONS)
-    given = options if checked else check_tolerances(n, span, {"rtol": 1e-3, "atol": 1e-6, **options})
+    given = options if checked else check_tolerances(n, span, {"rtol": SCIPY_RTOL, "atol": SCIPY_ATOL, **options})
     if not isinstance(given["rtol"], float):
         raise UsageError(f"rtol must be one number for a compiled method, not of shape {given['rtol'].shape}")
     limits = {"max_step": given.get("max_step", np.inf), "first_step": given.get("first_step", 0.0)}

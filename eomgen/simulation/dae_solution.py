@@ -17,7 +17,7 @@ from ..errors import SimulationError, UsageError
 from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
-from ..runtime.names import require
+from ..runtime.near_names import require
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .event_values import EventValues
@@ -115,7 +115,7 @@ def integrate_dae(
     times = None if t_eval is None else ordered_times(t_eval, start, end, DaeForm(module).n_y)
     if options.get("max_step"):
         require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
-    run = _Run(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
+    run = _DaeRun(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
     warn_of_unknown([event.name for event in run.listed if not event.known], 2)
     solution = run.solution()
@@ -123,7 +123,7 @@ def integrate_dae(
     return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)
 
 
-class _Run:
+class _DaeRun:
     """A run on its way, from one start of IDA to the next."""
 
     def __init__(

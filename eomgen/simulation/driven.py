@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.following import Follower
-from ..analysis.gaps import describe_gap
-from ..analysis.kinematic import complete, start_from, walk_in
-from ..analysis.motions import KinematicAnalysis, keep
+from ..analysis.driven_coordinates import DrivenCoordinates
+from ..analysis.followed_path import FollowedPath
+from ..analysis.kinematic import complete, follow_to_start, start_from
+from ..analysis.kinematic_motion import KinematicAnalysis, keep
+from ..analysis.open_joint import describe_gap
+from ..analysis.path_following import StraightPath
 from ..analysis.roots import find_root
-from ..analysis.tracks import Track
-from ..analysis.walking import Path
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
-from .events import Event
+from .events import UNWATCHED, Events, RunEvent
+from .run_arguments import find_span, ordered_times
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -33,13 +34,63 @@ def is_driven(module: BoundModel) -> bool:
     return layout.n_dof == 0 and layout.n_q > 0 and layout.n_h == layout.n_c
 
 
+def follow_drivers(
+    module: BoundModel,
+    span: float | tuple[float, float] | None,
+    initial: Mapping[str, float] | ArrayLike | None,
+    parameters: Any,
+    inputs: Mapping[str, Any] | None,
+    t_eval: ArrayLike | None,
+    events: Any,
+    method: Any,
+    checkpoint: Any,
+    options: Mapping[str, Any],
+) -> KinematicAnalysis | None:
+    """The motion of a mechanism that its drivers move entirely: solved, not integrated; None for any other.
+
+    Raises
+    ------
+    UsageError
+        Method kinematic for another mechanism, or what only a run that integrates can do.
+    """
+    if not is_driven(module) or _led_by_inputs(module, inputs, method):
+        if method is not None:
+            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+        return None
+    if checkpoint is not None:
+        raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
+    forcing = Forcing(module.layout, inputs)
+    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
+    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
+    forcing.attach(bound)
+    watched = Events(module.layout, events)
+    if watched.resets:
+        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
+    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
+    stored = None if t_eval is None else ordered_times(t_eval, start, end)
+    given = {key: value for key, value in options.items() if value is not None}
+    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
+
+
+def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
+    """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
+    led = Forcing(module.layout, inputs).constrained
+    if led and method == "kinematic":
+        names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
+        raise UsageError(
+            f"method 'kinematic' follows drivers that are expressions of t, and inputs ({names}) move {module.name}; "
+            "leave method= out, and it is integrated"
+        )
+    return led
+
+
 def simulate_driven(
     module: BoundModel,
     span: tuple[float, float],
     initial: Mapping[str, float] | ArrayLike | None,
     forcing: Forcing,
     t_eval: Array | None,
-    events: Sequence[Event],
+    events: Sequence[RunEvent],
     given: Mapping[str, Any],
 ) -> KinematicAnalysis:
     """The motion over a span; see :func:`~.simulate.simulate`.
@@ -51,7 +102,7 @@ def simulate_driven(
     span : (float, float)
     t_eval : (n_t,) array, optional
         Within the span, in order.
-    events : sequence of Event
+    events : sequence of RunEvent
     given : mapping
         Options meant for an integrator; tolerances and steps have no meaning here.
 
@@ -74,28 +125,28 @@ def simulate_driven(
         t0, q = start, module.x0(initial, t=start)[: module.n_q]
     else:
         t0, q = start_from(module, initial, start)
-    follower = Follower(module, complete(module, q, t0, ()))
-    q = walk_in(follower, q, (t0, nothing), (start, nothing))
+    driven = DrivenCoordinates(module, complete(module, q, t0, ()))
+    q = follow_to_start(driven, q, (t0, nothing), (start, nothing))
     sense = 1.0 if end >= start else -1.0
-    track = Track(follower, Path(start, nothing, sense, nothing), q, abs(end - start))
-    if track.stop is not None:
-        beyond = 0.9 * track.reached + 0.1 * track.end
-        gap = describe_gap(follower, *track.path.at(beyond), track.stop.q)
+    followed = FollowedPath(driven, StraightPath(start, nothing, sense, nothing), q, abs(end - start))
+    if followed.stop is not None:
+        beyond = 0.9 * followed.reached + 0.1 * followed.end
+        gap = describe_gap(driven, *followed.path.at(beyond), followed.stop.q)
         raise SimulationError(
-            f"the drivers cannot go on from t = {track.stop.t:.6g} s of {end:.6g} s: {track.stop}; {gap}; "
+            f"the drivers cannot go on from t = {followed.stop.t:.6g} s of {end:.6g} s: {followed.stop}; {gap}; "
             "change the drivers' values, or the dimensions"
         )
-    own = track.nodes[track.nodes <= track.end]
+    own = followed.nodes[followed.nodes <= followed.end]
     if t_eval is None:
         s = np.unique(
-            np.concatenate([own, np.linspace(0.0, track.end, FEWEST)]) if len(own) < FEWEST else [*own, track.end]
+            np.concatenate([own, np.linspace(0.0, followed.end, FEWEST)]) if len(own) < FEWEST else [*own, followed.end]
         )
         t = start + sense * s
     else:
         t = t_eval
         s = sense * (t - start)
-    run = _Run(track, forcing, start, sense)
-    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [track.end]])))
+    run = _DrivenRun(followed, forcing, start, sense)
+    t_events, x_events, last = run.find(events, np.unique(np.concatenate([own, s, [followed.end]])))
     message, status = ("A termination event occurred.", 1) if last is not None else ("The end was reached.", 0)
     if last is not None:
         kept = s < last
@@ -111,24 +162,24 @@ def simulate_driven(
     )
 
 
-class _Run:
-    """Samples of one track as states."""
+class _DrivenRun:
+    """Samples of one followed path as states."""
 
-    def __init__(self, track: Track, forcing: Forcing, start: float, sense: float) -> None:
-        self.track, self.forcing, self.start, self.sense = track, forcing, start, sense
+    def __init__(self, followed: FollowedPath, forcing: Forcing, start: float, sense: float) -> None:
+        self.followed, self.forcing, self.start, self.sense = followed, forcing, start, sense
 
     def state(self, s: float) -> Array:
-        q, v, _ = self.track.motion(np.array([s]), None)
+        q, v, _ = self.followed.motion(np.array([s]), None)
         return np.concatenate([q[:, 0], v[:, 0]])
 
-    def _value(self, event: Event, s: float) -> float:
+    def _value(self, event: RunEvent, s: float) -> float:
         return event(self.start + self.sense * s, self.state(s))
 
-    def find(self, events: Sequence[Event], grid: Array) -> tuple[list[Array], list[Array], float | None]:
+    def find(self, events: Sequence[RunEvent], grid: Array) -> tuple[list[Array], list[Array], float | None]:
         """Times and states of events, and where a terminal one ends the run."""
         found: list[list[float]] = [[] for _ in events]
         if events:
-            q, v, _ = self.track.motion(grid, None)
+            q, v, _ = self.followed.motion(grid, None)
             states = np.concatenate([q, v])
         last: float | None = None
         for event, places in zip(events, found, strict=True):
@@ -146,23 +197,23 @@ class _Run:
         kept = [np.array([s for s in places if last is None or s <= last]) for places in found]
         times = [self.start + self.sense * s for s in kept]
         states_at = [np.array([self.state(float(s)) for s in places]).reshape(len(places), -1).T for places in kept]
-        width = self.track.follower.layout.n_x
+        width = self.followed.driven.layout.n_x
         return times, [x if x.size else np.empty((width, 0)) for x in states_at], last
 
     def keep(
         self, t: Array, s: Array, t_events: list[Array], x_events: list[Array], header: dict[str, Any]
     ) -> KinematicAnalysis:
         """The trajectory at parameters s."""
-        motion = self.track.motion(s, None)
+        motion = self.followed.motion(s, None)
         sample: Callable[[Array], KinematicAnalysis] = lambda times: self.keep(  # noqa: E731
             times, self.sense * (times - self.start), [], [], header
         )
         u = self.forcing.sample(t, np.concatenate(motion[:2]))
         return keep(
-            self.track.follower,
+            self.followed.driven,
             t,
             [motion],
-            self.track.singular,
+            self.followed.singular,
             None,
             len(t),
             (),

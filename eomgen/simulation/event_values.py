@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..numeric.scales import Array
-from .events import Event, Together
+from .events import RunEvent, Together
 
 AT_ONCE = 1_000_000  #: values of events at several times that are asked for in one call
 
@@ -17,10 +17,10 @@ class EventValues:
 
     Parameters
     ----------
-    events : sequence of Event
+    events : sequence of RunEvent
     """
 
-    def __init__(self, events: Sequence[Event]) -> None:
+    def __init__(self, events: Sequence[RunEvent]) -> None:
         self.events = events
         self.together: dict[int, tuple[Together, list[int]]] = {}  #: what gives several values, and of which events
         self.alone: list[int] = []

@@ -17,16 +17,17 @@ import numpy as np
 
 from ..errors import UsageError, ZenoError
 from ..limits.rounding import TINY
-from ..limits.runs import CROWD, INSTANT
+from ..limits.runs import CROWD, EARLIEST, INSTANT
 from ..numeric.counts import as_count
 from ..numeric.scales import Array
+from ..runtime.input_texts import is_formula, read_formula
 from ..runtime.layout import Layout
-from ..runtime.names import check_names, require_time_and_state
-from ..runtime.tapes import Formula, is_formula, record_tape, values_together
+from ..runtime.near_names import check_names, require_time_and_state
 from ..texts import shown
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+    from ..runtime.formulas import Formula
     from ..runtime.signals import Forcing
 
 GO_ON, RESET, WAIT = 0, 1, 2  #: as in eomgen_loop.h
@@ -34,7 +35,7 @@ STOP = 3  #: an integrator stops there and goes on, from another state or the sa
 UNWATCHED = 2  #: a direction
 
 
-class Event:
+class RunEvent:
     """An event with the number of times it may still happen.
 
     Parameters
@@ -79,7 +80,7 @@ class Event:
         if not isfinite(value):
             return nan
         self.known = True
-        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), 1e-3):
+        if self.left is not None and abs(t - self.left[0]) <= INSTANT * max(abs(t), EARLIEST):
             return self.left[1] * max(abs(value), TINY)
         return value
 
@@ -105,9 +106,9 @@ class Events:
         self.layout = layout
         self.declared: list[dict[str, Any]] = layout.metadata.get("events") or []
         self.names: list[str] = []
-        self.model: list[Event] = []
-        self.formulas: list[tuple[Event, Formula]] = []
-        self.functions: list[Event] = []
+        self.model: list[RunEvent] = []
+        self.formulas: list[tuple[RunEvent, Formula]] = []
+        self.functions: list[RunEvent] = []
         if given is None and not self.declared:
             return
         known = [str(event["name"]) for event in self.declared]
@@ -118,7 +119,7 @@ class Events:
             elif is_formula(one) or isinstance(one, Mapping):
                 self.formulas.append(_of_text(layout, one, name, self.formulas[0][1] if self.formulas else None))
             else:
-                self.functions.append(Event(one, name or ""))
+                self.functions.append(RunEvent(one, name or ""))
         self.model = [_of_model(event, event["name"] in chosen) for event in self.declared]
         taken: dict[str, int] = {}
         for name in (*known, *(event.name for event, _ in self.formulas), *(event.name for event in self.functions)):
@@ -126,6 +127,10 @@ class Events:
             self.names.append(name if taken[name] == 1 else f"{name}_{taken[name]}")
         if all(event.direction == UNWATCHED for event in self.model):
             self.names, self.model = self.names[len(known) :], []
+        if any(event.action == WAIT for event in self.model):  # here, so that a slim package refuses before the run
+            from ..analysis.impact import strike_events
+
+            self._strike = strike_events
 
     def __len__(self) -> int:
         return len(self.names)
@@ -140,9 +145,10 @@ class Events:
         if not self.names:
             return None
         every = [*self.model, *(event for event, _ in self.formulas), *self.functions]
+        texts = [formula for _, formula in self.formulas]
         return {
             "model": len(self.model),
-            "tape": record_tape([formula for _, formula in self.formulas]) if self.formulas else None,
+            "tape": texts[0].tape_with(texts[1:]) if texts else None,
             "outside": [event.function for event in self.functions],
             "direction": [event.direction for event in every],
             "most": [int(event.terminal) for event in every],
@@ -151,19 +157,22 @@ class Events:
             "resets": self.layout.metadata.get("resets", []) if self.model else [],
         }
 
-    def listed(self, module: BoundModel, forcing: Forcing) -> list[Event]:
+    def listed(self, module: BoundModel, forcing: Forcing) -> list[RunEvent]:
         """The same as functions f(t, x), for SciPy's methods."""
         kernel = module.kernels.timed("events", nan=True) if self.model else None
-        found: list[Event] = []
+        found: list[RunEvent] = []
         every = _of_kernel(kernel, forcing)
         for i, event in enumerate(self.model):
             function = _unwatched if event.direction == UNWATCHED else _value_of(kernel, forcing, i)
-            found.append(Event(function, self.names[i], event.terminal, event.direction, event.action))
+            found.append(RunEvent(function, self.names[i], event.terminal, event.direction, event.action))
             found[-1].source = None if event.direction == UNWATCHED else (every, i)
         p = module.p
-        texts = Together(values_together([f for _, f in self.formulas], p)) if len(self.formulas) > 1 else None
+        texts = None
+        if len(self.formulas) > 1:
+            first, *others = (formula for _, formula in self.formulas)
+            texts = Together(first.function_with(others, p))
         for i, (event, formula) in enumerate(self.formulas):
-            found.append(Event(formula.function(p), event.name, event.terminal, event.direction))
+            found.append(RunEvent(formula.function(p), event.name, event.terminal, event.direction))
             found[-1].source = None if texts is None else (texts, i)
         return [*found, *self.functions]
 
@@ -179,9 +188,7 @@ class Events:
                 after = np.asarray(module.project(after, t=t, u=forcing(t, after)))
         gaps = [i for i in fired if self.model[i].action == WAIT]
         if gaps:
-            from ..analysis.impact import strike_events
-
-            after = strike_events(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
+            after = self._strike(module, t, after, self.declared, gaps, forcing(t, after), forcing.state_dependent)
         return after
 
     def crowded(self, t: float, count: int) -> ZenoError:
@@ -213,7 +220,7 @@ def _listed(given: Any) -> list[tuple[str | None, Any]]:
     return [(None, given)]
 
 
-def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | None) -> tuple[Event, Formula]:
+def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | None) -> tuple[RunEvent, Formula]:
     """An event by its text, or by a mapping with the keys of a model file."""
     options: dict[str, Any] = {"expression": given} if isinstance(given, str) else dict(given)
     check_names("key of an event", options, ("expression", "terminal", "direction"))
@@ -223,14 +230,14 @@ def _of_text(layout: Layout, given: Any, name: str | None, beside: Formula | Non
     direction = options.get("direction") or 0
     if direction not in (-1, 0, 1):
         raise UsageError(f"event {name or text!r}: direction must be 1, -1 or 0, not {direction!r}")
-    event = Event(_only_in_c, name or text, options.get("terminal"), direction)
-    return event, Formula(layout, text, f"event {name or text!r}", beside)
+    event = RunEvent(_only_in_c, name or text, options.get("terminal"), direction)
+    return event, read_formula(layout, text, f"event {name or text!r}", beside)
 
 
-def _of_model(event: Mapping[str, Any], chosen: bool) -> Event:
+def _of_model(event: Mapping[str, Any], chosen: bool) -> RunEvent:
     action = RESET if event.get("resets") else WAIT if event.get("restitution") is not None else GO_ON
     direction = int(event.get("direction") or 0) if chosen or action != GO_ON else UNWATCHED
-    return Event(_only_in_c, str(event["name"]), int(event.get("terminal") or 0), direction, action)
+    return RunEvent(_only_in_c, str(event["name"]), int(event.get("terminal") or 0), direction, action)
 
 
 def _only_in_c(t: float, x: Array) -> float:

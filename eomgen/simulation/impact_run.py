@@ -86,7 +86,7 @@ def simulate_impacts(
     bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
     forcing.attach(bound)
     forcing.begin(start, end)
-    run = _Run(bound, found, forcing, inputs, end, most, options)
+    run = _ImpactRun(bound, found, forcing, inputs, end, most, options)
     return run.finish(run.travel(start, find_state(bound, initial, start, forcing)))
 
 
@@ -102,7 +102,7 @@ def _ending(module: BoundModel) -> list[str]:
     return [str(event["name"]) for event in declared if event.get("terminal")]
 
 
-class _Run:
+class _ImpactRun:
     """A run on its way."""
 
     def __init__(

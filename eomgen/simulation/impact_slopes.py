@@ -119,7 +119,7 @@ def after_reset(
     moved[places] = move.along(slopes, what, names)
     dq, dv = moved[:n_q], moved[n_q:]
     if layout.space is not None:
-        for i, _ in layout.balls:
+        for i, _ in layout.quaternion_slots:
             dq[i : i + 4] /= np.linalg.norm(star[i : i + 4])
         star[:n_q] = layout.space.normalised(star[:n_q])
         dq = dq - layout.space.stretch(star[:n_q], dq)

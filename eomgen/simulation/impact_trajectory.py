@@ -67,11 +67,11 @@ class ImpactRun(Trajectory):
         found = []
         for a, b in pairwise(ends):
             header = self.metadata | {"span": [float(self.t[a]), float(self.t[b - 1])], "event_names": []}
-            found.append(Trajectory(self.t[a:b], self.x[:, a:b], Part(self._columns, a, b), header))
+            found.append(Trajectory(self.t[a:b], self.x[:, a:b], TrajectoryPart(self._columns, a, b), header))
         return found
 
 
-class Part:
+class TrajectoryPart:
     """Columns from one point of a run to another."""
 
     def __init__(self, whole: Source, first: int, last: int) -> None:

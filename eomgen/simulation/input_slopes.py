@@ -9,12 +9,13 @@ import numpy as np
 
 from ..errors import UsageError
 from ..numeric.scales import Array
+from ..runtime.input_kinds import Tabulated
 from ..runtime.layout import Layout
-from ..runtime.signal_rates import TableRate, rate_places
-from ..runtime.signals import Forcing, Signal
+from ..runtime.signal_rates import rate_places
+from ..runtime.signals import Forcing
 
 
-class Slopes(NamedTuple):
+class SlopesNow(NamedTuple):
     """Derivatives of all inputs at a time and state."""
 
     by_t: Array  #: (n_u,)
@@ -41,23 +42,23 @@ class InputSlopes:
         self.formulas = {i: formula.slopes(p) for i, formula in forcing.formulas.items()}
         self.forcing = forcing
         self.rates = rate_places(layout)
-        self.tables: dict[int, TableRate] = {}
+        self.tables: dict[int, Tabulated] = {}
         self.functions: set[int] = set()
         for i, signal in forcing.varying.items():
             if i in self.formulas:
                 continue
-            if isinstance(signal, Signal | TableRate):
+            if isinstance(signal, Tabulated):
                 self.tables[i] = signal.derivative()
             else:
                 self.functions.add(i)
-                forcing.varying[i] = OfTime(layout.u[i], signal)
+                forcing.varying[i] = AtOneState(layout.u[i], signal)
 
     @property
     def by_state_or_parameters(self) -> bool:
         """Whether an input may depend on more than time."""
         return bool(self.formulas)
 
-    def __call__(self, t: float, x: Array) -> Slopes:
+    def __call__(self, t: float, x: Array) -> SlopesNow:
         """The derivatives; NaN by time for a Python function, unless its rate is an input too."""
         n_u, n_x, n_p = self.layout.n_u, self.layout.n_x, self.layout.n_p
         every = np.zeros((n_u, 1 + n_x + n_p))
@@ -69,10 +70,10 @@ class InputSlopes:
         for i in self.functions:
             rate = self.rates.get(i)
             every[i, 0] = np.nan if rate is None else self.forcing(t, x)[rate]
-        return Slopes(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
+        return SlopesNow(every[:, 0], every[:, 1 : 1 + n_x], every[:, 1 + n_x :])
 
 
-class OfTime:
+class AtOneState:
     """A user's function f(t, x) as one of time alone.
 
     Parameters

@@ -14,13 +14,14 @@ import numpy as np
 
 from ..errors import SimulationError, UsageError
 from ..numeric.scales import Array
-from ..runtime.names import require, unknown
-from .crossings import Crossings, Step
-from .events import Event
+from ..runtime.near_names import require, unknown
+from .event_crossings import Crossings, Step
+from .events import RunEvent
 from .stalling import Pace
 
 if TYPE_CHECKING:
     from .solver_state import Pause
+    from .stalling import Pace
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -127,10 +128,10 @@ def integrate(
     x0: Array,
     solver: Any,
     t_eval: Array | None,
-    events: Sequence[Event],
+    events: Sequence[RunEvent],
     dense: bool,
     options: dict[str, Any],
-    pace: Pace,
+    pace: Pace | None,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
     pause: Pause | None = None,
@@ -166,8 +167,8 @@ class _Journey:
     """One run on its way."""
 
     def __init__(
-        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None, events: Sequence[Event],
-        dense: bool, options: dict[str, Any], pace: Pace,
+        self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
+        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace | None,
     ) -> None:  # fmt: skip
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
         self.options, self.pace = options, pace
@@ -225,7 +226,8 @@ class _Journey:
                         return
                     stop = self._settle(solver)
                     if stop is None and solver.status == "running":
-                        self.pace.look(self.t, self.x)
+                        if self.pace is not None:
+                            self.pace.look(self.t, self.x)
                         if pause is not None and perf_counter() >= pause.due:
                             pause.save(self, k, solver)
             finally:

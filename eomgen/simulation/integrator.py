@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import EvaluationError, SimulationError, UsageError
 from ..numeric.scales import Array
 from ..runtime.late import eager
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import read_number, read_vector, require_steps
 from ..runtime.signals import Forcing
 from .bound_run import Run
@@ -21,7 +21,8 @@ from .events import Events
 from .integrate import choose_solver
 from .run_arguments import check_method, declare, own_step
 from .simulate import simulate
-from .stalling import Crawling, Pace
+from .stalled import Crawling
+from .stalling import Pace
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from ..limits.constraints import PASSED
 from ..limits.impacts import OPENS
 from ..numeric import algebra
 from ..runtime.change_points import scaled_jacobians
-from .sensitivity_start import Columns
+from .sensitivity_start import Differentiated
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory
 
 
-def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, columns: Columns) -> None:
+def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, columns: Differentiated) -> None:
     """Refuse parameters and inputs whose change opens a crossing that the run passes.
 
     Raises
@@ -54,5 +54,5 @@ def refuse_lost_branches(module: BoundModel, forcing: Forcing, run: Trajectory, 
                 )
 
 
-def _named(columns: Columns, pairs: tuple[tuple[int, int], ...]) -> list[tuple[str, int]]:
+def _named(columns: Differentiated, pairs: tuple[tuple[int, int], ...]) -> list[tuple[str, int]]:
     return [(columns.names[column], index) for column, index in pairs]

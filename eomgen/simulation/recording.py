@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import UnavailableError
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, project, units_of_layout
-from ..runtime.origin import inputs_of, plain
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
 from .integrate import Solution
@@ -39,8 +39,7 @@ def record(
         "method": method,
         "rtol": _plain(options.get("rtol")),
         "atol": _plain(options.get("atol")),
-        "options": {name: plain(value) for name, value in options.items() if name != "jac"},
-        "inputs": inputs_of(module, forcing),
+        **_given(module, forcing, options),
         "span": list(solution.ends),
         "status": solution.status,
         "message": solution.message,
@@ -67,6 +66,16 @@ def record(
             return Trajectory(t, states, Columns(module, t, states, forcing.sample(t, states)), head)
 
     return Trajectory(solution.t, x, columns, header, solution.t_events, events, sample)
+
+
+def _given(module: BoundModel, forcing: Forcing, options: dict[str, Any]) -> dict[str, Any]:
+    """Options and inputs as they were given; a slim package does not keep them."""
+    try:
+        from ..runtime.origin import inputs_of, plain
+    except UnavailableError:
+        return {}
+    given = {name: plain(value) for name, value in options.items() if name != "jac"}
+    return {"options": given, "inputs": inputs_of(module, forcing)}
 
 
 def _plain(value: Any) -> Any:

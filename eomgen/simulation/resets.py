@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import ZenoError
 from ..limits.runs import AHEAD, CROWDED, TOUCHING
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, WAIT, Event, Events, crowd_of
+from .events import GO_ON, RESET, WAIT, Events, RunEvent, crowd_of
 
 
 class Resets:
@@ -17,14 +17,16 @@ class Resets:
 
     Parameters
     ----------
-    events : sequence of Event
+    events : sequence of RunEvent
     rhs : callable
         (t, x) -> x'.
     start, end : float
         Of the run (s).
     """
 
-    def __init__(self, events: Sequence[Event], rhs: Callable[[float, Array], Array], start: float, end: float) -> None:
+    def __init__(
+        self, events: Sequence[RunEvent], rhs: Callable[[float, Array], Array], start: float, end: float
+    ) -> None:
         self.events, self.rhs, self.span = events, rhs, end - start
         self.count, self.crowded, self.last = 0, 0, np.inf
         self.most = crowd_of([event.action for event in events])
@@ -55,13 +57,13 @@ class Resets:
         """The error for resets that never end."""
         return Events.crowded_near(self.last, self.count, [e.name for e in self.events if e.action != GO_ON])
 
-    def rate(self, event: Event, t: float, x: Array) -> float:
+    def rate(self, event: RunEvent, t: float, x: Array) -> float:
         """How fast an event's value changes along the motion, in the direction of the run."""
         h = AHEAD * self.span
         event.left = None
         return float((event(t + h, x + h * np.asarray(self.rhs(t, x))) - event(t, x)) / abs(h))
 
-    def side(self, event: Event, t: float, x: Array) -> float:
+    def side(self, event: RunEvent, t: float, x: Array) -> float:
         """The side of zero, 1 or -1, to which the value of an event goes that is zero now; 0 where it stays.
 
         Its rate tells; where it has none, as that of a body at rest, the value after a midpoint step of the run.

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import AssemblyError, UsageError
-from ..limits.constraints import ALIKE
+from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
-from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.room import as_real, read_number, read_numbers, read_times
 from ..runtime.signals import Forcing
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
-#: Assemblies in turn, by secant steps, with inputs that depend on the state.
-ROUNDS = 50
 
 
 def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
@@ -89,40 +85,9 @@ def find_state(
         The loops do not close, or the inputs on which they depend change with the state that they give.
     """
     if forcing is not None and forcing.constrained:
-        layout = module.layout
-        places = layout.constraint_inputs
+        from .led_state import find_led_state
 
-        def assemble(u: Array) -> tuple[Array, Array]:
-            """The state at inputs u, and the inputs at this state."""
-            x = find_state(module.bind(None, u), initial, t)
-            found = forcing(t, x)
-            forcing.require_finite()
-            return x, found
-
-        u = forcing(t, np.concatenate([layout.q_reference, np.zeros(layout.n_v)]))
-        forcing.require_finite()
-        secant, before = -np.eye(len(places)), None  # with this first guess of the slope a step takes what was found
-        for _ in range(ROUNDS):
-            x, found = assemble(u)
-            gap = (found - u)[places]
-            if np.all(np.abs(gap) <= ALIKE * (1.0 + np.abs(u[places]))):
-                return x
-            if before is not None:  # Broyden's update: the slope that explains the last step
-                move, change = before
-                secant += np.outer(gap - change - secant @ move, move) / (move @ move)
-            move = algebra.lstsq(secant, -gap, rcond=None)
-            if not np.isfinite(move).all() or not move.any():
-                break
-            before, u = (move, gap), found.copy()
-            u[places] = found[places] - gap + move
-        names = ", ".join(layout.u[i] for i in places)
-        given, gives = (", ".join(f"{value:.6g}" for value in values[places]) for values in (u, forcing(t, x)))
-        raise AssemblyError(
-            f"the inputs {names} change with the state that the constraints give at t = {t:.6g} s, and no "
-            f"state was found that fits both: the last one was assembled with {given} and gives them as {gives}; "
-            "give initial values nearer to such a state, or write the inputs in t",
-            [],
-        )
+        return find_led_state(module.layout, forcing, t, lambda u: find_state(module.bind(None, u), initial, t))
     if initial is None:
         return module.x0(t=t)
     if isinstance(initial, Mapping):

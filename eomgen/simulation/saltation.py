@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import NoDerivativeError, UsageError
 from ..limits.impacts import ASIDE, SIMULTANEOUS, SMOOTH, TOUCHING
 from ..numeric.scales import Array
-from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Event, Events, Together
+from .events import GO_ON, RESET, STOP, UNWATCHED, WAIT, Events, RunEvent, Together
 from .impact_slopes import after_impact, after_reset
 from .sensitivity_result import EventSlopes
 from .sensitivity_start import keep_consistent
@@ -64,10 +64,10 @@ class Saltation:
         self.formulas = [formula.slopes(self.module.p) for _, formula in events.formulas]
         self.found: list[EventSlopes] = []
 
-    def _of_both(self, event: Event, name: str) -> Event:
+    def _of_both(self, event: RunEvent, name: str) -> RunEvent:
         """The same event of z = [x; S], at which the integrator stops whatever it does: rates may jump there."""
         action = STOP if event.action == GO_ON else event.action
-        return Event(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
+        return RunEvent(lambda t, z: event.function(t, z[: self.n]), name, event.terminal, event.direction, action)
 
     def _shared(self, source: Together) -> Together:
         """What gives several values, of z too."""

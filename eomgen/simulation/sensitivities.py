@@ -14,15 +14,16 @@ from numpy.typing import ArrayLike
 
 from ..errors import NoDerivativeError, SimulationError
 from ..limits.motions import SINGULAR
+from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
-from ..runtime.names import check_names, read_names, unknown
+from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
 from .events import Events, told_by_the_caller, warn_of_unknown
-from .input_slopes import Slopes
+from .input_slopes import SlopesNow
 from .integrate import Solution, choose_solver, integrate, require_end
 from .lost_branch import refuse_lost_branches
 from .recording import record
@@ -31,7 +32,8 @@ from .saltation import Saltation
 from .sensitivity_result import Sensitivities
 from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
 from .simulate import simulate
-from .stalling import Crawling, Pace, describe_crawl
+from .stalled import Crawling
+from .stalling import Pace, describe_crawl
 from .tolerances import check_tolerances
 from .variational import Variational
 
@@ -53,8 +55,8 @@ def sensitivities(
     *,
     hold: Sequence[str] | None = None,
     method: Any = "DOP853",
-    rtol: float = 1e-9,
-    atol: float = 1e-11,
+    rtol: float = SENSITIVITY_RTOL,
+    atol: float = SENSITIVITY_ATOL,
     t_eval: ArrayLike | None = None,
     events: Any = None,
     **options: Any,
@@ -202,7 +204,7 @@ def _require_same(found: Trajectory, alone: Trajectory) -> None:
             )
 
 
-def _inputs(run: Variational, t: float, x: Array) -> Slopes | None:
+def _inputs(run: Variational, t: float, x: Array) -> SlopesNow | None:
     return run.inputs(t, x) if run.forcing else None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
-from ..runtime.names import unknown
+from ..runtime.near_names import unknown
 from ..runtime.storage import table_path
 from ..runtime.trajectory import Named
 

@@ -22,10 +22,10 @@ from ..runtime.initial import Initial
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.layout import Layout
-    from .input_slopes import Slopes
+    from .input_slopes import SlopesNow
 
 
-class Columns(NamedTuple):
+class Differentiated(NamedTuple):
     """What a trajectory is differentiated by: k names, each a parameter, an input or an initial value."""
 
     names: tuple[str, ...]
@@ -43,7 +43,7 @@ class Columns(NamedTuple):
         return result
 
 
-def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Columns:
+def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> Differentiated:
     """Sort names into parameters, inputs and held initial values.
 
     Raises
@@ -51,7 +51,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
     UsageError
         A name is none of them.
     """
-    from ..runtime.names import read_names, unknown
+    from ..runtime.near_names import read_names, unknown
 
     names = read_names("names", names)
     parameters, inputs, initial = [], [], []
@@ -73,7 +73,7 @@ def split_columns(layout: Layout, names: Sequence[str], held: Sequence[str]) -> 
         raise UsageError("name at least one parameter, input or initial value")
     if len(set(names)) != len(names):
         raise UsageError(f"each name counts once: {', '.join(names)}")
-    return Columns(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
+    return Differentiated(tuple(names), tuple(parameters), tuple(inputs), tuple(initial))
 
 
 def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float] | None) -> list[str]:
@@ -83,7 +83,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     initial = Initial(module.kernels, t)
     q, found = x[: layout.n_q], []
     declared, chosen = initial.sort(layout.initial), initial.sort(dict(given or {}))
-    free = [layout.freedoms[i] for i in layout.independent] + list(layout.q)
+    free = [layout.velocity_labels[i] for i in layout.independent] + list(layout.q)
     rates = [layout.v[i] for i in layout.independent] + list(layout.v)
     for first, second, rest, positions in (
         (chosen.positions, declared.positions, [n for n in free if n in layout.q], True),
@@ -95,7 +95,7 @@ def held_names(module: BoundModel, t: float, x: Array, given: Mapping[str, float
     return found
 
 
-def assembly_rows(module: BoundModel, t: float, x: Array, inputs: Slopes | None) -> Array:
+def assembly_rows(module: BoundModel, t: float, x: Array, inputs: SlopesNow | None) -> Array:
     """The derivatives of what an assembly solves, inputs that depend on the state and on parameters included."""
     layout, E = module.layout, assembly_jacobian(module, t, x)
     if inputs is not None:
@@ -106,7 +106,12 @@ def assembly_rows(module: BoundModel, t: float, x: Array, inputs: Slopes | None)
 
 
 def start_sensitivity(
-    module: BoundModel, t: float, x: Array, held: Sequence[str], columns: Columns, inputs: Slopes | None = None
+    module: BoundModel,
+    t: float,
+    x: Array,
+    held: Sequence[str],
+    columns: Differentiated,
+    inputs: SlopesNow | None = None,
 ) -> Array:
     """dx0 (n_x, k) of an assembled state, with the derivatives of the inputs there.
 
@@ -159,7 +164,7 @@ def start_sensitivity(
     return np.vstack([dq, dv])
 
 
-def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, columns: Columns) -> Array:
+def _solve(rows: Sequence[Array], right: Sequence[Array], n: int, count: int, columns: Differentiated) -> Array:
     """The smallest solution (n, k) of rows that must be consistent."""
     A, b = np.array(rows).reshape(len(rows), n), np.array(right).reshape(len(rows), count)
     if not A.size or not count:
@@ -180,8 +185,8 @@ def keep_consistent(
     t: float,
     x: Array,
     S: Array,
-    columns: Columns,
-    inputs: Slopes | None = None,
+    columns: Differentiated,
+    inputs: SlopesNow | None = None,
 ) -> Array:
     """The nearest sensitivities (n_x, k) that keep the constraints to first order, at a state on them.
 

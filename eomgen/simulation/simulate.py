@@ -11,17 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
-from ..runtime.names import check_names
+from ..runtime.near_names import check_names
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
-from .bound_run import Run
+from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
-from .progress import Progress, wanted
 from .recording import record
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
-from .stalling import Crawling, Pace
+from .stalled import Crawling
 from .tolerances import IMPLICIT, check_tolerances
 
 if TYPE_CHECKING:
@@ -134,15 +133,12 @@ def simulate(
     elif resume is not None:
         raise UsageError("resume needs checkpoint=, the file to go on from")
     if (isinstance(method, str) and method == "kinematic") or (method is None and not module.n_dof):
-        from .driven import is_driven
+        from .driven import follow_drivers
 
-        if is_driven(module) and not _led_by_inputs(module, inputs, method):
-            if kept is not None:
-                raise UsageError(f"{module.name} is moved by its drivers, position by position: no checkpoint is kept")
-            steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
-            return _follow_drivers(module, span, initial, parameters, inputs, t_eval, events, steps)
-        if method is not None:
-            raise UsageError(f"method 'kinematic' is for mechanisms without freedom; {module.name} has {module.n_dof}")
+        steps = {"rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step, **options}
+        motion = follow_drivers(module, span, initial, parameters, inputs, t_eval, events, method, kept, steps)
+        if motion is not None:
+            return motion
     method, step = own_step(module, method, step)
     step, dense_output = check_method(method, step), read_flag("dense_output", dense_output)
     declared = declare(module)
@@ -186,7 +182,7 @@ def simulate(
         require_steps("max_step", float(options.get("max_step", np.inf)), start, end)
     if not compiled and takes_jacobian(solver):
         options.setdefault("jac", run.jacobian)
-    watch = Progress(start, end, 0.0 if progress else 2.0) if wanted(progress) else None
+    watch = watch_run(start, end, progress)
     stored = None if t_eval is None else ordered_times(t_eval, start, end, module.n_x)
     longest = float(options.get("max_step", np.inf))
     numbers = (1 + module.n_x) * ((stored is None) + 8 * bool(dense_output))  # of each step
@@ -196,7 +192,7 @@ def simulate(
         pause = None if compiled else Pause(kept, solver, dense_output)
         own = {name: value for name, value in options.items() if name != "jac" or value != run.jacobian}
         kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
-    pace = Pace(start, end, x0, module.n_q, longest, run.troubled, numbers)
+    pace = run.pace(start, end, x0, longest, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
@@ -236,44 +232,6 @@ def simulate(
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
-
-
-def _follow_drivers(
-    module: BoundModel,
-    span: float | tuple[float, float] | None,
-    initial: Mapping[str, float] | ArrayLike | None,
-    parameters: Any,
-    inputs: Mapping[str, Any] | None,
-    t_eval: ArrayLike | None,
-    events: Any,
-    options: Mapping[str, Any],
-) -> Trajectory:
-    """The motion of a mechanism that its drivers move entirely: solved, not integrated."""
-    from .driven import simulate_driven
-
-    forcing = Forcing(module.layout, inputs)
-    start, end = find_span(span, float(module.metadata.get("simulation", {}).get("end") or 10.0))
-    bound = module.bind(parameters, forcing.constants) if parameters is not None or forcing.constants else module
-    forcing.attach(bound)
-    watched = Events(module.layout, events)
-    if watched.resets:
-        raise UsageError(f"{module.name} has no freedom: its drivers move it, and no event can reset its state")
-    listed = [event for event in watched.listed(bound, forcing) if event.direction != UNWATCHED]
-    stored = None if t_eval is None else ordered_times(t_eval, start, end)
-    given = {key: value for key, value in options.items() if value is not None}
-    return simulate_driven(bound, (start, end), initial, forcing, stored, listed, given)
-
-
-def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method: Any) -> bool:
-    """Whether inputs that vary move the mechanism: it is integrated then; UsageError for method kinematic."""
-    led = Forcing(module.layout, inputs).constrained
-    if led and method == "kinematic":
-        names = ", ".join(module.u_names[i] for i in module.layout.constraint_inputs)
-        raise UsageError(
-            f"method 'kinematic' follows drivers that are expressions of t, and inputs ({names}) move {module.name}; "
-            "leave method= out, and it is integrated"
-        )
-    return led
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:

@@ -15,6 +15,7 @@ from ..limits.rounding import TINY
 from ..limits.runs import ENDLESS, ENOUGH, FEW, HOPELESS, MOST_NUMBERS, NOTICED, SHORT, STEEP, STILL
 from ..numeric.scales import Array
 from ..runtime.failure import place
+from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
 MANY = 100_000  #: steps left that a run may take at any pace
@@ -22,22 +23,6 @@ REMEDY = (
     "look for a force that jumps (smooth it), a singular position, or motions far faster than the run is long (try an "
     "implicit method, Radau)"
 )
-
-
-class Crawling(Exception):
-    """Raised inside an integration whose steps lead nowhere.
-
-    Parameters
-    ----------
-    t : float
-    x : (n_x,) array
-    step : float
-        Mean length of the last steps (s).
-    """
-
-    def __init__(self, t: float, x: Array, step: float) -> None:
-        super().__init__(t, x, step)
-        self.t, self.x, self.step = t, x, step
 
 
 class Pace:

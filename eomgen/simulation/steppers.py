@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UnavailableError, UsageError
+from ..limits.runs import SCIPY_ATOL, SCIPY_RTOL
 from ..numeric.scales import Array
 from ..runtime.kernels import fitting
 from ..runtime.late import eager
-from ..runtime.names import require
+from ..runtime.near_names import require
 from ..runtime.room import read_number, read_vector
 from .compiled import no_series, stepper_options
 from .events import Events
@@ -73,8 +74,8 @@ def solver_class(core: Any, name: str) -> Any:
             y0: Array,
             t_bound: float,
             max_step: float = np.inf,
-            rtol: float = 1e-3,
-            atol: Any = 1e-6,
+            rtol: float = SCIPY_RTOL,
+            atol: Any = SCIPY_ATOL,
             vectorized: bool = False,
             first_step: float | None = None,
             **extraneous: Any,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.runs import LEAST_RTOL
-from ..runtime.room import as_real, read_number
+from ..runtime.room import as_real, read_flag, read_number
 from ..texts import shown
 
 IMPLICIT = ("jac", "jac_sparsity")  #: options of SciPy's implicit methods: the Jacobian, if not the model's own
@@ -25,7 +25,7 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
     span : float
         Length of the run (s), the longest first step.
     options : mapping
-        rtol and atol (a number or n of them), max_step, first_step, min_step; others are left as they are.
+        rtol and atol (a number or n of them), max_step, first_step, min_step, vectorized; others are left as they are.
 
     Returns
     -------
@@ -48,6 +48,8 @@ def check_tolerances(n: int, span: float, options: Mapping[str, Any]) -> dict[st
     for name in ("max_step", "first_step"):
         if name in checked:
             checked[name] = check_step(name, checked[name])
+    if "vectorized" in checked:
+        checked["vectorized"] = read_flag("vectorized", checked["vectorized"])
     if "min_step" in checked:
         checked["min_step"] = read_number("min_step", checked["min_step"])
         if checked["min_step"] < 0.0:

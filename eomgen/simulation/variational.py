@@ -11,7 +11,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .input_slopes import InputSlopes
-from .sensitivity_start import Columns
+from .sensitivity_start import Differentiated
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -54,11 +54,11 @@ class Variational:
         With parameters and constant inputs bound.
     forcing : Forcing
         The inputs of the run.
-    columns : Columns
+    columns : Differentiated
         What is differentiated by.
     """
 
-    def __init__(self, module: BoundModel, forcing: Forcing, columns: Columns) -> None:
+    def __init__(self, module: BoundModel, forcing: Forcing, columns: Differentiated) -> None:
         self.module, self.forcing, self.columns = module, forcing, columns
         self.inputs = InputSlopes(module.layout, forcing, module.p)
         self.weights = _weights(module, columns)
@@ -116,7 +116,7 @@ class Variational:
         return np.asarray(Y[:, :n_x] @ S + Y[:, n_x : n_x + n_v] @ S_dot[n_q:] + by_u @ move.u + by_p @ move.p)
 
 
-def _weights(module: BoundModel, columns: Columns) -> Array:
+def _weights(module: BoundModel, columns: Differentiated) -> Array:
     """Sizes of what is differentiated by, so that one tolerance fits all columns."""
     weights = np.ones(len(columns.names))
     for column, index in columns.parameters:

@@ -1,9 +1,9 @@
 """Solids of uniform density: one short class a type; :data:`SOLIDS` is the literal table of all of them."""
 
-from .base import Solid
 from .bounded import Box, Ellipsoid, Sphere
-from .properties import MassProperties, combine, point, shift_tensor, turn_tensor
+from .properties import MassProperties, combine, point
 from .round import Cone, Cylinder, Rod, Tube
+from .solid import Solid
 
 SOLIDS: dict[str, type[Solid]] = {
     solid.type_name: solid for solid in (Box, Cylinder, Tube, Sphere, Rod, Cone, Ellipsoid)
@@ -22,6 +22,4 @@ __all__ = [
     "Tube",
     "combine",
     "point",
-    "shift_tensor",
-    "turn_tensor",
 ]

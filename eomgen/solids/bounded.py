@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Dimension, Solid
+from .solid import Solid, SolidSize
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Box(Solid):
     """A rectangular block; edges along its axes."""
 
     type_name: ClassVar[str] = "box"
-    dimensions: ClassVar[dict[str, Dimension]] = {"size": Dimension("vector", "edges along x, y, z (m)")}
+    dimensions: ClassVar[dict[str, SolidSize]] = {"size": SolidSize("vector", "edges along x, y, z (m)")}
 
     def content(self) -> Expr:
         a, b, c = self.lengths["size"]
@@ -32,7 +32,7 @@ class Ellipsoid(Solid):
     """An ellipsoid; half axes along its axes."""
 
     type_name: ClassVar[str] = "ellipsoid"
-    dimensions: ClassVar[dict[str, Dimension]] = {"semi_axes": Dimension("vector", "half axes along x, y, z (m)")}
+    dimensions: ClassVar[dict[str, SolidSize]] = {"semi_axes": SolidSize("vector", "half axes along x, y, z (m)")}
 
     def content(self) -> Expr:
         a, b, c = self.lengths["semi_axes"]
@@ -48,7 +48,7 @@ class Sphere(Solid):
     """A ball."""
 
     type_name: ClassVar[str] = "sphere"
-    dimensions: ClassVar[dict[str, Dimension]] = {"radius": Dimension("expression", "radius (m)")}
+    dimensions: ClassVar[dict[str, SolidSize]] = {"radius": SolidSize("expression", "radius (m)")}
 
     def content(self) -> Expr:
         r = self.length("radius")

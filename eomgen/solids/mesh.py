@@ -9,7 +9,7 @@ from stat import S_ISREG
 import numpy as np
 
 from ..errors import UsageError
-from ..files.paths import as_name
+from ..files.path_names import as_name
 from ..limits.files import MESH
 from ..records import dataclass
 

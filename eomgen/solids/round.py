@@ -8,10 +8,10 @@ from typing import ClassVar
 from ..graph.core import Expr
 from ..graph.vectors import Vec3
 from ..records import dataclass
-from .base import Dimension, Solid
+from .solid import Solid, SolidSize
 
-_LENGTH = Dimension("expression", "length along the axis (m)")
-_RADIUS = Dimension("expression", "radius (m)")
+_LENGTH = SolidSize("expression", "length along the axis (m)")
+_RADIUS = SolidSize("expression", "radius (m)")
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Cylinder(Solid):
     """A full circular cylinder, placed by its centre; of length 0 a disc (which needs a mass)."""
 
     type_name: ClassVar[str] = "cylinder"
-    dimensions: ClassVar[dict[str, Dimension]] = {"radius": _RADIUS, "length": _LENGTH}
+    dimensions: ClassVar[dict[str, SolidSize]] = {"radius": _RADIUS, "length": _LENGTH}
     has_axis: ClassVar[bool] = True
 
     def content(self) -> Expr:
@@ -37,9 +37,9 @@ class Tube(Solid):
     """A hollow circular cylinder, placed by its centre."""
 
     type_name: ClassVar[str] = "tube"
-    dimensions: ClassVar[dict[str, Dimension]] = {
-        "outer_radius": Dimension("expression", "outer radius (m)"),
-        "inner_radius": Dimension("expression", "inner radius (m)"),
+    dimensions: ClassVar[dict[str, SolidSize]] = {
+        "outer_radius": SolidSize("expression", "outer radius (m)"),
+        "inner_radius": SolidSize("expression", "inner radius (m)"),
         "length": _LENGTH,
     }
     has_axis: ClassVar[bool] = True
@@ -60,7 +60,7 @@ class Rod(Solid):
     """A thin straight rod, placed by its middle; ``line_density`` is its mass for each metre."""
 
     type_name: ClassVar[str] = "rod"
-    dimensions: ClassVar[dict[str, Dimension]] = {"length": _LENGTH}
+    dimensions: ClassVar[dict[str, SolidSize]] = {"length": _LENGTH}
     has_axis: ClassVar[bool] = True
     content_key: ClassVar[str] = "line_density"
 
@@ -78,9 +78,9 @@ class Cone(Solid):
     """A full circular cone, placed by the centre of its base, its apex along the axis."""
 
     type_name: ClassVar[str] = "cone"
-    dimensions: ClassVar[dict[str, Dimension]] = {
-        "radius": Dimension("expression", "radius of the base (m)"),
-        "length": Dimension("expression", "height along the axis (m)"),
+    dimensions: ClassVar[dict[str, SolidSize]] = {
+        "radius": SolidSize("expression", "radius of the base (m)"),
+        "length": SolidSize("expression", "height along the axis (m)"),
     }
     has_axis: ClassVar[bool] = True
 

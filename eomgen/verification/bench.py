@@ -10,12 +10,15 @@ import numpy as np
 
 from ..graph.core import Expr
 from ..kernel_table import NAMED
+from ..limits.constraints import EXACT
+from ..limits.rounding import TINY
+from ..limits.verification import NUDGE
 from ..numeric import algebra
 from ..numeric.scales import Array
 from ..program.collect import collect_terms
 from .cases import Case
-from .rounding import FOLDED, UNIT, bounded
-from .truth import System, Truth
+from .rounding_sizes import FOLDED, UNIT, bounded
+from .truth import PreciseSystem, Truth
 
 if TYPE_CHECKING:
     from ..derivation import Derivation
@@ -42,7 +45,7 @@ class Bench:
         self.kinematics = equations.kinematics
         self.mechanism = equations.kinematics.mechanism
         self.terms: SystemTerms = collect_terms(equations.kinematics, equations.mobility, equations.tree)
-        self.system = System(equations, self.terms)
+        self.system = PreciseSystem(equations, self.terms)
         self._bounds: dict[str, tuple[Array, Array]] = {}
 
     @cached_property
@@ -172,8 +175,8 @@ class Bench:
         if not len(C):
             return 1.0
         dependent = np.delete(np.arange(self.layout.n_v), self.layout.independent)
-        J = C[:, dependent] / np.maximum(np.linalg.norm(C, axis=1), 1e-300)[:, None]
-        J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+        J = C[:, dependent] / np.maximum(np.linalg.norm(C, axis=1), TINY)[:, None]
+        J = J / np.maximum(np.linalg.norm(J, axis=0), TINY)
         return float(algebra.cond(J)) if J.shape[0] == J.shape[1] and J.size else 1.0
 
     def shift(self, k: int, C: Array) -> Array:
@@ -209,7 +212,7 @@ class Bench:
         columns, base = [], self.rhs(case)
         for k in range(self.layout.n_x):
             x = np.array(case.x)
-            h = 1e-6 * (1.0 + abs(x[k]))
+            h = NUDGE * (1.0 + abs(x[k]))
             x[k] += h
             columns.append((self.module.rhs(case.t, x, p=case.p, u=case.u) - base) / h)
         return np.array(columns).T if columns else np.zeros((0, 0))
@@ -223,7 +226,7 @@ def _inverse(K: Array) -> Array:
             size = np.abs(K * d * d[:, None]).max(axis=1, initial=0.0)
             d = d / np.sqrt(np.where(size > 0.0, size, 1.0))
         scaled = K * d * d[:, None]
-    return np.asarray(algebra.pinv(scaled, rcond=1e-15) * d * d[:, None])
+    return np.asarray(algebra.pinv(scaled, rcond=EXACT) * d * d[:, None])
 
 
 def numbers(values: Sequence[Any]) -> Array:

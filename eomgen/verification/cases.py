@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
+from ..limits.verification import CLOSED, REGULAR
 from ..numeric import algebra
 from ..numeric.scales import Array
 
@@ -21,7 +22,6 @@ SPREAD = 0.03  #: relative spread of parameters
 ANGLE, LENGTH = 0.4, 0.2  #: spread of coordinates: rad, and parts of the model's length
 SPEED = 1.0  #: spread of velocities: rad/s, and lengths of the model per second
 LATEST = 0.5  #: latest time (s)
-CLOSED = 1e-9  #: scaled residual of a state that counts as closed
 HALVINGS = 8  #: of the way from the reference position, until it closes
 
 
@@ -147,4 +147,4 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     J = scales.jacobian(module.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
     values = algebra.singular_values(J)
     rank = module.n_v - module.n_dof
-    return bool(values[rank - 1] > 1e-3 * values[0]) if rank and rank <= len(values) else True
+    return bool(values[rank - 1] > REGULAR * values[0]) if rank and rank <= len(values) else True

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..limits.rounding import EPS
+from ..limits.rounding import EPS, TINY
 from ..numeric.scales import Array
 from . import bodies
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import FOLDED, UNIT
+from .rounding_sizes import FOLDED, UNIT
 from .truth import Truth
 
 
@@ -192,7 +192,7 @@ def _power(bench: Bench) -> Finding:
         slack = bench.acceleration_limit(k, numbers(exact), numbers(multipliers))
         gap = np.abs(numbers(rows))[layout.rows] @ np.abs(numbers(multipliers)) if len(layout.rows) else 0.0
         limit = float(momentum @ slack) + float(gap) + UNIT * float(np.abs(numbers(parts)).sum())
-        size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), 1e-300)
+        size = max(float(np.abs(numbers(parts)).max(initial=0.0)), float(np.abs(a) @ momentum), TINY)
         found.add(k, [float(rate - power)], [limit], size)
     return found.finding()
 

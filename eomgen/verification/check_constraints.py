@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
+from ..limits.verification import FIRST_DIFFERENCE, NO_FORCE, SECOND_DIFFERENCE
 from .bench import Bench, numbers
 from .comparison import Comparison, pairs, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import FOLDED, UNIT
+from .rounding_sizes import FOLDED, UNIT
 from .truth import Truth, Values
 
 
@@ -29,7 +30,9 @@ def _jacobian(bench: Bench) -> Finding:
         expected = numbers([x for row in truth.constraint_jacobian for x in row])
         actual = bench.call("constraint_jacobian", truth.case).ravel()
         limit = bounds[:, k] + UNIT * np.abs(expected)
-        found.add(k, actual - expected, limit + 1e-30, size_of(expected), pairs(layout.constraint_labels, layout.v))
+        found.add(
+            k, actual - expected, limit + FIRST_DIFFERENCE, size_of(expected), pairs(layout.constraint_labels, layout.v)
+        )
     return found.finding()
 
 
@@ -44,7 +47,7 @@ def _velocity(bench: Bench) -> Finding:
         actual = bench.call("velocity_constraints", truth.case)
         size = float((np.abs(bench.call("constraint_jacobian", truth.case)) @ np.abs(truth.case.v)).max(initial=0.0))
         limit = bounds[:, k] + UNIT * np.abs(expected)
-        found.add(k, actual - expected, limit + 1e-30, size, bench.layout.constraint_labels)
+        found.add(k, actual - expected, limit + FIRST_DIFFERENCE, size, bench.layout.constraint_labels)
     return found.finding()
 
 
@@ -63,7 +66,7 @@ def _gamma(bench: Bench) -> Finding:
         found.add(
             k,
             values[:, k] - expected,
-            limit + 1e-24 * size_of(expected),
+            limit + SECOND_DIFFERENCE * size_of(expected),
             size_of(expected),
             bench.layout.constraint_labels,
         )
@@ -82,7 +85,7 @@ def _potentials(bench: Bench) -> Finding:
         every, rest = truth.applied(), truth.applied(remainder=True)
         gap = numbers([f - r + s for f, r, s in zip(every, rest, slopes, strict=True)])
         own = np.abs(numbers(slopes)) + np.abs(numbers(every)) + np.abs(numbers(rest))
-        limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + 1e-40
+        limit = (64.0 * UNIT if bench.kinematics.graph.calls else FOLDED) * (own + size_of(own)) + NO_FORCE
         if "bias" in bench.graph_kernels:  # folded constants weigh more beside half a turn, as rounding does
             limit = np.maximum(limit, FOLDED / UNIT * bench.bounds("bias", bench.graph_kernels["bias"])[1][:, k])
         found.add(k, gap, limit, size_of(own), layout.v)

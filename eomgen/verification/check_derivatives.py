@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import EomgenError
-from ..limits.rounding import EPS
+from ..limits.rounding import EPS, TINY
+from ..limits.verification import OFF_CONSTRAINTS
 from ..numeric import algebra
 from ..numeric.scales import Array
 from .bench import Bench, numbers
@@ -20,13 +21,10 @@ from .comparison import Comparison, pairs, size_of
 from .differences import FIRST_STEP, SHORTER, extrapolate
 from .digits import Numbers, solve
 from .finding import Finding
-from .rounding import UNIT
+from .rounding_sizes import UNIT
 from .truth import Truth, Values
 
 DIRECTIONS = 2  #: random ones for each state
-#: First step off the constraints.  The projection adds a term that grows with the residual: x' then has a part that
-#: goes with the third power of the distance, without its sign, and farther away takes another number of passes.
-OFF_CONSTRAINTS = 2.5e-3
 
 
 def check(bench: Bench) -> list[Finding]:
@@ -62,9 +60,9 @@ def _condition(bench: Bench, case: Case) -> float:
     module = bench.module
     C = module.constraint_jacobian(case.q, p=case.p, u=case.u, t=case.t)
     M, m = module.mass_matrix(case.q, p=case.p, u=case.u, t=case.t), len(C)
-    d = 1.0 / np.sqrt(np.maximum(np.diag(M), 1e-300 + EPS * size_of(np.diag(M))))
+    d = 1.0 / np.sqrt(np.maximum(np.diag(M), TINY + EPS * size_of(np.diag(M))))
     M, C = M * d * d[:, None], C * d
-    C = C / np.maximum(np.linalg.norm(C, axis=1), 1e-300)[:, None]
+    C = C / np.maximum(np.linalg.norm(C, axis=1), TINY)[:, None]
     return float(algebra.cond(np.block([[M, C.T], [C, np.zeros((m, m))]]))) if module.n_v else 1.0
 
 

@@ -14,7 +14,7 @@ from . import bodies
 from .bench import Bench
 from .comparison import Comparison
 from .finding import Finding
-from .rounding import UNIT
+from .rounding_sizes import UNIT
 from .truth import Truth
 
 PARTS = ("x", "y", "z", *["rotation"] * 9)  #: of a relative pose

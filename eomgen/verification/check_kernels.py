@@ -7,7 +7,7 @@ import numpy as np
 from .bench import Bench, numbers
 from .comparison import Comparison, size_of, terms_size
 from .finding import Finding
-from .rounding import UNIT, bounded
+from .rounding_sizes import UNIT, bounded
 
 COLUMNS = 9  #: states of a batch: more than a vector holds, and no multiple of it
 

@@ -18,7 +18,7 @@ from .check_joints import placed
 from .comparison import Comparison, size_of
 from .digits import Number
 from .finding import Finding
-from .rounding import UNIT
+from .rounding_sizes import UNIT
 from .truth import Truth
 
 TURNING = (Revolute, Continuous)
@@ -135,8 +135,8 @@ def _along(truth: Truth, a: Array) -> dict[str, Number]:
         total[name] = total.get(name, truth.zero) + value
     many = [truth.mp.mpf(float(x)) for x in a]
     for name, inertia in truth.drives:
-        if name in truth.system.kinematics.freedoms:
-            bend = many[truth.system.kinematics.freedoms.index(name)]
+        if name in truth.system.kinematics.velocity_labels:
+            bend = many[truth.system.kinematics.velocity_labels.index(name)]
         else:
             k = truth.system.kinematics.loop_coordinates.names.index(name)
             bend = truth.bend(truth.measured, lambda s: truth.later(s, many))[k]

@@ -15,9 +15,12 @@ import numpy as np
 
 from ..errors import EomgenError, SimulationError
 from ..graph.traverse import reachable
+from ..limits.constraints import ACCEPTED
+from ..limits.verification import ABSOLUTE, COLLECTED, COMPARED, LARGE, LOOSE, SLOWEST, TIGHT
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.names import require
+from ..operations import operations_with
+from ..runtime.near_names import require
 from ..simulation.events import Events
 from ..simulation.integrator import integrator
 from ..simulation.simulate import simulate
@@ -31,10 +34,6 @@ ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
 #: By how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others.
 SHORT = 0.5
 JUDGED = 3  #: states that single steps are taken from
-LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
-LOOSE = 1e6  #: tolerance that accepts every step
-TIGHT = {"rtol": 1e-13, "atol": 1e-16}
-KINKED = frozenset({"abs", "sign", "min", "max", "lt", "le", "select"})  #: operations with kinks
 LONG = 2.0  #: length of a run, in times in which the state changes by its own size
 FIRST = 4.0  #: the first step tried, in the same times
 MOST = 3000  #: evaluations of a run that is smooth
@@ -76,7 +75,8 @@ def _kinked(bench: Bench) -> bool:
     """Whether right-hand sides may have kinks, where methods need not keep their order."""
     terms = bench.terms
     nodes = reachable(terms.graph, (x.id for x in (*terms.inverse_dynamics, *terms.gamma)))
-    return any(terms.graph.nodes[i][0] in KINKED or terms.graph.nodes[i][0] in terms.graph.calls for i in nodes)
+    kinked = operations_with(lambda row: row.bends).union(terms.graph.calls)
+    return any(terms.graph.nodes[i][0] in kinked for i in nodes)
 
 
 def _methods(bench: Bench) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ def _pace(bench: Bench, case: Case) -> float:
     J = bench.slopes(case)
     fastest = float(np.abs(algebra.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
     speed = float(np.abs(case.v / bench.layout.scales.q).max(initial=0.0))
-    return 1.0 / max(fastest, speed, 1e-3)
+    return 1.0 / max(fastest, speed, SLOWEST)
 
 
 def _judge(bench: Bench, case: Case) -> Judge:
@@ -122,7 +122,7 @@ def _judge(bench: Bench, case: Case) -> Judge:
                 raise SimulationError(f"more than {MOST} evaluations for a run of {h:g} s")
             return bound.rhs(t, x)
 
-        run = integrate.solve_ivp(rhs, (case.t, case.t + h), case.x, method="DOP853", **TIGHT)
+        run = integrate.solve_ivp(rhs, (case.t, case.t + h), case.x, method="DOP853", rtol=TIGHT, atol=ABSOLUTE * TIGHT)
         steps = np.diff(run.t)[2:-1]
         if not run.success or (steps.size and steps.min() < EVEN * steps.max()):
             raise SimulationError(f"no run of {h:g} s: {run.message}")
@@ -160,7 +160,7 @@ def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> F
     for case, judge in judges:
         bound = bench.module.bind(case.p, case.u)
         size = size_of(case.x) + size_of(bench.rhs(case)) * _pace(bench, case)
-        lost = 30.0 * TIGHT["rtol"] * size
+        lost = 30.0 * TIGHT * size
         errors: list[float] = []
         h = FIRST * _pace(bench, case)
         for _ in range(SMALLEST):
@@ -194,9 +194,9 @@ def _agreement(bench: Bench, h: float, expected: Array) -> Finding:
     found = Comparison(check, ", ".join(methods))
     size = size_of(expected)
     for method in methods:
-        rtol = 1e-10
-        end = integrator(bound, method=method, rtol=rtol, atol=1e-3 * rtol * size)(case.t, case.x, h)
-        found.add(0, end - expected, 1e3 * rtol * size, size, [f"{method} {name}" for name in bench.layout.x])
+        tolerances = {"rtol": COMPARED, "atol": ABSOLUTE * COMPARED * size}
+        end = integrator(bound, method=method, **tolerances)(case.t, case.x, h)
+        found.add(0, end - expected, COLLECTED * COMPARED * size, size, [f"{method} {name}" for name in bench.layout.x])
     found.cases = 1
     return found.finding()
 
@@ -206,11 +206,11 @@ def _energy(bench: Bench, h: float) -> Finding:
     module, case = bench.module, _held(bench)[0]
     found = Comparison("runs: energy and loops")
     bound = module.bind(case.p, case.u)
-    rtol = 1e-10
-    run = simulate(bound, (case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=1e-13)
+    rtol, atol = COMPARED, ABSOLUTE * COMPARED
+    run = simulate(bound, (case.t, case.t + h), case.x, method="DOP853", rtol=rtol, atol=atol)
     residuals = [size_of(bound.layout.scales.residual(bound.constraints(x[: module.n_q], t=t, rows="all")))
                  for t, x in zip(run.t, run.x.T, strict=True)]  # fmt: skip
-    found.add(0, [max(residuals, default=0.0)], [1e-10], 1.0, ["loops"])
+    found.add(0, [max(residuals, default=0.0)], [ACCEPTED], 1.0, ["loops"])
     if _conservative(bench):
         E = np.array([bound.energy(x, t=t) for t, x in zip(run.t, run.x.T, strict=True)])
         size = float(np.abs(E[:, 0]).max() + np.abs(E[:, 1] - E[0, 1]).max()) or 1.0

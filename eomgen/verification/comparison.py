@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..limits.verification import ROUNDED
 from ..numeric.scales import Array
 from .finding import Finding
 
@@ -89,7 +90,7 @@ def size_of(values: ArrayLike) -> float:
 
 def terms_size(values: ArrayLike, bounds: ArrayLike) -> float:
     """The largest entry, or the size of the terms that cancel in it, told from the bound of its rounding."""
-    return max(size_of(values), size_of(bounds) / 1e-14)
+    return max(size_of(values), size_of(bounds) / ROUNDED)
 
 
 def pairs(rows: Sequence[str], columns: Sequence[str]) -> list[str]:

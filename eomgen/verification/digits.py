@@ -6,14 +6,14 @@ has 30 of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import factorial
 from typing import Any
 
 from ..errors import MissingDependencyError
 from ..graph.core import Expr
-from ..graph.elementary import ELEMENTARY
 from ..graph.traverse import common_graph, reachable
+from ..operations import OPERATIONS
 
 DIGITS = 60
 FIRST = "1e-16"  #: step of first differences: truncation 1e-32, rounding 1e-44
@@ -40,35 +40,6 @@ def context() -> Any:
     return made
 
 
-def _operations(mp: Any) -> dict[str, Callable[..., Any]]:
-    one, zero = mp.mpf(1), mp.mpf(0)
-
-    def truth(test: Callable[..., bool]) -> Callable[..., Any]:
-        return lambda *x: one if test(*x) else zero
-
-    plain = (*ELEMENTARY, "sqrt", "atan2")
-    return {
-        **{name: getattr(mp, name) for name in plain},
-        "add": lambda a, b: a + b,
-        "sub": lambda a, b: a - b,
-        "mul": lambda a, b: a * b,
-        "div": lambda a, b: a / b,
-        "neg": lambda a: -a,
-        "pow": lambda a, b: a**b,
-        "abs": abs,
-        "sign": lambda a: mp.mpf(int(mp.sign(a))),
-        "min": min,
-        "max": max,
-        "lt": truth(lambda a, b: a < b),
-        "le": truth(lambda a, b: a <= b),
-        "eq": truth(lambda a, b: a == b),
-        "not": truth(lambda a: not a),
-        "and": truth(lambda a, b: bool(a) and bool(b)),
-        "or": truth(lambda a, b: bool(a) or bool(b)),
-        "select": lambda c, a, b: a if c else b,
-    }
-
-
 class Digits:
     """Expressions ready to be evaluated in many digits.
 
@@ -86,7 +57,6 @@ class Digits:
         graph = common_graph(outputs)
         order = reachable(graph, (y.id for y in outputs)) if graph is not None else []
         slot = {i: k for k, i in enumerate(order)}
-        operations = _operations(mp)
         self._outputs = [slot[y.id] for y in outputs]
         self._steps: list[tuple[str | None, Any, tuple[int, ...]]] = []  # name of a symbol, or operation and operands
         for i in order:
@@ -96,8 +66,9 @@ class Digits:
                 self._steps.append((args[0], None, ()))
             elif operation == "const":
                 self._steps.append((None, mp.mpf(args[0]), ()))
-            elif operation in operations:
-                self._steps.append((None, operations[operation], tuple(slot[k] for k in args)))
+            elif operation in OPERATIONS:
+                row = OPERATIONS[operation]
+                self._steps.append((None, getattr(mp, row.digits, row.value), tuple(slot[k] for k in args)))
             else:
                 function, orders = graph.calls[operation]
                 call = _Local(mp, function, orders)
@@ -141,7 +112,7 @@ class _Local:
         return total
 
     def _expand(self, centre: list[float]) -> None:
-        from ..numeric.functions import up_to
+        from ..numeric.user_functions import up_to
 
         self.centre, self.terms = centre, []
         for total in range(3):

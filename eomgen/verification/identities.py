@@ -12,12 +12,13 @@ import numpy as np
 
 from ..errors import EomgenError
 from ..limits.rounding import EPS
+from ..limits.verification import CLOSED
 from ..numeric import algebra
 from ..numeric.definite import correlated
 from ..numeric.scales import Array
 from ..runtime.minimal import Minimal
 from ..runtime.signal_rates import moving_inputs
-from .cases import CLOSED, Case
+from .cases import Case
 from .comparison import Comparison, failed, size_of
 from .differences import extrapolate
 from .finding import Finding

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import ModelError
 from .cases import SPREAD
-from .rounding import bounded
+from .rounding_sizes import bounded
 
 if TYPE_CHECKING:
     from ..program.program import Program

@@ -14,12 +14,12 @@ from ..frames import GROUND
 from . import bodies
 from .bodies import Matrix, Pose, Rigid, Twist
 from .digits import FIRST, SECOND, Number, Numbers, solve
-from .states import State, System, Values
+from .precise_states import PreciseState, PreciseSystem, Values
 
-__all__ = ["State", "System", "Truth", "Values"]
+__all__ = ["PreciseState", "PreciseSystem", "Truth", "Values"]
 
 
-class Truth(State):
+class Truth(PreciseState):
     """One state of a model; every quantity is found when it is first asked for."""
 
     # -- bodies -------------------------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ class Truth(State):
 
     def coordinate_slopes(self, name: str) -> Numbers:
         """dy/dv' of a joint's coordinate, of the tree or cut."""
-        freedoms, cut = self.system.kinematics.freedoms, self.system.kinematics.loop_coordinates.names
+        freedoms, cut = self.system.kinematics.velocity_labels, self.system.kinematics.loop_coordinates.names
         if name in freedoms:
             k = freedoms.index(name)
             return [self.mp.mpf(j == k) for j in range(self.n)]
@@ -176,7 +176,7 @@ class Truth(State):
                     weight = body.mass * bodies.dot(self.gravity, w.at(body.arm))
                     total[j] += body.power(w, rate, twist.angular) - weight
         for name, inertia in self.drives:
-            if name in self.system.kinematics.freedoms:
+            if name in self.system.kinematics.velocity_labels:
                 continue  # its y'' is that velocity's own acceleration
             k = self.system.kinematics.loop_coordinates.names.index(name)
             bend = self.bend(self.measured, self.later)[k]

@@ -24,7 +24,7 @@ cdef class Integrator(Journey):
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
         self.end, self.first, self.turn = <double *>self.journey.nodes, first_step, allocate_lock()
-        if _FACTS.get("n_c", 0) or _FACTS.get("balls"):
+        if _FACTS.get("n_c", 0) or _FACTS.get("quaternion_slots"):
             self.project = MODEL.kernels[find("project", ValueError)].call
 
     def advance(self, double t, x, double h, p=None, u=None, out=None):

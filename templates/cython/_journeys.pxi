@@ -169,7 +169,7 @@ cdef class Journey(Stepper):
             ev.values = MODEL.kernels[find("events", ValueError)].call
         if n_resets:
             ev.resets = MODEL.kernels[find("resets", ValueError)].call
-            if _FACTS.get("n_c", 0) or _FACTS.get("balls"):
+            if _FACTS.get("n_c", 0) or _FACTS.get("quaternion_slots"):
                 ev.project = MODEL.kernels[find("project", ValueError)].call
         if tape is not None:
             held = Tape(*tape)

@@ -56,7 +56,7 @@ def closed_chain(kind: str, rotation: str) -> Random:
     m, graph, random = made.mechanism, made.mechanism.graph, np.random.default_rng(3)
     kinematics = analyse(m)
     values = random.uniform(0.2, 0.7, len(kinematics.names))
-    for ball in kinematics.balls:
+    for ball in kinematics.quaternion_slots:
         e = values[ball.coordinate : ball.coordinate + 4]
         e /= np.linalg.norm(e)
     start = dict(zip(kinematics.names, values.tolist(), strict=True))

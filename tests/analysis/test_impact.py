@@ -82,7 +82,7 @@ def test_momentum_and_energy_with_constraints(name: str, compiled: Callable[...,
     gap = {"slider_crank": "s", "three_cranks": "theta1", "rssr": "ph", "rolling_disc": "yaw"}[name]
     for x in judges.random_states(mod, 8, 2):
         q, v = x[: mod.n_q], x[mod.n_q :]
-        n = np.eye(mod.n_v)[mod.layout.freedoms.index(gap)]
+        n = np.eye(mod.n_v)[mod.layout.velocity_labels.index(gap)]
         M, C_q = mod.mass_matrix(q), mod.constraint_jacobian(q, rows="all")
         for e in (0.0, 0.6, 1.0):
             hit = mod.impact(0.0, x, {gap: e}, closed=True)  # a stop where it is

@@ -321,15 +321,15 @@ def test_change_points_where_the_determinant_only_touches_zero() -> None:
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.walking import Walk
+    from eomgen.analysis.path_following import Continuation
 
-    count, real = [0], Walk.forward
+    count, real = [0], Continuation.forward
 
-    def counted(self: Walk, *given: Any) -> Any:
+    def counted(self: Continuation, *given: Any) -> Any:
         count[0] += 1
         return real(self, *given)
 
-    monkeypatch.setattr(Walk, "forward", counted)
+    monkeypatch.setattr(Continuation, "forward", counted)
     module = eg.load(models.EXAMPLES / "four_bar.yaml").compile(target=target)
     values = np.random.default_rng(0).normal(size=200)
     found = module.kinematic_analysis(theta=values)
@@ -345,15 +345,15 @@ def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, mon
 
 
 def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.walking import Walk
+    from eomgen.analysis.path_following import Continuation
 
-    count, real = [0], Walk.forward
+    count, real = [0], Continuation.forward
 
-    def counted(self: Walk, *given: Any) -> Any:
+    def counted(self: Continuation, *given: Any) -> Any:
         count[0] += 1
         return real(self, *given)
 
-    monkeypatch.setattr(Walk, "forward", counted)
+    monkeypatch.setattr(Continuation, "forward", counted)
     module = eg.load(models.EXAMPLES / "driven_slider_crank.yaml").compile(target="numpy")
     times = np.random.default_rng(1).random(100)
     found = module.kinematic_analysis(t=times)
@@ -365,20 +365,20 @@ def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypat
 
 
 def test_what_of_a_way_was_walked() -> None:
-    from eomgen.analysis.ground import Ground
+    from eomgen.analysis.known_range import KnownRange
 
     y = np.array([[0.0, 2.0, 1.0, 4.0, -2.0], [1.0, 1.0, 1.0, 1.0, 1.0]])
-    ground, known = Ground(np.zeros(5), y), []
+    known_range, known = KnownRange(np.zeros(5), y), []
     for k in range(4):
-        known.append(ground.known(k, k + 1))
-        ground.walked(k, k + 1, True)
+        known.append(known_range.known(k, k + 1))
+        known_range.walked(k, k + 1, True)
     np.testing.assert_allclose(known, [0.0, 1.0, 1 / 3, 4 / 6])
-    ground.walked(3, 4, False)  # a change point: from here on every way is walked as if it were the first
-    assert ground.known(1, 2) == 0.0
-    assert Ground(np.arange(5.0), y).known(0, 0) == 0.0
-    time = Ground(np.array([0.0, 2.0, 1.0]), y[:, :1].repeat(3, axis=1))
+    known_range.walked(3, 4, False)  # a change point: from here on every way is walked as if it were the first
+    assert known_range.known(1, 2) == 0.0
+    assert KnownRange(np.arange(5.0), y).known(0, 0) == 0.0
+    time = KnownRange(np.array([0.0, 2.0, 1.0]), y[:, :1].repeat(3, axis=1))
     time.walked(0, 1, True)
     assert time.known(1, 2) == 1.0
-    both = Ground(np.zeros(5), np.concatenate([y, y]))
+    both = KnownRange(np.zeros(5), np.concatenate([y, y]))
     both.walked(0, 1, True)
     assert both.known(1, 2) == 0.0

@@ -148,9 +148,9 @@ def test_advice_on_checkpoints_names_options_of_the_verb(tmp_path: Path, capsys:
 
 
 def test_the_doctor_tries_whether_the_cache_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.cli import doctor
+    from eomgen.cli import verb_doctor
 
     monkeypatch.setenv("EOMGEN_CACHE_DIR", "/proc/eomgen")  # which grants all rights to root, and takes no file
-    assert not doctor._cache().ok
+    assert not verb_doctor._cache().ok
     monkeypatch.setenv("EOMGEN_CACHE_DIR", str(tmp_path / "cache"))
-    assert doctor._cache().ok
+    assert verb_doctor._cache().ok

@@ -9,7 +9,7 @@ import pytest
 
 from eomgen.cli.command import VERBS
 from eomgen.cli.example_files import example_files
-from eomgen.cli.examples import describe_example
+from eomgen.cli.verb_examples import describe_example
 
 from .conftest import EXAMPLES, Call
 
@@ -92,8 +92,8 @@ def test_derive_needs_no_parameter_values(call: Call, model_file: Callable[[str]
 
 def test_generate_json(call: Call, tmp_path: Path) -> None:
     written = call("generate", EXAMPLES / "pendulum.yaml", "--out", tmp_path / "out", "--json").json
-    assert set(written) == {"name", "target", "folder", "files"}
-    assert written["target"] == "cython"
+    assert set(written) == {"name", "target", "slim", "folder", "files"}
+    assert (written["target"], written["slim"]) == ("cython", False)
     assert Path(written["folder"]) == tmp_path / "out" / "pendulum"
     assert {"model.json", "pyproject.toml", "README.md"} <= set(written["files"])
     assert all((tmp_path / "out" / "pendulum" / name).is_file() for name in written["files"])
@@ -164,12 +164,12 @@ def test_doctor(call: Call) -> None:
 
 
 def test_doctor_tells_which_extras_are_there(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.cli import doctor
+    from eomgen.cli import verb_doctor
 
     def version(name: str) -> str | None:
         return None if name == "mujoco" else "1.2"
 
-    monkeypatch.setattr(doctor, "_version", version)
+    monkeypatch.setattr(verb_doctor, "_version", version)
     monkeypatch.setenv("CC", "no-such-compiler")  # quick
     checks = {check["name"]: check for check in call("doctor", "--json").json["checks"]}
     assert not checks["[robots]"]["ok"]
@@ -181,7 +181,7 @@ def test_doctor_tells_which_extras_are_there(call: Call, monkeypatch: pytest.Mon
 def test_every_extra_for_users_is_known_to_doctor() -> None:
     import tomllib
 
-    from eomgen.cli.doctor import CORE, EXTRAS
+    from eomgen.cli.verb_doctor import CORE, EXTRAS
 
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]

@@ -17,7 +17,7 @@ from foreign import give_away
 
 import eomgen as eg
 from eomgen.cli.command import run_command
-from eomgen.cli.doctor import _cache
+from eomgen.cli.verb_doctor import _cache
 from eomgen.compilation import Cache, compile_c_library, compile_sources, load_core
 from eomgen.compilation.late_lanes import find_lanes
 from eomgen.ensembles.handle import describe

@@ -17,7 +17,7 @@ from scipy.special import ellipk
 
 import eomgen as eg
 from eomgen.constraints import CONSTRAINTS, Condition, Constraint
-from eomgen.constraints.base import View as Motion
+from eomgen.constraints.constraint import ConstraintView as Motion
 from eomgen.describe import model_schema
 from eomgen.describe.yaml_nodes import Document
 from eomgen.elements.element_type import ElementType

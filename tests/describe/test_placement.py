@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from eomgen.describe.placement import TURNS, axis_columns, cosine_and_sine, rpy_rotation
+from eomgen.describe.placement import TURNS, axis_columns, rpy_rotation
 from eomgen.graph import Graph, evaluate
+from eomgen.rotations.scalars import cosine_and_sine
 
 Axis = tuple[float, float, float]
 UNITS = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}

@@ -145,7 +145,7 @@ def moved(case: Case, h: float) -> np.ndarray:
     """q after the time h at the velocities of the state."""
     module, q = case.module, np.array(case.x[: case.module.n_q])
     v = case.x[module.n_q :]
-    balls = [tuple(pair) for pair in module.metadata["balls"]]
+    balls = [tuple(pair) for pair in module.metadata["quaternion_slots"]]
     plain_q = [k for k in range(module.n_q) if not any(i <= k < i + 4 for i, _ in balls)]
     plain_v = [k for k in range(module.n_v) if not any(j <= k < j + 3 for _, j in balls)]
     q[plain_q] += h * v[plain_v]
@@ -218,7 +218,7 @@ def test_derivatives_are_differences(make: Callable[[str], Case], name: str) -> 
 def test_euler_parameters_are_projected_by_the_least_turn(make: Callable[[str], Case]) -> None:
     """The turn that closes the loop is along the gradient of the constraint, scaled by the size of the mechanism."""
     library, module, x = make("balls")
-    balls, n_q = module.metadata["balls"], module.n_q
+    balls, n_q = module.metadata["quaternion_slots"], module.n_q
     off = np.array(x)
     for k, (i, _) in enumerate(balls):
         turn = Rotation.from_rotvec([1e-4 * (k + 1), -2e-4, 1.5e-4])

@@ -31,6 +31,10 @@ FORCES = {
     "acos": ("acos(0.5*t)", lambda m, t: m.acos(m.mpf(0.5) * t)),
     "atan": ("atan(t*(1 + t))", lambda m, t: m.atan(t * (1 + t))),
     "atan2": ("atan2(sin(t), 2 + t)", lambda m, t: m.atan(m.sin(t) / (2 + t))),
+    "hypot": ("hypot(sin(t), 2 - t)", lambda m, t: m.hypot(m.sin(t), 2 - t)),
+    "hypot, one fixed": ("hypot(3, t)", lambda m, t: m.hypot(3, t)),
+    "asinh, atanh": ("asinh(2*t) - atanh(t/2)", lambda m, t: m.asinh(2 * t) - m.atanh(t / 2)),
+    "acosh": ("acosh(2 + t*t)", lambda m, t: m.acosh(2 + t * t)),
     "atan2, one fixed": ("atan2(1, 2 + t)", lambda m, t: m.atan(1 / (2 + t))),
 }  # fmt: skip
 NAMES = list(FORCES)

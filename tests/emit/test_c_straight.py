@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from eomgen.graph.core import Graph
-from eomgen.graph.evaluate import FUNCTIONS, evaluate
+from eomgen.graph.evaluate import evaluate
+from eomgen.operations import OPERATIONS
 from eomgen.program import KERNELS
 
 FIELDS = {
@@ -68,10 +69,8 @@ def every_operation(systems):
     """A system whose outputs are every operation of the graph on two coordinates."""
     g = Graph()
     x, y = g.symbol("x"), g.symbol("y")
-    names = sorted(set(FUNCTIONS) - {"select"})
-    binary = {"add", "sub", "mul", "div", "pow", "atan2", "min", "max", "lt", "le", "eq", "and", "or"}
-    arity = {n: 2 if n in binary else 1 for n in names}
-    results = [g.apply(n, *(x, y)[: arity[n]]) for n in names]
+    names = sorted(set(OPERATIONS) - {"select"})
+    results = [g.apply(n, *(x, y)[: OPERATIONS[n].arity]) for n in names]
     conditions = [g.apply(n, x, y) for n in ("lt", "le", "eq", "and", "or")] + [g.apply("not", x)]
     results += [g.apply("select", c, x + 1.0, y * 2.0) for c in conditions]
     results += [g.apply("and", conditions[0], conditions[1]) + conditions[1], g.apply("select", x, y, -x)]

@@ -11,6 +11,7 @@ import eomgen as eg
 
 EXPRESSIONS = {
     "atan2(a, b)": lambda a, b: math.atan2(a, b),
+    "hypot(a, 2*b)": lambda a, b: math.hypot(a, 2 * b),
     "where(a < b, a, 2*b)": lambda a, b: a if a < b else 2 * b,
     "where(a <= b and b > 0, 1, -1)": lambda a, b: 1.0 if a <= b and b > 0 else -1.0,
     "min(a, b) - 3*max(a, b)": lambda a, b: min(a, b) - 3 * max(a, b),

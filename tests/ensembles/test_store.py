@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.ensembles import blocks
+from eomgen.ensembles import run_blocks
 
 from .test_simulate_many import angles
 
@@ -18,7 +18,7 @@ def test_only_what_is_missing_is_run_again(pendulum: Any, tmp_path: Path, monkey
     whole = pendulum.simulate_many(1, angles(40))
     folder = tmp_path / "runs"
     begun: list[int] = []
-    run_block = blocks.run_block
+    run_block = run_blocks.run_block
 
     def stopping(module: Any, cases: Any, *rest: Any) -> Any:
         if len(begun) == 3:
@@ -26,7 +26,7 @@ def test_only_what_is_missing_is_run_again(pendulum: Any, tmp_path: Path, monkey
         begun.append(cases.count)
         return run_block(module, cases, *rest)
 
-    monkeypatch.setattr(blocks, "run_block", stopping)
+    monkeypatch.setattr(run_blocks, "run_block", stopping)
     with pytest.raises(KeyboardInterrupt):
         pendulum.simulate_many(1, angles(40), store=folder, block=8)
     assert len(list(folder.glob("block_*.npz"))) == 3
@@ -36,7 +36,7 @@ def test_only_what_is_missing_is_run_again(pendulum: Any, tmp_path: Path, monkey
     assert begun == [0, 8, 8]
     np.testing.assert_array_equal(resumed.x, whole.x)
     np.testing.assert_array_equal(resumed.steps, whole.steps)
-    monkeypatch.setattr(blocks, "run_block", None)  # nothing is left to do
+    monkeypatch.setattr(run_blocks, "run_block", None)  # nothing is left to do
     np.testing.assert_array_equal(pendulum.simulate_many(1, angles(40), store=folder, block=8).x, whole.x)
 
 

@@ -19,10 +19,10 @@ from eomgen.kinematics.mobility import judge
 
 def test_methods_import_only_what_they_may_share() -> None:
     folder = Path(eomgen.equations.__file__).parent
-    common = {"frames", "graph", "kinematics", "records", "equations"}  # .equations is the type they all return
+    common = {"frames", "graph", "kinematics", "records", "tree_equations"}  # the type they all return
     families = {  # related by what they are: the same energies, the same free bodies, the same M and h
-        "lagrange": {"energies"},
-        "hamilton": {"energies"},
+        "lagrange": {"analytical"},
+        "hamilton": {"analytical"},
         "newton_euler": {"free_bodies", "free_body_system"},
         "amalgamated": {"free_bodies", "free_body_system"},
         "augmented": {"", "armature"},

@@ -10,7 +10,7 @@ from eomgen.equations import METHODS, embedding
 from eomgen.graph import evaluate
 from eomgen.graph.core import Expr
 from eomgen.kinematics import Kinematics, analyse
-from eomgen.kinematics.turned import turn_links
+from eomgen.kinematics.link_axes import turn_links
 from eomgen.program.factor import factorize, solve
 
 
@@ -44,7 +44,7 @@ def values(kinematics: Kinematics) -> dict[str, float]:
     random = np.random.default_rng(11)
     names = [*kinematics.names, *kinematics.velocity_names, *(str(a.node[1]) for a in kinematics.a)]
     drawn = {name: float(random.uniform(-1, 1)) for name in names}
-    for first, _ in kinematics.balls:
+    for first, _ in kinematics.quaternion_slots:
         e = random.normal(size=4)
         drawn |= dict(zip(kinematics.names[first : first + 4], (e / np.linalg.norm(e)).tolist(), strict=True))
     return drawn | {"g": 9.81, "k": 30.0, "t": 0.0}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import eomgen as eg
-from eomgen.equations.slopes import ForceSlopes, can_differentiate
+from eomgen.equations.tree_slopes import ForceSlopes, can_differentiate
 from eomgen.graph import evaluate
 from eomgen.graph.differentiate import jacobian
 

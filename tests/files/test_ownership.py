@@ -14,7 +14,7 @@ from foreign import give_away
 
 from eomgen.errors import ToolchainError
 from eomgen.files import ownership
-from eomgen.files.entry import read_entry, read_manifest, sealed
+from eomgen.files.build_folder import read_entry, read_manifest, sealed
 from eomgen.files.kept import Kept
 from eomgen.files.ownership import make_private, read_trusted, require_trusted
 

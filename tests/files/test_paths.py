@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import eomgen as eg
-from eomgen.files.paths import as_name, as_path
+from eomgen.files.path_names import as_name, as_path
 from eomgen.files.reading import open_plain
 from eomgen.runtime.trajectory import load_trajectory
 from eomgen.solids.mesh import measure_mesh

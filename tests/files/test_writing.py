@@ -29,7 +29,7 @@ FULL = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # writing beyond the limit fails like a full disk
 from eomgen.cli.command import run_command
-import eomgen.cli.run, numpy, scipy.integrate, matplotlib.figure, matplotlib.backends.backend_agg
+import eomgen.cli.verb_run, numpy, scipy.integrate, matplotlib.figure, matplotlib.backends.backend_agg
 from eomgen.runtime.storage import save
 from eomgen.files import writing
 opened = writing.os.open

@@ -76,7 +76,7 @@ def test_libration_under_the_gravity_gradient() -> None:
 
 
 def bounce(e: float, v: float, formula: str, exponent: float) -> tuple[float, float]:
-    """Ball dropped at v onto a floor: velocity after, and the dissipation factor the model used."""
+    """QuaternionSlot dropped at v onto a floor: velocity after, and the dissipation factor the model used."""
     m = eg.Model("ball")
     body = m.body("ball", mass=0.7)
     m.prismatic("z", m.ground.at(0, 0, 0.1), body, axis="z")

@@ -15,7 +15,7 @@ from eomgen.graph import Expr, Graph, count, evaluate, gradient, jacobian, jvp, 
 from eomgen.graph.functions import Function
 from eomgen.graph.sympy_lower import LoweringError, lower
 from eomgen.graph.sympy_raise import raise_inline, raise_named
-from eomgen.numeric.functions import Twin, difference_step
+from eomgen.numeric.user_functions import Twin, difference_step
 
 TEXTS = [
     "f(x)",

@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline, PchipInterpolator, RectBivariateSpline
 
 import eomgen as eg
-from eomgen.numeric.functions import Curve, Surface
 from eomgen.numeric.splines import curve_coefficients, slopes, surface_nodes
+from eomgen.numeric.user_functions import Curve, Surface
 
 REFERENCES = {
     "cubic": lambda x, y: CubicSpline(x, y),

@@ -7,18 +7,25 @@ from hypothesis import strategies as st
 
 from eomgen.errors import UsageError
 from eomgen.graph import Graph, compile_evaluator, evaluate
+from eomgen.operations import OPERATIONS
 
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.5, 1e-320, 1e308, -1e308, 710.0, math.inf, -math.inf, math.nan)
 UNARY = {
     "neg": np.negative, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan,
     "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh,
-    "abs": np.abs, "sign": np.sign, "not": lambda a: 1.0 * (a == 0),
+    "asinh": np.arcsinh, "acosh": np.arccosh, "atanh": np.arctanh, "abs": np.abs, "sign": np.sign,
+    "not": lambda a: 1.0 * (a == 0),
 }  # fmt: skip
 BINARY = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "pow": np.power, "atan2": np.arctan2,
+    "hypot": np.hypot,
     "min": np.minimum, "max": np.maximum, "lt": np.less, "le": np.less_equal, "eq": np.equal,
     "and": np.logical_and, "or": np.logical_or,
 }  # fmt: skip
+
+
+def test_every_operation_has_its_judge():
+    assert {*UNARY, *BINARY, "select"} == set(OPERATIONS)
 
 
 @pytest.mark.parametrize("operation", [*UNARY, *BINARY])

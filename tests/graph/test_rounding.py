@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eomgen.graph.core import Expr, Graph, atan2, cos, sin, sqrt
-from eomgen.graph.rounding import settled_rotation, settled_vector, terms_of, vanishing, with_bounds
+from eomgen.graph.rounding_bounds import settled_rotation, settled_vector, terms_of, vanishing, with_bounds
 from eomgen.graph.vectors import product, transpose
 from eomgen.limits.rounding import EPS, ROUNDED
 

@@ -43,6 +43,7 @@ MATHEMATICS = frozenset(
         "acos",
         "atan",
         "atan2",
+        "hypot",
         "sinh",
         "cosh",
         "tanh",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from eomgen.describe.expressions import parse
-from eomgen.describe.names import FUNCTIONS, QUANTITIES
+from eomgen.describe.names import QUANTITIES, function_words
 from eomgen.errors import ExpressionError
 from eomgen.graph.core import Expr, Graph
 from eomgen.graph.differentiate import jacobian
@@ -53,7 +53,7 @@ WRAPS = (
     "diff(f({}), {})",
     "-{}",
 )
-CALLED = (*FUNCTIONS, *QUANTITIES, "f", "g", "foo", "open", "exec", "gamma", "Sum", "sympify")
+CALLED = (*function_words(), *QUANTITIES, "f", "g", "foo", "open", "exec", "gamma", "Sum", "sympify")
 MARKERS = ("rod", "rod.tip", "com", "ground", "rod.tip.x", "1", "a b", "")
 
 
@@ -117,7 +117,7 @@ def expression(r: random.Random, depth: int) -> str:
         name = r.choice(CALLED)
         if name in QUANTITIES and r.random() < 0.8:
             return f"{name}({r.choice(MARKERS)})"
-        least = FUNCTIONS.get(name, (1, 1))[0]
+        least = function_words().get(name, (1, 1))[0]
         count = least if r.random() < 0.93 else r.choice((0, 1, 2, 3, 65))
         if name == "diff" and r.random() < 0.7:
             return f"diff(f({inner()}), {r.choice((0, 1, 2, 3, 4, -1, 'a', 1.0, 'True', 10**30))})"

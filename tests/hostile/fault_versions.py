@@ -53,7 +53,7 @@ def other_versions(work: Work, fast: bool) -> Iterator[Result]:
 
 #: What a changed version has elsewhere: text -> text.
 SINE = "*sine = (pack)(", "*sine = -(pack)("
-PATTERN = "CONDITION_PATTERNS: dict", 'PATTERNS["sin"] = "(-np.sin({}))"\nCONDITION_PATTERNS: dict'
+PATTERN = 'c="sine_of({})"', 'c="sine_of({})", numpy="(-np.sin({}))"'
 
 
 class Version(NamedTuple):
@@ -76,7 +76,7 @@ class Version(NamedTuple):
 def copy_eomgen(folder: Path, changed: bool) -> Path:
     """A copy of eomgen that stands alone; a changed one has another version, and takes sines for their negatives.
 
-    In C a template does so, for NumPy the code that prints: what either made must never serve the other.
+    In C a template does so, for NumPy the table of operations: what either made must never serve the other.
     """
     root, package = TESTS.parent, folder / "eomgen"
     skipped = shutil.ignore_patterns("__pycache__")
@@ -86,7 +86,7 @@ def copy_eomgen(folder: Path, changed: bool) -> Path:
     if changed:
         _replace(package / "__init__.py", '__version__ = "', '__version__ = "9.')
         _replace(package / "templates" / "c" / "eomgen_sincos.h", *SINE)
-        _replace(package / "emit" / "numpy_text.py", *PATTERN)
+        _replace(package / "operations" / "table.py", *PATTERN)
     return folder
 
 

@@ -117,6 +117,7 @@ class Runner:
         try:
             given = kind.build(case)
         except (Exception, Hang):
+            self.warned.clear()  # by what the case is built of
             return Outcome("refused", "not built")
         self.warned.clear()
         signal.setitimer(signal.ITIMER_REAL, SECONDS, 1.0)  # again each second, in case a handler swallows it

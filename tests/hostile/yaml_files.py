@@ -15,7 +15,7 @@ from typing import Any
 from eomgen import Model
 from eomgen.cli.command import run_command
 from eomgen.describe import model_schema
-from eomgen.describe.build import build
+from eomgen.describe.build_mechanism import build
 from eomgen.describe.yaml_file import describe_yaml
 from eomgen.describe.yaml_nodes import Document
 from eomgen.errors import ModelError

@@ -18,11 +18,11 @@ from invariance.random_loops import FAMILIES, Loops, random_loops
 import eomgen as eg
 from eomgen.verification.variants import NotApplicable, Variant
 from eomgen.verification.variants.chains import chain
-from eomgen.verification.variants.closures import as_constraints, as_equations
 from eomgen.verification.variants.compare import states_of
 from eomgen.verification.variants.cuts import cut_another
 from eomgen.verification.variants.findings import all_at_once, original_of
-from eomgen.verification.variants.states import Original, compiled
+from eomgen.verification.variants.joints_as_constraints import as_constraints, as_equations
+from eomgen.verification.variants.probe_states import Original, compiled
 
 LIMIT = 1e-9  #: of accelerations, relative to the largest, times max(1, condition / 1000)
 FIRST = (None, cut_another, as_constraints, as_equations, chain)

@@ -18,8 +18,8 @@ from eomgen.verification import Finding
 from eomgen.verification.variants import CHANGES, Variant, variant_findings
 from eomgen.verification.variants.compare import compare
 from eomgen.verification.variants.findings import RUN, all_at_once, original_of
-from eomgen.verification.variants.runs import run_findings
-from eomgen.verification.variants.texts import scaled
+from eomgen.verification.variants.rewritten_texts import scaled
+from eomgen.verification.variants.short_runs import run_findings
 from eomgen.verification.variants.variant import drop
 from eomgen.verification.variants.visit import copied
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from eomgen.graph.core import Graph
 from eomgen.graph.differentiate import jvp
 from eomgen.graph.evaluate import evaluate
-from eomgen.joints.rotations import euler, euler_angles
+from eomgen.joints.rotation_coordinates import euler, euler_angles
 
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[1] not in (s[0], s[2])]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from eomgen.numeric import Scales, unpack_terms
-from eomgen.numeric.embedded import Residuals
+from eomgen.numeric.embedded import DynamicsSlopes
 
 HERE = Path(__file__).parent
 
@@ -45,7 +45,7 @@ def crank(models):
             x = np.concatenate([q, v, a, multipliers])
             flat = blocks["residual_jacobian"](t, x, u, c)
             parts = np.split(flat, np.cumsum([9, 9, 3 * m, 3 * m]))
-            return Residuals(*(part.reshape(-1, 3) for part in parts))
+            return DynamicsSlopes(*(part.reshape(-1, 3) for part in parts))
 
         return SimpleNamespace(
             p=SimpleNamespace(**p),

@@ -20,7 +20,7 @@ from eomgen.numeric import (
     rank,
     redundant_rows,
 )
-from eomgen.numeric.closure import Equations
+from eomgen.numeric.closure import WantedValues
 
 NAMES, LABELS = ["theta", "beta", "s"], ["C.x", "C.y", "C.x again"]
 REFERENCE = Path(__file__).parents[1] / "reference" / "slider_crank_kinematics.json"
@@ -82,7 +82,7 @@ def test_consistent_values_may_be_more_than_needed(crank):
 
 def test_functions_of_the_coordinates_reach_their_values(crank):
     c = crank()
-    equations = Equations(
+    equations = WantedValues(
         lambda q: (-q[1:2], np.array([[0.0, -1.0, 0.0]])), np.array([0.2 + 2 * np.pi]), np.ones(1), [True], ["psi"]
     )
     found = put_together(c, c.closed(0.1), equations=equations)
@@ -219,6 +219,6 @@ def test_rates_of_functions_that_change_by_themselves():
 
 
 def test_angles_to_be_reached_count_modulo_full_turns():
-    wanted = Equations(lambda q: (q, np.eye(2)), np.array([0.1, 0.1]), np.ones(2), [True, False], ["turn", "way"])
+    wanted = WantedValues(lambda q: (q, np.eye(2)), np.array([0.1, 0.1]), np.ones(2), [True, False], ["turn", "way"])
     assert wanted.difference(np.array([0.3 + 4 * np.pi, 6.4])) == pytest.approx([0.2, 6.3])
     assert wanted.difference(np.array([-3.2, -3.2])) == pytest.approx([2 * np.pi - 3.3, -3.3])

@@ -15,7 +15,7 @@ import sympy as sp
 import eomgen as eg
 from eomgen.errors import EomgenError, NonFiniteError, UnsolvedError
 from eomgen.numeric import algebra
-from eomgen.numeric.inertia import fault_of_inertia, longest_within
+from eomgen.numeric.rigid_inertia import fault_of_inertia, longest_within
 
 pytestmark = pytest.mark.filterwarnings("error")
 

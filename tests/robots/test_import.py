@@ -15,7 +15,8 @@ from jsonschema import Draft202012Validator
 import eomgen as eg
 from eomgen.describe import model_schema
 from eomgen.describe.yaml_nodes import Document
-from eomgen.robots.placement import about, placed, roll_pitch_yaw
+from eomgen.numeric.rotation_matrices import about, roll_pitch_yaw
+from eomgen.robots.robot_frames import placed
 
 ARM = Path(__file__).parents[2] / "examples" / "arm.urdf"
 

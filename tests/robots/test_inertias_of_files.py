@@ -19,7 +19,7 @@ from robots.pinocchio_judge import Judge
 from robots.shipped import EXAMPLES, urdf_robots
 
 import eomgen as eg
-from eomgen.numeric.inertia import COMPUTED, fault_of_inertia, inertia_scales, longest_within
+from eomgen.numeric.rigid_inertia import COMPUTED, fault_of_inertia, inertia_scales, longest_within
 
 LINK = """<link name="{name}"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
 <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""

@@ -106,7 +106,7 @@ def test_every_operation_means_the_same_on_a_tape(cart: Any) -> None:
     text = (
         "sqrt(1 + t) + exp(-t) + log(2 + t) + sin(t)*cos(t) + tan(t/2) + asin(t/3) + acos(t/3) + atan(t) + sinh(t) "
         "+ cosh(t) + tanh(t) + asinh(t) + acosh(1 + t) + atanh(t/3) "
-        "+ atan2(t, 2) + abs(t - 1) + sign(t - 1) + min(t, 1, 2*t) + max(t, 1) + (t < 1) "
+        "+ atan2(t, 2) + hypot(t, 2) + abs(t - 1) + sign(t - 1) + min(t, 1, 2*t) + max(t, 1) + (t < 1) "
         "+ (t <= 1) + (t == 1) + (t != 1) + (not t) + (t > 1 and t < 1.5 or t > 1.7) + (3 if t > 0.5 else 2) "
         "+ t**3 - -t + t**2.5 / 7"
     )

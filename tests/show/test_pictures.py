@@ -140,8 +140,8 @@ def test_pitch_circles_touch() -> None:
 
 
 def test_bad_input_is_refused_by_name(module: Any) -> None:
-    with pytest.raises(UsageError, match=r"shape \(3,\); give a state"):
-        module.draw(np.zeros(3))
+    with pytest.raises(UsageError, match=r"shape \(5,\); give a state"):
+        module.draw(np.zeros(5))
     with pytest.raises(UsageError, match="theta_1"):
         module.draw({"theta_1": 0.2})
     with pytest.raises(UsageError, match="not finite"):

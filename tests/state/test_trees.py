@@ -45,7 +45,7 @@ def seeds_with_balls(count: int, **options: Any) -> list[int]:
         made = random_mechanism(
             seed, bodies=1 + seed % 5, forces=False, types=tuple(STEPS), rotation="euler_parameters", **options
         )
-        if any(spec.joint.balls for spec in made.mechanism.joints):
+        if any(spec.joint.quaternion_slots for spec in made.mechanism.joints):
             found.append(seed)
         if len(found) == count:
             return found

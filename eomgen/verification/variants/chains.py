@@ -6,16 +6,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from .pieces import frame_on, frames_of
-from .texts import scaled
+from .rewritten_texts import scaled
 from .variant import NotApplicable, References, Variant, coordinates_of
 from .visit import bodies_of, copied
 
 _SLIDES = tuple(("prismatic", axis) for axis in "xyz")
 
 
-def links_of(entry: Entry) -> Sequence[tuple[str, str]] | None:
+def links_of(entry: DescribedEntry) -> Sequence[tuple[str, str]] | None:
     """Type and axis of the simple joints, one for each coordinate in order; None if there is no such chain."""
     kind, values = entry.values["type"], entry.values
     turns = tuple(("revolute", axis) for axis in values.get("sequence", "xyz"))
@@ -34,7 +34,7 @@ def chain(description: Description, random: Any) -> Variant:
     """Every spherical, free, cylindrical, universal and planar joint as a chain; its coordinates keep their names."""
     made = copied(description)
     names, keys = coordinates_of(description), References(description).keys
-    joints: list[Entry] = []
+    joints: list[DescribedEntry] = []
     gone: dict[str, str] = {}
     for entry in made.sections["joints"]:
         links = links_of(entry)
@@ -49,7 +49,7 @@ def chain(description: Description, random: Any) -> Variant:
             if not end:
                 made.add("bodies", f"{entry.name}_part_{k}", {"mass": 0, "markers": {}})
             values = {"type": kind, "between": between, "axis": axis, "coordinate": name}
-            joints.append(Entry(f"{entry.name}_link_{k}", values, f"joints.{entry.name}_link_{k}"))
+            joints.append(DescribedEntry(f"{entry.name}_link_{k}", values, f"joints.{entry.name}_link_{k}"))
             first = frame_on(f"{entry.name}_part_{k}")
     if not gone:
         raise NotApplicable("there is no joint of several degrees that a chain could stand for")

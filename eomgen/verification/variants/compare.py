@@ -11,8 +11,8 @@ from ...kinematics.idle_rows import IDLE
 from ...limits.rounding import EPS
 from ..comparison import NO_LIMIT
 from ..finding import Finding
-from .states import ROUNDINGS, Original, compiled, reactions_of
-from .texts import names_of
+from .probe_states import ROUNDINGS, Original, compiled, reactions_of
+from .rewritten_texts import names_of
 from .variant import NotApplicable, Variant
 
 #: Names whose constant is free: it changes where ground is shifted.

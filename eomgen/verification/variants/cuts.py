@@ -9,7 +9,7 @@ from typing import Any
 
 from ...describe.description import Description
 from ...joints import JOINTS
-from .texts import rewritten
+from .rewritten_texts import rewritten
 from .variant import NotApplicable, Variant, coordinates_of, sketch_of
 from .visit import Slot, Visitor, visit
 

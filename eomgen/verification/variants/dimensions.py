@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .variant import NotApplicable, Scales
+from .variant import NotApplicable, UnitScales
 from .visit import Slot
 
 
@@ -19,7 +19,7 @@ class Dimension(NamedTuple):
     mass: float = 0
     time: float = 0
 
-    def of(self, scales: Scales) -> float:
+    def of(self, scales: UnitScales) -> float:
         """Units of a variant in one SI unit."""
         return float(scales.length**self.length * scales.mass**self.mass * scales.time**self.time)
 

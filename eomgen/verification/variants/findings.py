@@ -12,20 +12,20 @@ from ...describe.builder import Builder
 from ...describe.description import Description
 from ...errors import EomgenError
 from ..finding import NOT_REACHED, Finding
-from .calls import CALLS
+from .body_frames import turn_bodies, turn_ground
 from .chains import chain, split
-from .closures import as_constraints, as_equations
 from .compare import compare, refused
 from .cuts import cut_another
-from .frames import turn_bodies, turn_ground
-from .names import rename, reorder
+from .joints_as_constraints import as_constraints, as_equations
+from .other_calls import CALLS
+from .other_rotations import redescribe
+from .other_units import in_units
 from .plain import plain
+from .probe_states import Original, observe
 from .probes import with_probes
-from .rotations import redescribe
-from .runs import run_findings
-from .states import Original, observe
+from .renamed import rename, reorder
+from .short_runs import run_findings
 from .swaps import swap
-from .units import in_units
 from .variant import NotApplicable, Variant
 
 Change = Callable[[Description, Any], Variant]

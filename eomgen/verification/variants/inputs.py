@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
-from .states import Original, compiled
-from .texts import number_of
+from .probe_states import Original, compiled
+from .rewritten_texts import number_of
 from .variant import Variant
 from .visit import copied
 
@@ -21,11 +22,10 @@ if TYPE_CHECKING:
     from ...describe.builder import Builder
 
 #: Tolerances of the runs, and what two runs with them may differ by, relative to the size of the state.
-RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
 SLOPE = 0.3
 
 
-class Line(NamedTuple):
+class LineOverTime(NamedTuple):
     """A straight line over time: a Python function of time and state that knows its rates."""
 
     start: float
@@ -35,9 +35,9 @@ class Line(NamedTuple):
         """The value at time t (s)."""
         return self.start + self.slope * t
 
-    def derivative(self) -> Line:
+    def derivative(self) -> LineOverTime:
         """Its rate, as a function too."""
-        return Line(self.slope, 0.0)
+        return LineOverTime(self.slope, 0.0)
 
 
 def input_findings(check: str, model: Builder, original: Original, random: Any) -> Finding:
@@ -55,7 +55,7 @@ def input_findings(check: str, model: Builder, original: Original, random: Any) 
     slope = {name: SLOPE * (abs(value) + 1.0) for name, value in start.items()}
     x, times = original.states[:, 0], np.linspace(0.0, end, 5)
 
-    course = {name: Line(start[name], slope[name]) for name in start}
+    course = {name: LineOverTime(start[name], slope[name]) for name in start}
     table = {name: (times, start[name] + slope[name] * times) for name in start}
     runs = {
         "function": simulate(original.module, (0.0, end), x, inputs=course, t_eval=times, rtol=RTOL, atol=ATOL),

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from ...describe.placement import TURNS, axis_columns
-from .frames import values_of
-from .texts import number_of
-from .turns import rpy_of, turn_of
+from ...numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
+from .body_frames import values_of
+from .rewritten_texts import number_of
 
 Frame = dict[str, Any]
 
 
-def frames_of(description: Description, entry: Entry) -> tuple[Frame, Frame]:
+def frames_of(description: Description, entry: DescribedEntry) -> tuple[Frame, Frame]:
     """The markers of a joint, its axis as their z axis; each a mapping of body, at, rpy."""
     parameters = values_of(description)
     axis = entry.values.get("axis", "z")
@@ -40,7 +40,8 @@ def _frame(description: Description, reference: Any, turn: Any, parameters: Mapp
     else:
         body, placed = reference["body"], reference
     angles = [number_of(x, parameters) for x in placed.get("rpy", (0, 0, 0))]
-    return {"body": body, "at": list(placed.get("at", (0, 0, 0))), "rpy": rpy_of(turn_of(angles) @ turn)}
+    rpy = roll_pitch_yaw(from_roll_pitch_yaw(angles) @ turn)
+    return {"body": body, "at": list(placed.get("at", (0, 0, 0))), "rpy": [float(x) for x in rpy]}
 
 
 def frame_on(body: str) -> Frame:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...describe.builder import Builder
-from ...describe.description import GROUND_NAME, Description, Entry
+from ...describe.description import GROUND_NAME, DescribedEntry, Description
 from ...describe.write_yaml import yaml_text
 from ...describe.yaml_file import describe_yaml
 from .visit import Visitor, visit
@@ -50,7 +50,7 @@ def plain(model: Builder | Description) -> Description:
     return result
 
 
-def _write_placements(entry: Entry) -> None:
+def _write_placements(entry: DescribedEntry) -> None:
     """Markers as mappings of at and rpy; solids and points with their place."""
     markers = entry.values.get("markers", {})
     entry.values["markers"] = {

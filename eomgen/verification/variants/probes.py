@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...describe.description import Description
-from .texts import is_zero
+from .rewritten_texts import is_zero
 from .variant import kinds_of, velocities_of
 from .visit import bodies_of, copied
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...describe.description import Description, Entry
-from .texts import negative, rewritten
+from ...describe.description import DescribedEntry, Description
+from .rewritten_texts import negative, rewritten
 from .variant import NotApplicable, Variant, coordinates_of
 from .visit import Slot, Visitor, copied, visit
 
@@ -55,7 +55,7 @@ def swap(description: Description, random: Any) -> Variant:
     )
 
 
-def _can(entry: Entry) -> bool:
+def _can(entry: DescribedEntry) -> bool:
     values = entry.values
     return values["type"] in TYPES and values.get("rotation", "euler_angles") == "euler_angles"
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from ...describe.build_cam_points import needs_point
 from ...describe.build_joints import coordinate_names
-from ...describe.description import Description, Entry
+from ...describe.description import DescribedEntry, Description
 from ...joints import JOINTS
 from ...records import dataclass
-from .texts import names_of
+from .rewritten_texts import names_of
 from .visit import Slot, Visitor, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
@@ -33,7 +33,7 @@ def unchanged(values: Mapping[str, float]) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Scales:
+class UnitScales:
     """Units of a variant: how many of its units one SI unit is."""
 
     length: float = 1.0
@@ -59,7 +59,7 @@ class Variant:
         Name in the original -> name here, where they differ; joints that are no longer there are mapped to "".
     turn : (3, 3) array
         Takes ground axes of the original to those here.
-    scales : Scales
+    scales : UnitScales
         Units here.
     """
 
@@ -71,7 +71,7 @@ class Variant:
     joints: Mapping[str, str] = field(default_factory=dict)
     events: Mapping[str, str] = field(default_factory=dict)
     turn: Any = None
-    scales: Scales = Scales()
+    scales: UnitScales = UnitScales()
 
     def then(self, change: Callable[[Description, Any], Variant], random: Any) -> Variant:
         """This variant, changed once more."""
@@ -91,7 +91,7 @@ class Variant:
             joints=_chained(self.joints, next_one.joints),
             events=_chained(self.events, next_one.events),
             turn=second @ first,
-            scales=Scales(a.length * b.length, a.mass * b.mass, a.time * b.time),
+            scales=UnitScales(a.length * b.length, a.mass * b.mass, a.time * b.time),
         )
 
 
@@ -182,6 +182,6 @@ def drop(description: Description, names: Iterable[str]) -> None:
     values["independent"] = [name for name in values.get("independent", ()) if name not in gone]
 
 
-def entry_of(description: Description, section: str, name: str) -> Entry:
+def entry_of(description: Description, section: str, name: str) -> DescribedEntry:
     """The entry of a name."""
     return next(entry for entry in description.sections[section] if entry.name == name)

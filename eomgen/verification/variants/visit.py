@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ...constraints import CONSTRAINTS
-from ...describe.description import GROUND_NAME, Description, Entry
+from ...describe.description import GROUND_NAME, DescribedEntry, Description
 from ...describe.fields import (
     BODY,
     EQUATIONS,
@@ -30,7 +30,7 @@ class Slot(NamedTuple):
     type: str
     key: str
     place: tuple[Any, ...] = ()
-    entry: Entry | None = None
+    entry: DescribedEntry | None = None
 
     def at(self, *index: Any) -> Slot:
         """A place within this one."""
@@ -113,10 +113,10 @@ def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
     return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 
-def _entry(section: str, entry: Entry, visitor: Visitor) -> Entry:
+def _entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:
     slot = Slot(section, str(entry.values.get("type", "")), "", (), entry)
     values = _values(entry.values, fields_of(section, entry.values), slot, visitor)
-    return Entry(entry.name, values, entry.path, entry.trusted, entry.folder)
+    return DescribedEntry(entry.name, values, entry.path, entry.trusted, entry.folder)
 
 
 def _values(values: Mapping[str, Any], fields: Fields, slot: Slot, visitor: Visitor) -> dict[str, Any]:
@@ -178,6 +178,6 @@ def _part(value: Any, kind: str, slot: Slot, body: str, visitor: Visitor) -> Any
     return result
 
 
-def bodies_of(description: Description) -> list[Entry]:
+def bodies_of(description: Description) -> list[DescribedEntry]:
     """Entries of bodies, ground aside."""
     return [entry for entry in description.sections["bodies"] if entry.name != GROUND_NAME]

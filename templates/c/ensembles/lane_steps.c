@@ -137,7 +137,7 @@ static EOMGEN_APART void begin_lanes(const eomgen_ensemble *e, const lane_method
     const flag chosen = begins & ~given & ~simple;
     run->size = choose(simple, length, run->size);
     const real d0 = lane_norm(run, run->y, NULL), d1 = lane_norm(run, run->f, NULL);
-    real h0 = choose((d0 < 1e-5) | (d1 < 1e-5), same(1e-6), 0.01 * d0 / d1);
+    real h0 = choose((d0 < RUNS_UNKNOWN) | (d1 < RUNS_UNKNOWN), same(RUNS_FIRST), 0.01 * d0 / d1);
     h0 = choose(chosen, choose(h0 < length, h0, length), same(0.0));
     for (int i = 0; i < n; i++) {
         y1[i] = run->y[i] + h0 * direction * run->f[i];
@@ -148,8 +148,9 @@ static EOMGEN_APART void begin_lanes(const eomgen_ensemble *e, const lane_method
     const real d2 = lane_norm(run, f1, run->f) / h0, d = choose(d1 >= d2, d1, d2);
     for (int l = 0; l < W; l++) {
         if (chosen[l]) {
-            const double h1 = d1[l] <= 1e-15 && d2[l] <= 1e-15 ? fmax(1e-6, h0[l] * 1e-3)
-                                                               : pow(0.01 / d[l], 1.0 / (method->error_order + 1));
+            const double h1 = d1[l] <= RUNS_STRAIGHT && d2[l] <= RUNS_STRAIGHT
+                                  ? fmax(RUNS_FIRST, h0[l] * RUNS_GROWTH)
+                                  : pow(0.01 / d[l], 1.0 / (method->error_order + 1));
             run->size[l] = fmin(fmin(100.0 * h0[l], h1), fmin(length[l], e->max_step));
         }
     }

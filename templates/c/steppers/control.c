@@ -58,7 +58,7 @@ static double first_step(const eomgen_method *method, eomgen_run *run)
         return length;
     }
     const double d0 = stepper_norm(run->y, NULL, run), d1 = stepper_norm(run->f, NULL, run);
-    double h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    double h0 = d0 < RUNS_UNKNOWN || d1 < RUNS_UNKNOWN ? RUNS_FIRST : 0.01 * d0 / d1;
     h0 = h0 < length ? h0 : length;
     double *const y1 = run->K, *const f1 = run->K + run->n;
     for (int i = 0; i < run->n; i++) {
@@ -66,8 +66,9 @@ static double first_step(const eomgen_method *method, eomgen_run *run)
     }
     eomgen_evaluate(run, run->t + h0 * run->direction, y1, f1);
     const double d2 = stepper_norm(f1, run->f, run) / h0, d = d1 > d2 ? d1 : d2;
-    const double h1 = d1 <= 1e-15 && d2 <= 1e-15 ? fmax(1e-6, h0 * 1e-3)
-                                                 : pow(0.01 / d, 1.0 / (method->error_order + 1));
+    const double h1 = d1 <= RUNS_STRAIGHT && d2 <= RUNS_STRAIGHT
+                          ? fmax(RUNS_FIRST, h0 * RUNS_GROWTH)
+                          : pow(0.01 / d, 1.0 / (method->error_order + 1));
     return fmin(fmin(100.0 * h0, h1), fmin(length, run->max_step));
 }
 
@@ -100,7 +101,7 @@ static double least_step(const eomgen_run *run)
 
 static int too_small(const eomgen_run *run, double h)
 {
-    return !(h >= 2.5e-15 * fabs(run->t) + 1e-300) && !(h >= least_step(run)); /* nextafter takes its time */
+    return !(h >= RUNS_FINE * fabs(run->t) + ROUNDING_TINY) && !(h >= least_step(run)); /* nextafter takes its time */
 }
 
 int eomgen_step(const eomgen_method *method, eomgen_run *run)
@@ -129,7 +130,7 @@ int eomgen_step(const eomgen_method *method, eomgen_run *run)
             return run->stopped ? EOMGEN_STOPPED : EOMGEN_STEP_TOO_SMALL;
         }
         double t_new = run->t + h_abs * run->direction;
-        const double slack = method->fixed ? -1e-9 * h_abs : 0.0; /* no step for what rounding left over */
+        const double slack = method->fixed ? -RUNS_SAME * h_abs : 0.0; /* no step for what rounding left over */
         if (run->direction * (t_new - run->t_bound) > slack) {
             t_new = run->t_bound;
         }

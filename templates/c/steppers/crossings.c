@@ -1,5 +1,5 @@
 /* Where values change sign within a step: between its ends, after a reset, and where they come to zero and leave again.
-   Python's loop does the same: simulation/crossings.py. */
+   Python's loop does the same: simulation/event_crossings.py. */
 #include <math.h>
 #include <string.h>
 

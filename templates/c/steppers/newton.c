@@ -61,7 +61,7 @@ int eomgen_differentiate(eomgen_run *run, double t, const double *y, const doubl
     }
     double *const moved = spare, *const change = spare + n;
     for (int k = 0; feedback && k < n; k++) { /* x' at inputs of a state moved a little, all else where it is */
-        const double step = 1.5e-8 * fmax(fabs(y[k]), 1e-3);
+        const double step = RUNS_SLOPE * fmax(fabs(y[k]), RUNS_SIZE);
         memcpy(moved, y, (size_t)n * sizeof(double));
         moved[k] += step;
         eomgen_force(run, t, moved);

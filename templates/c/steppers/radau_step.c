@@ -118,7 +118,7 @@ static int radau_step(eomgen_run *run)
         }
         const double h = t_new - run->t;
         h_abs = fabs(h);
-        if (!(fabs(h - a->state[RADAU_H_FACTORED]) <= 1e-9 * h_abs)) {
+        if (!(fabs(h - a->state[RADAU_H_FACTORED]) <= RUNS_SAME * h_abs)) {
             a->state[RADAU_FACTORED] = 0.0;
         }
         if (!radau_converge(run, a, h, &iterations, &rate)) {
@@ -138,7 +138,7 @@ static int radau_step(eomgen_run *run)
             run->rejected++;
             continue;
         }
-        const int renew = iterations > 2 && rate > 1e-3;
+        const int renew = iterations > 2 && rate > RUNS_SLOW;
         factor = fmin(10.0, factor);
         if (!renew && factor < 1.2) {
             factor = 1.0;

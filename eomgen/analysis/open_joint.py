@@ -1,0 +1,63 @@
+"""Analysis: a place that cannot be reached -> which joint stays open there, and by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..limits.constraints import CONTRADICTION
+from ..numeric.closure import ClosureSystem, WantedValues, close
+from ..numeric.scales import Array
+from .driven_coordinates import DrivenCoordinates
+
+
+def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> str:
+    """The largest gap that is left when all equations are met as well as they can be.
+
+    Parameters
+    ----------
+    driven : DrivenCoordinates
+    t : float
+    y : (n_led,) array
+        Values of the led coordinates.
+    near : (n_q,) array
+        A closed position beside it.
+    """
+    layout, scales = driven.layout, driven.scales
+    start, free = np.array(near), np.ones(layout.n_v)
+    for name, tree, column, value in zip(driven.led, driven.in_tree, driven.columns, y, strict=True):
+        if tree:  # held exactly, so that the gap opens at a joint
+            start[layout.q.index(name)] = value
+            free[column] = 0.0
+    loops = [k for k, tree in enumerate(driven.in_tree) if not tree]
+    sizes = driven.led_scales[loops]
+
+    def led(q: Array) -> tuple[Array, Array]:
+        rows = driven.matrix(q, t)[layout.n_c :][loops] / scales.q * sizes[:, None]
+        return driven.led_values(q, t)[loops], rows
+
+    def position(q: Array) -> tuple[Array, Array]:
+        return driven.closure(q, t)
+
+    names = [driven.led[k] for k in loops]
+    equations = WantedValues(led, y[loops], sizes, driven.wraps[loops].tolist(), names) if loops else None
+    with np.errstate(all="ignore"):
+        q, _ = close(ClosureSystem(position, scales, free, equations), start)
+    C = position(q)[0]
+    if not C.size:
+        return "beyond, nothing is open"
+    gaps = np.abs(scales.residual(C))
+    undefined = ~np.isfinite(position(np.array(near))[0])  # whatever the position, by the time
+    if undefined.any():
+        owners = dict.fromkeys(layout.constraint_labels[i].partition(".")[0] for i in np.flatnonzero(undefined))
+        what = "no finite value: look for a root or logarithm of a negative number, or a division by zero"
+        return f"beyond, at t = {t:.6g} s, {', '.join(owners)} has {what}"
+    place = ", ".join(f"{n} = {v:.6g}" for n, v in zip(driven.led, y, strict=True)) or f"t = {t:.6g} s"
+    if not gaps.max() > CONTRADICTION:
+        return f"beyond, at {place}, it closes again: a driver's value jumps there, or it is out of reach in between"
+    joints = [k for k, label in enumerate(layout.constraint_labels[: len(C)]) if not label.endswith(".motion")]
+    if joints and gaps[joints].max() > CONTRADICTION:  # rather than the driver
+        worst = joints[int(np.argmax(gaps[joints]))]
+    else:
+        worst = int(np.argmax(gaps))
+    unit = "m" if layout.metadata["constraint_kinds"][worst] == "length" else "rad"
+    return f"beyond, at {place}, {layout.constraint_labels[worst]} stays open by {abs(C[worst]):.3g} {unit}"

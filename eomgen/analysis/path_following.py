@@ -1,0 +1,174 @@
+"""Analysis: driven coordinates and a path (t, y)(s) -> closed positions along it, without ever leaving the branch.
+
+Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
+and 6).  A step counts only if position and direction come out near to what the points before foretold: near a singular
+position another branch is near too, but runs in another direction.  A singular position itself is leapt over, to the
+point behind it that continues the motion smoothly, if there is one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..limits.motions import BLOCKED, LEAPS, UNJUDGED
+from ..numeric.projection import largest
+from ..numeric.scales import Array
+from .driven_coordinates import DrivenCoordinates, Tangent
+
+FIRST = 0.1  #: scaled motion in the first step
+LONG = 0.35  #: scaled motion aimed at in one step
+JUMP = 0.5  #: largest scaled motion in one step
+OFF = 0.1  #: largest part of a step by which a position may miss its prediction
+TURNED = 0.3  #: the same of a direction
+FEWEST = 50  #: steps of a continuation
+STEPS = 200_000  #: of one continuation
+
+
+class Point(NamedTuple):
+    """One point of a continuation; s is the path's parameter."""
+
+    s: float
+    q: Array
+    tangent: Tangent  #: along s
+
+
+class StraightPath(NamedTuple):
+    """A straight path: t and the led values are linear in s."""
+
+    t: float
+    y: Array
+    t1: float  #: dt/ds
+    y1: Array  #: dy/ds
+
+    def at(self, s: float) -> tuple[float, Array]:
+        """Time and led values."""
+        return self.t + s * self.t1, self.y + s * self.y1
+
+
+class Continuation:
+    """Walks along one straight path.
+
+    Parameters
+    ----------
+    driven : DrivenCoordinates
+    path : StraightPath
+    start : (n_q,) array
+        Closed position at s = 0.
+    extent : float, optional
+        Length in s of the whole range that the path is a piece of: the pieces of a range to and fro need no shorter
+        steps than one way over all of it.
+    """
+
+    def __init__(self, driven: DrivenCoordinates, path: StraightPath, start: Array, extent: float = 0.0) -> None:
+        self.driven, self.path, self.extent = driven, path, extent
+        self.points = [Point(0.0, start, self.tangent(0.0, start))]
+        self.leaps: list[tuple[Point, Point]] = []
+        rate = largest(self.points[0].tangent.rate / driven.scales.q)
+        self.step = FIRST / rate if rate > 0.0 else 1.0
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position of the path."""
+        return self.driven.tangent(self.path.at(s)[0], q, self.path.t1, self.path.y1)
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess."""
+        q = self.driven.position(*self.path.at(s), guess)
+        return None if q is None else Point(s, q, self.tangent(s, q))
+
+    def to(self, end: float, known: float = 0.0) -> bool:
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
+
+        Up to s = ``known`` the way was walked before and is smooth, so that only the motion limits the steps.
+        """
+        for _ in range(STEPS):
+            here = self.points[-1]
+            left = end - here.s
+            if left <= 0.0:
+                return True
+            # however still it stands: a pulse must not be stepped over
+            longest = max(end / FEWEST, self.extent / FEWEST, known - here.s)
+            rate = largest(here.tangent.rate / self.driven.scales.q)
+            self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
+            h = left if self.step >= left else min(self.step, 0.5 * left)
+            found = self.forward(here, h, end if h == left else here.s + h)
+            if found is None:
+                self.step = 0.5 * h
+                if self.step > BLOCKED * max(1.0, abs(here.s)):
+                    continue
+                found = self.leap(here)
+                if found is None:
+                    return False
+                self.leaps.append((here, found))
+                self.step = found.s - here.s
+            self.points.append(found)
+        return False
+
+    def forward(self, here: Point, h: float, s: float) -> Point | None:
+        """One step, None if it fails or is not a smooth continuation."""
+        scales = self.driven.scales
+        bend = self._bend(here)
+        ahead = self._predict(here, bend, h)
+        if largest(scales.distance(ahead, here.q)) > JUMP:
+            return None
+        found = self.solve(s, ahead)
+        if found is None:
+            return None
+        off = largest(scales.distance(found.q, ahead))
+        move = largest(scales.distance(found.q, here.q))
+        turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / scales.q)
+        if not (off <= max(OFF * move, UNJUDGED) and turned <= max(TURNED * move, UNJUDGED) and move <= JUMP):
+            return None
+        worst = max(off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED))
+        if h >= 0.999 * self.step:
+            self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
+        return found
+
+    def _bend(self, here: Point) -> Array:
+        """Second derivative along s, from the point before."""
+        if len(self.points) < 2 or self.points[-2].s >= here.s:
+            return np.zeros_like(here.tangent.rate)
+        before = self.points[-2]
+        return (here.tangent.rate - before.tangent.rate) / (here.s - before.s)
+
+    def _predict(self, here: Point, bend: Array, h: float) -> Array:
+        scales = self.driven.scales
+        return scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / scales.q)
+
+    def leap(self, here: Point) -> Point | None:
+        """A point behind a singular position that continues the motion smoothly; None if there is none."""
+        scales = self.driven.scales
+        for size in LEAPS:
+            near = self._behind(here, size)
+            if near is None:
+                continue
+            rate = largest(near.tangent.rate / scales.q)
+            gap = here.s - near.s
+            s = here.s + gap
+            other = self._behind(here, 2.0 * size)
+            bend = np.zeros_like(near.tangent.rate)
+            if other is not None and near.s > other.s:
+                bend = (near.tangent.rate - other.tangent.rate) / (near.s - other.s)
+            ahead = self._predict(near, bend, 2.0 * gap)
+            found = self.solve(s, ahead)
+            if found is None or rate == 0.0:
+                continue
+            move = largest(scales.distance(found.q, near.q))
+            off = largest(scales.distance(found.q, ahead))
+            turned = 2.0 * gap * largest((found.tangent.rate - near.tangent.rate - 2.0 * gap * bend) / scales.q)
+            if off <= OFF * move and turned <= TURNED * move and move <= 10.0 * size:
+                return found
+        return None
+
+    def _behind(self, here: Point, size: float) -> Point | None:
+        """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
+        scales = self.driven.scales
+        for point in reversed(self.points):
+            distance = largest(scales.distance(here.q, point.q))
+            if distance >= size:
+                part = size / distance
+                s = here.s - part * (here.s - point.s)
+                guess = scales.move(here.q, part * scales.distance(point.q, here.q))
+                return self.solve(s, guess) or point
+        return None

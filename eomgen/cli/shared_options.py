@@ -1,0 +1,314 @@
+"""Stage cli, options: what several verbs accept -> checked values."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import ModelError, UsageError
+from ..files.reading import kind_of
+from ..files.writing import refuse_link
+from ..targets import TARGETS
+
+if TYPE_CHECKING:
+    from ..api.model import Model
+
+model_argument = click.argument("model", metavar="MODEL", type=click.Path(path_type=Path))
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+method_option = click.option(
+    "--method",
+    default="auto",
+    show_default=True,
+    metavar="M",
+    help="Method of derivation: auto, embedding, lagrange, recursive, augmented, newton_euler, amalgamated, "
+    "gibbs_appell, hamilton (for the integrator see --solver of run).",
+)
+
+
+def _pair(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    try:
+        alpha, beta = (float(word) for word in value.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not two numbers ALPHA,BETA") from None
+    return alpha, beta
+
+
+baumgarte_option = click.option(
+    "--baumgarte",
+    metavar="ALPHA,BETA",
+    callback=_pair,
+    help="With --method augmented: hold constraints by C'' + 2 ALPHA C' + BETA^2 C = 0 (1/s), without projection.",
+)
+
+
+def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The integrator of a name, in whatever letters, before the work begins."""
+    if value is None:
+        return None
+    from ..describe.fields import SOLVERS
+
+    for solver in SOLVERS:
+        if solver.lower() == value.lower():
+            return solver
+    raise click.BadParameter(f"no integrator {value!r}; there are {', '.join(SOLVERS)} (derivation: --method)")
+
+
+_TOLERANCE = click.FloatRange(min=0, min_open=True)
+_SOLVER = (
+    click.option(
+        "--solver",
+        metavar="NAME",
+        callback=_find_solver,
+        help="Integrator: DOP853, RK45, RK23, Radau, Taylor, BDF, LSODA, or RK4 with --step.",
+    ),
+    click.option("--step", type=_TOLERANCE, metavar="H", help="Size of the steps of RK4 in s."),
+    click.option("--rtol", type=_TOLERANCE, metavar="X", help="Relative tolerance of the integrator."),
+    click.option("--atol", type=_TOLERANCE, metavar="X", help="Absolute tolerance of the integrator."),
+)
+
+
+def solver_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """``--solver``, ``--step``, ``--rtol`` and ``--atol``, for ``simulate`` in one mapping ``solver``."""
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        names = {"solver": "method", "step": "step", "rtol": "rtol", "atol": "atol"}
+        given = {name: value for key, name in names.items() if (value := kwargs.pop(key)) is not None}
+        return verb(*args, solver=given, **kwargs)
+
+    for option in reversed(_SOLVER):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """``--target`` with these choices."""
+    return click.option(
+        "--target",
+        type=click.Choice(list(targets)),
+        default="cython",
+        show_default=True,
+        help="; ".join(f"{target}: {TARGETS[target].about}" for target in targets) + ".",
+    )
+
+
+def _split(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
+
+
+independent_option = click.option(
+    "--independent",
+    multiple=True,
+    callback=_split,
+    metavar="NAME",
+    help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
+)
+
+
+native_option = click.option(
+    "--allow-native",
+    is_flag=True,
+    help="Compile and run the C (and Python) files that the model's native functions name; only for models you trust.",
+)
+
+
+@contextmanager
+def blaming_option(independent: tuple[str, ...]) -> Iterator[None]:
+    """Turn a complaint about ``--independent`` into a UsageError: the model file is not at fault."""
+    try:
+        yield
+    except ModelError as error:
+        if independent and all(p.path.startswith("independent") for p in error.problems):
+            raise UsageError(
+                "\n".join(str(p._replace(file="", path="--independent")) for p in error.problems)
+            ) from None
+        raise
+
+
+_MIMIC, _ROTATIONS = ("independent", "coupling"), ("euler_angles", "euler_parameters")
+_ROBOT = (
+    click.option("--floating", is_flag=True, help="Robots (URDF): the base moves freely."),
+    click.option("--lock", multiple=True, metavar="JOINT[=VALUE]", help="Robots: hold a joint; repeat it for more."),
+    click.option(
+        "--mimic",
+        type=click.Choice(["independent", "coupling"]),
+        help="Robots: joints that mimic others are independent, or a coupling.",
+    ),
+    click.option(
+        "--rotation",
+        type=click.Choice(["euler_angles", "euler_parameters"]),
+        help="Robots: free and ball joints in euler_angles or euler_parameters.",
+    ),
+    click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
+    click.option(
+        "--friction",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="VELOCITY",
+        help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
+    ),
+    click.option("--symbolic", is_flag=True, help="Robots: masses and inertias become parameters."),
+    click.option(
+        "--check-inertia",
+        type=click.Choice(["error", "note", "off"]),
+        help="Masses and inertias that no body can have, and motions without inertia: refuse, note, or take them.",
+    ),
+    click.option(
+        "--limits",
+        type=click.Choice(["note", "off"]),
+        help="Robots: note which limits of joints are data only, or not.",
+    ),
+    click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
+)
+
+
+def robot_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of robot files, handed to the verb as one mapping ``robot``."""
+    keys = (
+        "floating",
+        "lock",
+        "mimic",
+        "rotation",
+        "actuate",
+        "friction",
+        "symbolic",
+        "check_inertia",
+        "limits",
+        "assets",
+    )
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        given = {key: value for key in keys if (value := kwargs.pop(key))}
+        return verb(*args, robot=given, **kwargs)
+
+    for option in reversed(_ROBOT):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def _locked(words: tuple[str, ...]) -> dict[str, float]:
+    """``joint`` or ``joint=value`` -> the value at which it is held."""
+    result: dict[str, float] = {}
+    for word in words:
+        name, equals, _ = word.rpartition("=")
+        result |= dict([_parse_setting(word, "--lock")]) if equals and name else {word: 0.0}
+    return result
+
+
+def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | None = None) -> Model:
+    """The model of a file; what an import of a robot left out is told on stderr.
+
+    Parameters
+    ----------
+    path : Path
+    allow_native : bool, optional
+        Whether its native functions may be compiled and run.
+
+    Raises
+    ------
+    UsageError
+        There is no such file; the message names what is near.
+    ModelError
+        The file is no model.
+    """
+    if not path.is_file():
+        raise UsageError(_missing(path))
+    from ..loading import load
+
+    options = dict(robot or {})
+    if "lock" in options:
+        options["lock"] = _locked(options["lock"])
+    if allow_native:
+        options["allow_native"] = True
+    model = load(path, **options)
+    from .screen import say
+
+    for note in model.notes:
+        say(f"note: {note}", err=True)
+    return model
+
+
+def _missing(path: Path) -> str:
+    if what := kind_of(path):
+        return f"{path} is {what}, no plain file; " + (
+            "name a model file in it" if path.is_dir() else "copy what it gives into a file"
+        )
+    from .example_files import example_names
+
+    if path.stem in example_names():
+        return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
+    here = path.parent if path.parent.is_dir() else Path()
+    names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
+    near = difflib.get_close_matches(path.name, names, 1)
+    return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
+
+
+def require_folder(option: str, file: Path | None) -> None:
+    """Fail before the work if a file cannot be written where it is asked for; makes nothing.
+
+    Raises
+    ------
+    UsageError
+    """
+    if file is None:
+        return
+    refuse_link(file)
+    if file.is_dir():
+        raise UsageError(f"{option} {file}: is a folder; name a file in it")
+    above = file.absolute().parents
+    folder = next(parent for parent in above if parent.exists())
+    if folder == Path(file.absolute().anchor) != above[0]:  # rather a slip than a wish for a new folder there
+        raise UsageError(f"{option} {file}: there is no folder {above[-2]}")
+    if not folder.is_dir():
+        raise UsageError(f"{option} {file}: {folder} is a file, not a folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(f"{option} {file}: the folder {folder} cannot be written")
+
+
+def parse_settings(settings: tuple[str, ...], option: str = "--set", example: str = "r=0.12") -> dict[str, float]:
+    """``name=value`` words as numbers; a value may be an expression of numbers such as ``pi/3``.
+
+    Parameters
+    ----------
+    settings : tuple of str
+    option, example : str, optional
+        Which option has them, for errors, and a word that it takes.
+
+    Raises
+    ------
+    UsageError
+    """
+    return dict(_parse_setting(word, option, example) for word in settings)
+
+
+def _parse_setting(word: str, option: str = "--set", example: str = "r=0.12") -> tuple[str, float]:
+    name, equals, text = (part.strip() for part in word.partition("="))
+    if not equals or not name or not text:
+        raise UsageError(f"{option} {word}: write name=value, for example {option} {example}")
+    try:
+        return name, float(text)
+    except ValueError:
+        pass
+    from ..describe.expressions import parse
+    from ..errors import ExpressionError
+    from ..graph.core import Graph
+
+    def resolve(unknown: str) -> Any:
+        raise ExpressionError(f"{unknown!r} is not a number", 1, "numbers and pi are known here", text)
+
+    try:
+        value = parse(text, Graph(), resolve).value
+    except ExpressionError as error:
+        raise UsageError(f"{option} {word}: {error.message}; {error.remedy}") from None
+    if value is None:
+        raise UsageError(f"{option} {word}: not a number")
+    return name, value

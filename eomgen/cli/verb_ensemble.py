@@ -1,0 +1,171 @@
+"""Stage cli, ensemble: model file and cases -> many runs, their last states or statistics."""
+
+from __future__ import annotations
+
+import csv
+from io import TextIOWrapper
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..errors import UsageError
+from ..files.reading import open_plain
+from ..files.writing import save_figure, write_whole
+from ..runtime.near_names import require
+from ..runtime.room import require_room
+from .analysis import Prepared, analysis_options
+from .screen import finite, print_heading, print_json, print_table, say, stage
+from .shared_options import require_folder
+
+if TYPE_CHECKING:
+    from ..ensembles.ensemble import Ensemble
+
+SHOWN = 10  #: failures listed
+MOST_WORKERS = 4096  #: processes of a local cluster
+
+
+@click.command()
+@analysis_options
+@click.option(
+    "--cases",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="FILE",
+    help="CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
+)
+@click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
+@click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the numbers drawn.")
+@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M times.")
+@click.option("--statistics", is_flag=True, help="Keep mean, deviation, least and greatest only.")
+@click.option("--solver", metavar="NAME", help="Integrator; that of the file by default.")
+@click.option("--step", type=float, metavar="H", help="Size of the steps of RK4 in s.")
+@click.option("--rtol", type=float, metavar="X", help="Relative tolerance.")
+@click.option("--atol", type=float, metavar="X", help="Absolute tolerance.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Runs at a time; all processors by default.")
+@click.option("--cluster", metavar="N|ADDRESS", help="Run on N dask workers here, or on those of a scheduler.")
+@click.option(
+    "--store", type=click.Path(path_type=Path), metavar="DIR", help="Keep finished runs and go on from there."
+)
+@click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw a column to a picture.")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
+def ensemble(
+    work: Prepared, cases: Path | None, vary: tuple[str, ...], count: int | None, seed: int, end: float | None,
+    samples: int | None, statistics: bool, solver: str | None, step: float | None, rtol: float | None,
+    atol: float | None, threads: int | None, cluster: str | None, store: Path | None,
+    plot: tuple[str, str] | None, out: Path | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Run a model many times: from a table of cases, or with values drawn at random."""
+    if out is not None and out.suffix not in (".npz", ".csv"):
+        raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
+    for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
+        require_folder(word, path)
+    if out is not None and out.suffix == ".csv":
+        require("pandas", "pandas", "--out FILE.csv")
+    if cases is not None and count is not None:
+        raise UsageError("--count is for values drawn by --vary; --cases has as many runs as rows")
+    module = work.module
+    require_room(f"--count {count}", float(count or 0) * max(len(vary) + 2 * module.n_x, 1), "draw fewer runs")
+    require_room(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
+    if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
+        raise UsageError(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
+    values = _read(cases) if cases is not None else {}
+    values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
+    if not values:
+        raise UsageError("nothing differs between the runs: give --cases FILE or --vary NAME=LOW:HIGH")
+    sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial), "parameters": {}, "inputs": {}}
+    for name, column in values.items():
+        kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
+        sorted_values[kind][name] = column
+    last = module.metadata.get("simulation", {}).get("end") or 10.0
+    times = None if samples is None else _even(end or float(last), samples)
+    with stage("integrate"):
+        found = module.simulate_many(
+            end, *(group or None for group in sorted_values.values()), method=solver, step=step, t_eval=times,
+            threads=threads, reduce="statistics" if statistics else None, cluster=_cluster(cluster), store=store,
+            rtol=rtol, atol=atol,
+        )  # fmt: skip
+    if out is not None:
+        if out.suffix == ".csv":
+            write_whole(out, found.to_pandas().to_csv(index=False))
+        else:
+            found.save(out)
+    if plot is not None:
+        save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
+    files = [str(path) for path in (out, plot and plot[1]) if path]
+    _tell(work, found, sorted(values), files, as_json)
+
+
+def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], as_json: bool) -> None:
+    table = found.summary()
+    failures = found.failures()
+    if as_json:
+        print_json(
+            work.heading(float(found.t[-1])) | {"count": found.count, "varied": varied} |
+            {"steps": int(found.steps.sum()), "failures": [failure._asdict() for failure in failures], "files": files} |
+            {"summary": {name: {key: finite(x) for key, x in row.items()} for name, row in table.items()}}
+        )  # fmt: skip
+        return
+    print_heading(f"{found.count} runs to t = {found.t[-1]:g} s; varied: {', '.join(varied)}")
+    lines = [[name, *(f"{x:.6g}" for x in row.values())] for name, row in table.items()]
+    print_table(["at the end", "mean", "deviation", "least", "greatest"], lines, right=range(1, 5))
+    for failure in failures[:SHOWN]:
+        say(f"run {failure.run} ended at t = {failure.t:.6g} s: {failure.message}")
+    if len(failures) > SHOWN:
+        say(f"... and {len(failures) - SHOWN} more of {found.count} failed")
+    for file in files:
+        say(f"wrote {file}")
+
+
+def _even(end: float, count: int) -> list[float]:
+    return [end * i / (count - 1) for i in range(count)]
+
+
+def _cluster(given: str | None) -> int | str | None:
+    return int(given) if given is not None and given.isdigit() else given
+
+
+def _read(path: Path) -> dict[str, list[float]]:
+    """The columns of a table of cases."""
+    with TextIOWrapper(open_plain(path), newline="", encoding="utf-8-sig") as file:
+        try:
+            rows = [row for row in csv.reader(file) if row]
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise UsageError(f"--cases {path}: is no table of text (CSV, UTF-8): {error}") from None
+    if len(rows) < 2:
+        raise UsageError(f"--cases {path}: a line of names and a line for each run are needed")
+    names = [name.strip() for name in rows[0]]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise UsageError(f"--cases {path}: the names {', '.join(twice)} stand there twice")
+    columns: dict[str, list[float]] = {name: [] for name in names}
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(names):
+            raise UsageError(f"{path}:{number}: {len(row)} values for {len(names)} names")
+        for name, word in zip(names, row, strict=True):
+            try:
+                columns[name].append(float(word))
+            except ValueError:
+                raise UsageError(f"{path}:{number}: {name} must be a number, not {word!r}") from None
+    return columns
+
+
+def _draw(vary: tuple[str, ...], count: int, seed: int) -> dict[str, Any]:
+    """Values drawn for each name, from a stream of its own."""
+    import numpy as np
+
+    drawn = {}
+    for k, words in enumerate(vary):
+        name, _, ends = words.partition("=")
+        low, _, high = ends.partition(":")
+        try:
+            limits = float(low), float(high)
+        except ValueError:
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two numbers") from None
+        if not (isfinite(limits[0]) and isfinite(limits[1]) and limits[0] <= limits[1]):
+            raise UsageError(f"--vary {words}: write NAME=LOW:HIGH with two finite numbers in order")
+        if name.strip() in drawn:
+            raise UsageError(f"--vary {name.strip()} is given twice")
+        drawn[name.strip()] = np.random.default_rng([seed, k]).uniform(*limits, count)
+    return drawn

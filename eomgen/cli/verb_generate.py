@@ -1,0 +1,67 @@
+"""Stage cli, generate: model file -> a package folder that needs neither eomgen nor SymPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..targets import TARGETS
+from .failures import reports_failures
+from .screen import print_json, say, stage
+from .shared_options import (
+    baumgarte_option,
+    blaming_option,
+    independent_option,
+    json_option,
+    load_model,
+    method_option,
+    model_argument,
+    native_option,
+    robot_options,
+    target_option,
+)
+
+
+@click.command()
+@model_argument
+@native_option
+@click.option(
+    "--out", required=True, metavar="DIR", type=click.Path(path_type=Path), help="Folder to write <name>/ into."
+)
+@method_option
+@baumgarte_option
+@independent_option
+@target_option(*TARGETS)
+@click.option(
+    "--slim", is_flag=True, help="Only calls, events and simulate, in a small package; the rest refuses by name."
+)
+@json_option
+@robot_options
+@reports_failures
+def generate(
+    model: Path,
+    allow_native: bool,
+    out: Path,
+    method: str,
+    baumgarte: tuple[float, float] | None,
+    independent: tuple[str, ...],
+    target: str,
+    slim: bool,
+    as_json: bool,
+    robot: dict[str, Any],
+) -> None:
+    """Write one package folder DIR/<name>/ with everything it needs; a cython one installs by `pip install`."""
+    from ..generation import generate as write_out
+
+    with blaming_option(independent), stage("generate"):
+        described = load_model(model, allow_native, robot)
+        folder = write_out(described, out, method, target, independent or None, baumgarte, slim)
+    files = sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+    if as_json:
+        print_json({"name": folder.name, "target": target, "slim": slim, "folder": str(folder), "files": files})
+        return
+    say(str(folder))
+    for name in files:
+        say(f"  {name}")

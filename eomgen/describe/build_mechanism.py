@@ -1,0 +1,316 @@
+"""Stage describe, the check: Description (raw) -> Mechanism, or ModelError with every problem at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..constraints import CONSTRAINTS
+from ..errors import ModelError
+from ..forces import FORCES
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
+from ..graph.traverse import LEAVES, reachable
+from ..operations import OPERATIONS
+from .body_shapes import read_shapes
+from .build_cam_points import declare_contacts
+from .build_elements import build_elements
+from .build_equations import build_equations, check_energies, declare_equations
+from .build_events import build_events
+from .build_functions import build_functions
+from .build_joints import build_joints, declare_coordinates
+from .build_lagrangian import build_lagrangian, declare_lagrangian
+from .cam_turns import check_turns
+from .checks import check_connected, check_keys, check_names
+from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
+from .element_entry import Surroundings
+from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import GROUND as GROUND_FIELDS
+from .input_rates import add_rates
+from .joint_data import check_display
+from .mass_properties import read_body
+from .mechanism import SUMS, Body, Input, Mechanism, Output, Parameter, Simulation
+from .names import fault_of_model_name, nearest
+from .physical import check_bodies
+from .scope import Namespace
+from .sympy_face import in_order, name_of
+from .values import Reader
+
+
+def build(description: Description) -> Mechanism:
+    """Check a description and lower it to one graph.
+
+    Parameters
+    ----------
+    description : Description
+        What the user said.
+
+    Returns
+    -------
+    Mechanism
+
+    Raises
+    ------
+    ModelError
+        The description has faults; all of them are listed.
+    """
+    faults = Faults(description)
+    names = Namespace(faults)
+    graph = Graph()
+    reader = Reader(graph, names, faults, description)
+    values, sections = description.values, description.sections
+
+    name = values.get("name")
+    fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
+    if fault:
+        faults.add("name", *fault)
+    parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
+    inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
+    numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
+    build_functions(reader, sections["functions"])
+    specs = declare_coordinates(reader, sections["joints"])
+    contacts = declare_contacts(reader, sections["constraints"])
+    lagrangian_values = declare_lagrangian(
+        reader, values.get("lagrangian"), bool(sections["bodies"] or sections["joints"])
+    )
+    given_values = declare_equations(
+        reader, values.get("equations"), lagrangian_values is not None or bool(sections["bodies"] or sections["joints"])
+    )
+
+    inputs = tuple(_with_signal(reader, *pair) for pair in zip(inputs, sections["inputs"], strict=True))
+    bodies = _bodies(reader, sections["bodies"])
+    joints = build_joints(reader, specs)
+    around = Surroundings(reader, specs, joints, bodies, contacts)
+    forces = build_elements(around, "force", sections["forces"], FORCES)
+    lagrangian = build_lagrangian(reader, lagrangian_values)
+    given = build_equations(reader, given_values)
+    constraints = build_elements(around, "constraint", sections["constraints"], CONSTRAINTS)
+    gravity = reader.vector("gravity", values["gravity"]) if "gravity" in values else vec.zero(graph)
+    outputs = _outputs(reader, sections["outputs"])
+    events = build_events(reader, sections["events"])
+    inputs = add_rates(reader, inputs, lagrangian, given, constraints, events, outputs)
+    initial = _initial(reader, "initial", values.get("initial", {}), ("coordinate", "velocity"))
+    guess = _initial(reader, "guess", values.get("guess", {}), ("coordinate",))
+    independent = _independent(reader, values.get("independent", ()))
+    simulation = _simulation(reader, values.get("simulation", {}))
+    doc = reader.text("doc", values.get("doc", ""))
+
+    if lagrangian_values is None and given_values is None and not bodies and not faults.under("bodies"):
+        faults.add("bodies", "the model has no bodies", "add a body and a joint, or give a Lagrangian")
+    _check_mass(reader, bodies)
+    negative, inertia_notes = check_bodies(bodies, joints, numbers, faults)
+    check_turns(constraints, numbers, faults)
+    check_energies(given, outputs, faults)
+    if len(joints) == len(sections["joints"]):
+        check_connected(bodies, joints, faults)
+    if faults:
+        raise ModelError(faults.sorted())
+    described = len(bodies)
+    bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
+    return Mechanism(
+        name=str(name),
+        graph=graph,
+        parameters=parameters,
+        inputs=inputs,
+        gravity=gravity,
+        bodies=bodies,
+        joints=joints,
+        forces=forces,
+        outputs=outputs,
+        events=events,
+        quantities=dict(reader.quantities),
+        initial=initial,
+        guess=guess,
+        independent=independent,
+        simulation=simulation,
+        lagrangian=lagrangian,
+        given=given,
+        constraints=constraints,
+        lines=dict(description.lines),
+        doc=doc,
+        check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        negative=negative,
+        named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
+        body_shapes=tuple(
+            shape
+            for entry in sections["bodies"]
+            for shape in read_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+        ),
+        added_bodies=tuple(range(described, len(bodies))),
+        notes=inertia_notes,
+    )
+
+
+def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[str, str]:
+    """Unit and doc of an entry, its keys checked."""
+    check_keys(entry.path, entry.values, fields, reader.faults)
+    unit, doc = (reader.text(f"{entry.path}.{key}", entry.values.get(key, "")) for key in ("unit", "doc"))
+    return unit, doc
+
+
+def _parameter(reader: Reader, entry: DescribedEntry) -> Parameter:
+    reader.names.declare("parameter", entry.name, entry.path)
+    unit, doc = _described(reader, entry, PARAMETER)
+    given = entry.values.get("value")
+    value = None if given is None else reader.number(f"{entry.path}.value", given)
+    return Parameter(str(entry.name), value, unit, doc)
+
+
+def _input(reader: Reader, entry: DescribedEntry) -> Input:
+    reader.names.declare("input", entry.name, entry.path)
+    unit, doc = _described(reader, entry, INPUT)
+    given = entry.values.get("value")
+    value = 0.0 if given is None else reader.number(f"{entry.path}.value", given)
+    return Input(str(entry.name), value or 0.0, unit, doc)
+
+
+def _with_signal(reader: Reader, given: Input, entry: DescribedEntry) -> Input:
+    """The input with its expression over time, read when all coordinates are known."""
+    if entry.values.get("signal") is None:
+        return given
+    path = f"{entry.path}.signal"
+    expression = reader.expression(path, entry.values["signal"], MOTION)
+    for name in sorted(symbols_of([expression])):
+        if reader.names.kinds.get(name) == "input":
+            reader.faults.add(
+                path, f"the input {name!r} cannot stand here", "t, coordinates, velocities, parameters can"
+            )
+    if any(reader.graph.nodes[i][0] not in (*OPERATIONS, *LEAVES) for i in reachable(reader.graph, [expression.id])):
+        reader.faults.add(path, "a function that the model declares cannot stand here", "write the expression out")
+    return replace(given, signal=expression)
+
+
+def _bodies(reader: Reader, entries: list[DescribedEntry]) -> tuple[Body, ...]:
+    """Bodies, with all markers taken in before anything refers to them."""
+    faults, graph = reader.faults, reader.graph
+    ground = [entry for entry in entries if entry.name == GROUND_NAME]
+    usable = check_names([entry for entry in entries if entry.name != GROUND_NAME], "body", faults)
+    for k, entry in enumerate(usable):
+        reader.bodies[entry.name] = k
+    for entry in usable + ground:
+        if not faults.under(entry.path):
+            check_keys(entry.path, entry.values, GROUND_FIELDS if entry.name == GROUND_NAME else BODY, faults)
+        if "display" in entry.values:
+            check_display(reader, f"{entry.path}.display", entry.values["display"])
+    origin = Frame(reader.identity, vec.zero(graph))
+    for name, index in reader.bodies.items():
+        reader.markers[name] = Marker(index, origin, name)
+    for entry in usable + ground:
+        index = GROUND if entry.name == GROUND_NAME else reader.bodies[entry.name]
+        for marker in check_names(_marker_entries(reader, entry), "marker", faults):
+            label = f"{entry.name}.{marker.name}"
+            reader.markers[label] = Marker(index, reader.named_frame(marker.path, marker.values["placed"]), label)
+    check = reader.check_word("check_inertia", reader.description.values.get("check_inertia", True))
+    return tuple(read_body(reader, entry, check) for entry in usable)
+
+
+def _marker_entries(reader: Reader, entry: DescribedEntry) -> list[DescribedEntry]:
+    """Markers of a body: a mapping from a file, a list of (name, placement) from Python."""
+    path = f"{entry.path}.markers"
+    given: Any = entry.values.get("markers", ())
+    if isinstance(given, Mapping):
+        given = list(given.items())
+    if not isinstance(given, list | tuple) or not all(isinstance(one, list | tuple) and len(one) == 2 for one in given):
+        reader.wrong(path, given, "markers")
+        return []
+    return [DescribedEntry(name, {"placed": placed}, f"{path}.{name}") for name, placed in given]
+
+
+def _check_mass(reader: Reader, bodies: tuple[Body, ...]) -> None:
+    """Note centres of mass and momenta asked of a mechanism without mass."""
+    asked = [name for name, q in reader.quantities.items() if q.marker is None or q.level in SUMS]
+    if asked and all(body.mass.is_zero for body in bodies) and not reader.faults.under("bodies"):
+        what = ", ".join(name.removesuffix("()") for name in asked)
+        message = f"{what}: {'no body has a mass' if bodies else 'the model has no bodies'}"
+        reader.faults.add("outputs", message, "a centre of mass and a momentum need mass")
+
+
+def _outputs(reader: Reader, entries: list[DescribedEntry]) -> tuple[Output, ...]:
+    made = [_output(reader, entry) for entry in entries]
+    seen: set[str] = set()
+    for entry, output in zip(entries, made, strict=True):
+        if output.name in seen:
+            reader.faults.add(entry.path, "the name is given to two outputs", "rename one")
+        seen.add(output.name)
+    return tuple(made)
+
+
+def _output(reader: Reader, entry: DescribedEntry) -> Output:
+    faults, path = reader.faults, entry.path
+    unit, doc = _described(reader, entry, OUTPUT_FIELDS)
+    expression: Expr = reader.stand_in
+    if "expression" in entry.values:
+        expression = reader.expression(f"{path}.expression", entry.values["expression"], OUTPUT)
+    kind = reader.names.kinds.get(entry.name) if isinstance(entry.name, str) else None
+    if kind in ("coordinate", "velocity", "acceleration", "multiplier"):
+        if expression != reader.graph.symbol(entry.name):
+            faults.add(path, f"{entry.name!r} is a {kind}", f"an output of that name must be {entry.name} itself")
+    elif kind != "output":
+        reader.names.declare("output", entry.name, path)
+    return Output(str(entry.name), expression, unit, doc)
+
+
+def _initial(reader: Reader, section: str, given: Any, kinds: tuple[str, ...]) -> dict[str, Expr]:
+    """Values by coordinate (or rate): expressions in parameters."""
+    if not isinstance(given, Mapping):
+        reader.wrong(section, given, "table")
+        return {}
+    known = list(dict.fromkeys(reader.names.of(*kinds)))
+    result: dict[str, Expr] = {}
+    for name, value in in_order(given, known):
+        path = f"{section}.{name}"
+        if name in known:
+            result[name] = reader.expression(path, value)
+        else:
+            remedy = nearest(shown(name), known, " and ".join(_PLURAL[kind] for kind in kinds))
+            reader.faults.add(path, f"no {' or '.join(kinds)} {quoted(name)}", remedy)
+    return result
+
+
+_PLURAL = {"coordinate": "coordinates", "velocity": "velocities"}
+
+
+def _independent(reader: Reader, given: Any) -> tuple[str, ...]:
+    listed = [given] if isinstance(given, str) else items(given)
+    if listed is None:
+        reader.wrong("independent", given, "names")
+        return ()
+    coordinates = list(reader.names.of("coordinate"))
+    rates = {name + "_dot" for name in coordinates}
+    known = [*coordinates, *(name for name in reader.names.of("velocity") if name not in rates)]
+    result: list[str] = []
+    for k, item in enumerate(listed):
+        name = name_of(item)
+        if name not in known:
+            reader.faults.add(
+                f"independent[{k}]", f"no coordinate {quoted(name)}", nearest(shown(name), known, "coordinates")
+            )
+        elif name in result:
+            reader.faults.add(f"independent[{k}]", f"{name!r} is named twice", "name each coordinate once")
+        else:
+            result.append(name)
+    return tuple(result)
+
+
+def _simulation(reader: Reader, given: Any) -> Simulation:
+    if not isinstance(given, Mapping):
+        reader.wrong("simulation", given, "table")
+        return Simulation()
+    check_keys("simulation", given, SIMULATION, reader.faults)
+    settings: dict[str, Any] = {}
+    for key, field in SIMULATION.items():
+        if key not in given:
+            continue
+        path = f"simulation.{key}"
+        if field.kind == "choice":
+            settings[key] = reader.choice(path, given[key], field)
+        else:
+            settings[key] = reader.number(path, given[key], positive=True)
+    if (settings.get("method") == "RK4") != ("step" in settings):
+        remedy = "give step, in s" if "step" not in settings else "take it away, or set method to RK4"
+        reader.faults.add("simulation.step", "only method RK4 takes steps of one size, and it needs their size", remedy)
+    return Simulation(**settings)

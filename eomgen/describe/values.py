@@ -1,0 +1,283 @@
+"""Stage describe, values: numbers, texts and SymPy as the user gave them -> graph expressions, frames and markers.
+
+Every method notes what is wrong with a value as a fault at its path and returns a stand-in, so that one pass over a
+description finds all of its problems.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..errors import ExpressionError
+from ..files.path_names import usable_name
+from ..frames import GROUND, Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr, Graph
+from ..graph.evaluate import evaluate
+from ..graph.shown import quoted, shown
+from ..graph.substitute import symbols_of
+from ..graph.vectors import Mat3, Vec3
+from ..numeric.rigid_inertia import word_of_check
+from ..texts import WHOLE, join_surrogates, lone_surrogate
+from .checks import check_keys
+from .description import GROUND_NAME, Description, Faults, items, label_of
+from .expressions import parse
+from .fields import CONSTANT, INERTIA, KINDS, MARKER, NUMBER, OUTPUT, PLACED, Field
+from .mechanism import Quantity
+from .names import nearest, suggestion
+from .placement import TURNS, Numbers, axis_columns, rpy_rotation
+from .scope import Namespace, Scope
+from .sympy_face import is_sympy, lower_sympy
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a plain real number (truth values are not)."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+class Reader:
+    """Reads values of one description into one graph.
+
+    Attributes
+    ----------
+    bodies : dict of str to int
+        Index of each body; ground has :data:`~eomgen.frames.GROUND`.
+    markers : dict of str to Marker
+        Named markers (``rod.tip``) and the bodies' own frames (``rod``).
+    quantities : dict of str to Quantity
+        Motions of markers that expressions use.
+    """
+
+    def __init__(self, graph: Graph, names: Namespace, faults: Faults, description: Description) -> None:
+        self.graph, self.names, self.faults, self.description = graph, names, faults, description
+        self.identity = vec.identity(graph)
+        self.bodies: dict[str, int] = {GROUND_NAME: GROUND}
+        self.markers: dict[str, Marker] = {}
+        self.quantities: dict[str, Quantity] = {}
+        self.stand_in = graph.symbol("?")
+        self.numbers: dict[str, float] = {}  # declared values of parameters
+
+    def known(self, expression: Expr) -> float | None:
+        """The value of an expression at the declared values of parameters, None if they do not tell."""
+        if expression.value is None and not symbols_of([expression]) <= self.numbers.keys():
+            return None
+        value = float(evaluate([expression], self.numbers)[0])
+        return value if math.isfinite(value) else None
+
+    def wrong(self, path: str, value: object, kind: str) -> None:
+        """Note that a value is not of a kind."""
+        if value is None:
+            self.faults.add(path, "has no value", f"give {KINDS[kind]}")
+        else:
+            self.faults.add(path, f"{quoted(value, 80)} is not {KINDS[kind]}")
+
+    # -- scalars --------------------------------------------------------------------------------------------------
+    def expression(
+        self,
+        path: str,
+        value: Any,
+        level: int = CONSTANT,
+        local: Mapping[str, Expr] | None = None,
+        exclusive: bool = False,
+    ) -> Expr:
+        """A scalar: a number, a text or a SymPy expression.
+
+        Names in ``local`` come before those of the model; with ``exclusive`` a name must not be both.
+        """
+        scope = Scope(self.graph, self.names, path, level, self.moving, self.quantities, local, exclusive)
+        try:
+            if isinstance(value, str):
+                return parse(value, self.graph, scope.resolve, scope.locate if level >= OUTPUT else None)
+            if is_sympy(value):
+                return lower_sympy(self.graph, value, scope.resolve)
+            if is_number(value):
+                return self.graph.constant(float(value))
+        except ExpressionError as error:
+            if not self.names.explains(error):
+                self.faults.add(path, error.place(), error.remedy)
+            return self.stand_in
+        except OverflowError:
+            self.faults.add(path, f"{quoted(value)} is not a finite number")
+            return self.stand_in
+        self.wrong(path, value, "expression")
+        return self.stand_in
+
+    def number(self, path: str, value: Any, positive: bool = False) -> float | None:
+        """A number; a text or SymPy expression without names counts as one."""
+        kind = "positive" if positive else "number"
+        result = value
+        if isinstance(value, str) or is_sympy(value):
+            result = self.expression(path, value, NUMBER).value
+        try:
+            finite = is_number(result) and math.isfinite(result)
+        except OverflowError:  # a whole number of hundreds of digits
+            finite = False
+        if not finite or (positive and result <= 0):
+            if not self.faults.under(path):
+                self.wrong(path, value, kind)
+            return None
+        return float(result)
+
+    def text(self, path: str, value: Any) -> str:
+        """A text, pairs of surrogates as the characters that they mean."""
+        if not isinstance(value, str):
+            self.wrong(path, value, "text")
+            return ""
+        half = lone_surrogate(value)
+        if half:
+            self.faults.add(path, f"holds {half}, half of a pair and no character", WHOLE)
+            return ""
+        return join_surrogates(value)
+
+    def file(self, path: str, value: Any) -> str | None:
+        """The name of a file; None where no file can have it."""
+        if not isinstance(value, str | os.PathLike):
+            self.wrong(path, value, "file")
+            return None
+        name = usable_name(value)
+        if name is None:
+            self.faults.add(path, f"{value!r:.200} is empty, or holds a character that no file name can", "rename it")
+        return name
+
+    def flag(self, path: str, value: Any) -> bool:
+        """True or false; True when it is neither."""
+        if isinstance(value, bool):
+            return value
+        self.wrong(path, value, "flag")
+        return True
+
+    def check_word(self, path: str, value: Any) -> str:
+        """What becomes of an impossible inertia: error, note or off; true and false mean error and off."""
+        word = word_of_check(value)
+        if word is None:
+            self.wrong(path, value, "check")
+        return word or "error"
+
+    def choice(self, path: str, value: Any, field: Field) -> str:
+        """One of the words of a field; the default when it is another."""
+        if isinstance(value, str) and value in field.choices:
+            return value
+        shown = list(field.choices)
+        remedy = nearest(value, shown, "allowed") if isinstance(value, str) else f"allowed: {', '.join(shown)}"
+        self.faults.add(path, f"{quoted(value)} is not known", remedy)
+        return str(field.default)
+
+    # -- vectors and matrices -------------------------------------------------------------------------------------
+    def vector(self, path: str, value: Any, level: int = CONSTANT) -> Vec3:
+        """Three scalars."""
+        parts = items(value)
+        if parts is None or len(parts) != 3:
+            self.wrong(path, value, "vector")
+            return (self.stand_in,) * 3
+        x, y, z = (self.expression(f"{path}[{k}]", part, level) for k, part in enumerate(parts))
+        return (x, y, z)
+
+    def inertia(self, path: str, value: Any) -> Mat3:
+        """A symmetric tensor from three moments, a 3 x 3 tensor or a mapping of ``xx`` .. ``yz``."""
+        zero = self.graph.zero
+        if isinstance(value, Mapping):
+            for key in value:
+                if key not in INERTIA:
+                    self.faults.add(f"{path}.{key}", "unknown key", nearest(str(key), INERTIA, "allowed"))
+            given = {k: self.expression(f"{path}.{k}", value[k]) for k in INERTIA if k in value}
+            xx, yy, zz, xy, xz, yz = (given.get(k, zero) for k in INERTIA)
+            return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        parts = items(value)
+        if parts is not None and len(parts) == 3:
+            rows = [items(part) for part in parts]
+            if all(row is not None and len(row) == 3 for row in rows):
+                a, b, c = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
+                return (a, b, c)
+            if all(row is None for row in rows):
+                a = self.vector(path, parts)
+                return ((a[0], zero, zero), (zero, a[1], zero), (zero, zero, a[2]))
+        self.wrong(path, value, "inertia")
+        return tuple((self.stand_in,) * 3 for _ in range(3))  # type: ignore[return-value]
+
+    # -- frames and markers ---------------------------------------------------------------------------------------
+    def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
+        """A placement in a body from ``at`` and ``rpy``."""
+        at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
+        if "rpy" not in values:
+            return Frame(self.identity, at)
+        return Frame(rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"])), at)
+
+    def moving(self, label: str) -> Marker:
+        """The marker of a label in an expression; raises ExpressionError if there is none."""
+        found = self.markers.get(label)
+        if found is None and label in self.description.motions:
+            found = self.marker(label, self.description.motions[label])
+        if found is None:
+            raise ExpressionError(*self.unknown_marker(label))
+        return found
+
+    def unknown_marker(self, label: str) -> tuple[str, int, str]:
+        """Message, column (none) and remedy for a marker that does not exist."""
+        body, dot, name = label.partition(".")
+        if body in self.bodies and dot:
+            own = [key.split(".", 1)[1] for key in self.markers if key.startswith(body + ".")]
+            near = suggestion(name, own)
+            have = ", ".join(own) or "none"
+            return f"{body!r} has no marker {name!r}", 0, " ".join(x for x in (near, f"its markers: {have}") if x)
+        return f"no body {body!r}", 0, nearest(body, self.bodies, "bodies")
+
+    def marker(self, path: str, value: Any) -> Marker | None:
+        """A marker from a reference: ``rod``, ``rod.tip``, ``ground`` or a mapping of body, at, rpy."""
+        if isinstance(value, str):
+            found = self.markers.get(value)
+            body = value.partition(".")[0]
+            if found is None and (body in self.bodies or not self.faults.under(f"bodies.{body}")):
+                message, _, remedy = self.unknown_marker(value)
+                self.faults.add(path, message, remedy)
+            return found
+        if not isinstance(value, Mapping):
+            self.wrong(path, value, "marker")
+            return None
+        check_keys(path, value, PLACED, self.faults)
+        if "body" not in value:
+            return None
+        body = value["body"]
+        if not isinstance(body, str) or body not in self.bodies:
+            self.faults.add(f"{path}.body", f"no body {quoted(body)}", nearest(shown(body), self.bodies, "bodies"))
+            return None
+        return Marker(self.bodies[body], self.frame(path, value), label_of(value))
+
+    def named_frame(self, path: str, value: Any) -> Frame:
+        """The placement of a named marker: a position, or a mapping of at and rpy."""
+        if isinstance(value, Mapping):
+            check_keys(path, value, MARKER, self.faults)
+            return self.frame(path, value)
+        return Frame(self.identity, self.vector(path, value))
+
+    def pair(self, path: str, value: Any) -> tuple[Marker, Marker] | None:
+        """Two markers; None if either is unknown."""
+        parts = items(value)
+        if parts is None or len(parts) != 2:
+            self.wrong(path, value, "pair")
+            return None
+        first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
+        return None if first is None or second is None else (first, second)
+
+    def axis(self, path: str, value: Any) -> Sequence[Numbers]:
+        """Columns of the turn that brings an axis to z."""
+        if isinstance(value, str):
+            if value in TURNS:
+                return TURNS[value]
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
+            return TURNS["z"]
+        parts = items(value)
+        if parts is None or len(parts) != 3:
+            self.faults.add(path, f"{quoted(value)} is not an axis", f"allowed: {KINDS['axis']}")
+            return TURNS["z"]
+        x, y, z = (self.number(f"{path}[{k}]", part) for k, part in enumerate(parts))
+        if x is None or y is None or z is None:
+            return TURNS["z"]
+        columns = axis_columns((x, y, z))
+        if columns is None:
+            self.faults.add(path, "the axis has no length", f"allowed: {KINDS['axis']}")
+            return TURNS["z"]
+        return columns

@@ -1,0 +1,79 @@
+"""Stage emit: generated files of a package -> what of eomgen calls and runs need; the rest refuses by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .abridged import abridge
+from .carried import carry, describe_folder
+from .selection import Selection
+from .uses import SourceText
+
+#: Files that a slim package has not -> what asks for them.
+LEFT_OUT = {
+    "analysis/impact": "events with impacts",
+    "numeric/assembly_failure": "what keeps loops from closing",
+    "numeric/splines": "cubic tables",
+    "runtime/culprit": "what a failure is due to",
+    "runtime/origin": "where a result comes from",
+    "runtime/rate_checks": "inputs whose rates stand in the equations",
+    "runtime/signal_rates": "rates of inputs",
+    "simulation/led_state": "inputs that move constraints and depend on the state",
+    "simulation/progress": "progress=",
+    "simulation/stalling": "runs whose steps lead nowhere",
+    "runtime/canonical": "canonical",
+    "runtime/change_points": "change_points",
+    "runtime/minimal": "minimal",
+    "runtime/tree_motion": "kinematics",
+    "runtime/pickling": "pickling",
+    "runtime/plotting": "plot",
+    "runtime/storage": "save and pickles",
+    "simulation/checkpoint": "checkpoint=",
+    "simulation/dae_solution": "dae",
+    "simulation/driven": "mechanisms that drivers move entirely",
+    "simulation/solver_state": "checkpoint=",
+    "simulation/steppers": "step and classes of solvers",
+}
+#: Classes whose methods users call.
+PUBLIC = (
+    ("api/module", "Module"),
+    ("runtime/bound_model", "BoundModel"),
+    ("runtime/assembled", "Assembled"),
+    ("runtime/momenta", "Momenta"),
+    ("runtime/trajectory", "Trajectory"),
+)
+#: Calls of a Module that a slim package has; the others are refused.
+CALLS = ("simulate",)
+
+
+def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
+    """Files of eomgen for a slim package, by name: what is reached of each, and refusals in place of others.
+
+    Parameters
+    ----------
+    package : mapping of str to str
+        Generated files, from which all begins.
+    signals : bool
+        Whether the model declares inputs over time, whose expressions runs in Python have to play.
+    """
+    left_out = LEFT_OUT if signals else LEFT_OUT | {"runtime/tapes": "inputs that a model declares"}
+    own = {name: text for name, text in package.items() if name.endswith(".py")}
+    typed = [SourceText("", text) for name, text in package.items() if name.endswith(".pyi")]
+    selection = Selection(carry(package) | own, left_out)
+    for name in own:
+        selection.begin(name.removesuffix(".py"))
+    for one in (one for source in typed for one in source.imports.values()):
+        selection.reach(one.home or "", one.name)
+    for name in CALLS:
+        selection.reach(f"simulation/{name}", name)
+    selection.follow(PUBLIC)
+    texts = {f"{file}.py": abridge(selection, file) for file in sorted(selection.files) if f"{file}.py" not in own}
+    texts |= {f"{file}.py": _REFUSAL.format(left_out[file]) for file in sorted(selection.refused)}
+    folders = sorted({name.partition("/")[0] for name in texts if "/" in name})
+    return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}
+
+
+_REFUSAL = '''"""Left out of this package, which was generated slim."""
+from ..errors import left_out
+raise left_out("{}")
+'''

@@ -1,0 +1,244 @@
+"""What a user gives as initial values, parameters and inputs of many runs -> Cases, a column for each run."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import EomgenError, UsageError
+from ..numeric.counts import read_count
+from ..numeric.scales import Array
+from ..runtime.near_names import check_names
+from ..runtime.room import read_numbers, require_room
+from ..simulation.run_arguments import find_state
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+    from ..runtime.signals import Forcing
+
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+
+UNASSEMBLED = -111  #: status of a run whose initial values could not be assembled
+
+
+@dataclass(frozen=True)
+class Cases:
+    """What differs between runs, and what does not.
+
+    Attributes
+    ----------
+    count : int
+        Number of runs, k.
+    p, u : (n_p,), (n_u,) or (n_p, k), (n_u, k) arrays
+    states : (n_x, k) array or None
+        Initial states, not yet projected.
+    values : dict of str to float or (k,) array
+        Named initial values where there are no states.
+    """
+
+    count: int
+    p: Array
+    u: Array
+    states: Array | None
+    values: dict[str, Any]
+
+    def part(self, start: int, stop: int) -> Cases:
+        """The runs from `start` to before `stop`."""
+        values = {name: x[start:stop] if np.ndim(x) else x for name, x in self.values.items()}
+        states = None if self.states is None else self.states[:, start:stop]
+        p, u = (a if a.ndim == 1 else a[:, start:stop] for a in (self.p, self.u))
+        return Cases(min(stop, self.count) - start, p, u, states, values)
+
+    @property
+    def alike(self) -> bool:
+        """Whether parameters and inputs are the same for all."""
+        return self.p.ndim == 1 and self.u.ndim == 1
+
+    def column(self, k: int) -> dict[str, Any]:
+        """Parameters and inputs of one run, as ``Module.bind`` takes them."""
+        given = [(name, a) for name, a in (("p", self.p), ("u", self.u)) if a.size or a.ndim == 1]  # of no runs: none
+        return {name: a if a.ndim == 1 else a[:, k] for name, a in given}
+
+    def digest(self) -> str:
+        """SHA-256 of all of it."""
+        found = hashlib.sha256(str(self.count).encode())
+        for array in (self.p, self.u, self.states):
+            found.update(b"none" if array is None else repr(array.shape).encode() + np.ascontiguousarray(array).data)
+        for name, value in sorted(self.values.items()):
+            found.update(name.encode() + np.ascontiguousarray(value, dtype=float).data)
+        return found.hexdigest()
+
+
+def collect_cases(
+    module: BoundModel,
+    initial: Mapping[str, Any] | ArrayLike | None,
+    parameters: Mapping[str, Any] | ArrayLike | None,
+    inputs: Mapping[str, Any] | ArrayLike | None,
+    count: int | None,
+) -> Cases:
+    """Bring initial values, parameters and inputs together.
+
+    Parameters
+    ----------
+    module : BoundModel
+    initial : mapping of str to float or (k,), or (n_x,) or (n_x, k) array, optional
+    parameters : mapping of str to float or (k,), or (n_p,) or (n_p, k) array, optional
+    inputs : mapping of str to float or (k,), or (n_u,) or (n_u, k) array, optional
+        Constant over time.
+    count : int, optional
+        Number of runs, where nothing given tells it.
+
+    Raises
+    ------
+    UsageError
+        Unknown names, values that are not finite, and lengths that differ, all named.
+    """
+    lengths: dict[str, int] = {} if count is None else {"count": read_count("count, of runs,", count)}
+    p = _bound("parameter", module.p_names, module.p, parameters, lengths)
+    u = _bound("input", module.u_names, module.u, inputs, lengths)
+    states, values = None, {}
+    if isinstance(initial, Mapping):
+        values = {str(name): _numbers(f"initial {name}", x, lengths) for name, x in initial.items()}
+        known = (*module.x_names, *module.loop_names, *module.layout.loop_rates)
+        check_names("coordinate or rate", values, known)
+    elif initial is not None:
+        states = _columns("initial", initial, module.x_names, lengths)
+    _require_one_length(lengths)
+    k = next(iter(lengths.values()), 1)
+    require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")
+    if states is not None and states.ndim == 1:
+        states = np.repeat(states[:, None], k, axis=1)
+    return Cases(k, p, u, states, values)
+
+
+def assemble_states(
+    module: BoundModel, cases: Cases, t: float, forcing_of: Callable[[int], Forcing]
+) -> tuple[Array, Mask, list[str]]:
+    """The initial states of all runs, on the constraints.
+
+    Parameters
+    ----------
+    module : BoundModel
+    cases : Cases
+    t : float
+        Time of the start (s).
+    forcing_of : callable
+        The inputs of a run by its number.
+
+    Returns
+    -------
+    x : (n_x, k) array
+        NaN for a run that cannot be assembled.
+    failed : (k,) bool array
+    words : list of str
+        Why, for each of these in order.
+    """
+    free = not module.n_rows and not module.layout.space
+    failed: Mask = np.zeros(cases.count, dtype=bool)
+    words: list[str] = []
+    if cases.states is not None and free:
+        return np.array(cases.states), failed, words
+    if forcing_of(0).constrained:
+        return _assemble_each(module, cases, lambda k: _assemble_led(module, cases, k, t, forcing_of(k)))
+    varying = cases.p.ndim > 1 or cases.u.ndim > 1 or any(np.ndim(x) for x in cases.values.values())
+    if cases.states is None and (not varying or _is_free(module, cases, free)):
+        scalars = {name: float(x) for name, x in cases.values.items() if not np.ndim(x)}
+        x = np.repeat(module.x0(scalars, t=t, **_shared(cases))[:, None], cases.count, axis=1)
+        for name, value in cases.values.items():
+            if np.ndim(value):
+                x[module.x_names.index(name)] = value
+        return x, failed, words
+    if cases.states is not None and cases.alike:
+        with suppress(EomgenError):  # some cannot be: find out which
+            return module.project(cases.states, t=t, **cases.column(0)), failed, words
+    return _assemble_each(module, cases, lambda k: _assemble_one(module, cases, k, t))
+
+
+def _assemble_each(module: BoundModel, cases: Cases, assemble: Callable[[int], Array]) -> tuple[Array, Mask, list[str]]:
+    x, words = np.full((module.n_x, cases.count), np.nan), []
+    failed: Mask = np.zeros(cases.count, dtype=bool)
+    for k in range(cases.count):
+        try:
+            x[:, k] = assemble(k)
+        except EomgenError as error:
+            failed[k] = True
+            words.append(str(error))
+    return x, failed, words
+
+
+def _assemble_led(module: BoundModel, cases: Cases, k: int, t: float, forcing: Forcing) -> Array:
+    """The state of one run whose constraints depend on inputs that vary."""
+    values: Any = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()} or None
+    given = values if cases.states is None else cases.states[:, k]
+    return find_state(module.bind(**cases.column(k)), given, t, forcing)
+
+
+def _assemble_one(module: BoundModel, cases: Cases, k: int, t: float) -> Array:
+    if cases.states is not None:
+        return module.project(cases.states[:, k], t=t, **cases.column(k))
+    values = {name: float(x[k] if np.ndim(x) else x) for name, x in cases.values.items()}
+    return module.x0(values, t=t, **cases.column(k))
+
+
+def _is_free(module: BoundModel, cases: Cases, free: bool) -> bool:
+    """Whether named initial values are entries of the state, whatever the others are."""
+    return free and not module.layout.loops and all(name in module.x_names for name in cases.values)
+
+
+def _shared(cases: Cases) -> dict[str, Any]:
+    return {name: a for name, a in (("p", cases.p), ("u", cases.u)) if a.ndim == 1}
+
+
+def _bound(what: str, names: tuple[str, ...], base: Array, given: Any, lengths: dict[str, int]) -> Array:
+    """Values (n,) or (n, k) of parameters or inputs; those not given keep the bound ones."""
+    if given is None:
+        return base
+    if not isinstance(given, Mapping):
+        return _columns(f"{what}s", given, names, lengths)
+    check_names(what, given, names)
+    values = {name: _numbers(f"{what} {name}", x, lengths) for name, x in given.items()}
+    _require_one_length(lengths)
+    k = next((len(x) for x in values.values() if np.ndim(x)), None)
+    result = base.copy() if k is None else np.repeat(base[:, None], k, axis=1)
+    for name, value in values.items():
+        result[names.index(name)] = value
+    return result
+
+
+def _require_one_length(lengths: Mapping[str, int]) -> None:
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{what}: {k}" for what, k in lengths.items())
+        raise UsageError(f"every (k,) and (n, k) array must have the same number of runs k, not {told}")
+
+
+def _columns(what: str, given: Any, names: tuple[str, ...], lengths: dict[str, int]) -> Array:
+    array = _floats(what, given)
+    if array.ndim not in (1, 2) or array.shape[0] != len(names):
+        told = ", ".join(names) or "none"
+        raise UsageError(f"{what} must have shape ({len(names)},) or ({len(names)}, k) [{told}], not {array.shape}")
+    if array.ndim == 2:
+        lengths[what] = array.shape[1]
+    return array
+
+
+def _numbers(what: str, given: Any, lengths: dict[str, int]) -> Any:
+    array = _floats(what, given)
+    if array.ndim > 1:
+        raise UsageError(f"{what} must be a number or have shape (k,), not {array.shape}")
+    if array.ndim:
+        lengths[what] = len(array)
+    return array if array.ndim else float(array)
+
+
+def _floats(what: str, given: Any) -> Array:
+    array = np.array(read_numbers(what, given))
+    if not np.isfinite(array).all():
+        first = np.argwhere(~np.isfinite(array))[0].tolist()
+        raise UsageError(f"{what} must be finite; entry {first} is {array[tuple(first)]}")
+    return array

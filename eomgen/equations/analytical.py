@@ -1,0 +1,78 @@
+"""Stage equations: Kinematics -> T, V and the forces without a potential, what analytical mechanics starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..frames import GROUND
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.differentiate import gradient, vjp
+from ..graph.substitute import substitute
+from ..kinematics import Kinematics
+
+
+def form_energies(kinematics: Kinematics) -> tuple[Expr, Expr]:
+    """T and V; of a bare Lagrangian V = -L(v = 0) and T = L + V."""
+    bare = kinematics.mechanism.lagrangian
+    graph = kinematics.graph
+    if bare is not None:
+        at_rest = substitute([bare.expression], dict.fromkeys(kinematics.v, graph.zero))[0]
+        return bare.expression - at_rest, -at_rest
+    kinetic, potential = graph.zero, graph.zero
+    # g . r of each link's origin and g in link axes, outwards from ground, so that no ground pose is needed
+    heights: list[tuple[Expr, vec.Vec3]] = []
+    for link, (angular, linear) in zip(kinematics.links, kinematics.twists, strict=True):
+        height, pull = (graph.zero, kinematics.mechanism.gravity) if link.parent == GROUND else heights[link.parent]
+        height = height + vec.dot(pull, link.position)
+        pull = link.down(pull)
+        heights.append((height, pull))
+        center = vec.add(linear, vec.cross(angular, link.com))
+        spin = vec.dot(angular, vec.times(link.inertia, angular))
+        kinetic = kinetic + (link.mass * vec.dot(center, center) + spin)
+        potential = potential - link.mass * (height + vec.dot(pull, link.com))
+    for force in kinematics.forces:
+        if force.potential is not None:
+            potential = potential + force.potential
+    return 0.5 * kinetic, potential
+
+
+def generalized_forces(kinematics: Kinematics) -> list[Expr]:
+    """Q of everything without a potential, by virtual power: Q = sum F . d(velocity)/dv."""
+    graph, n = kinematics.graph, len(kinematics.v)
+    velocities: list[Expr] = []
+    weights: list[Expr] = []
+    direct = [graph.zero] * n
+    loop = kinematics.loop_coordinates
+    for terms in kinematics.forces:
+        for load in terms.marker_remainder:
+            velocities += kinematics.motion.velocity(load.marker)
+            weights += load.force
+            velocities += kinematics.motion.angular_velocity(load.marker)
+            weights += load.torque
+        for along in terms.coordinate_remainder:
+            if along.coordinate in kinematics.names:
+                j = kinematics.velocity_labels.index(along.coordinate)
+                direct[j] = direct[j] + along.value
+            else:
+                velocities.append(loop.rates[loop.names.index(along.coordinate)])
+                weights.append(along.value)
+    powers = _weighted(velocities, weights, list(kinematics.v))
+    return [a + b + c for a, b, c in zip(direct, powers, _bare_forces(kinematics), strict=True)]
+
+
+def _weighted(velocities: Sequence[Expr], weights: Sequence[Expr], v: Sequence[Expr]) -> list[Expr]:
+    """d(velocities)/dv^T weights, leaving out what is zero."""
+    pairs = [(x, w) for x, w in zip(velocities, weights, strict=True) if not (x.is_zero or w.is_zero)]
+    if not pairs:
+        return [x.graph.zero for x in v]
+    return vjp([x for x, _ in pairs], [w for _, w in pairs], v)
+
+
+def _bare_forces(kinematics: Kinematics) -> list[Expr]:
+    """Given generalized forces less the gradient of Rayleigh's dissipation function."""
+    bare, graph = kinematics.mechanism.lagrangian, kinematics.graph
+    if bare is None:
+        return [graph.zero] * len(kinematics.v)
+    drag = gradient(bare.dissipation, list(kinematics.v))
+    return [f - d for f, d in zip(bare.forces, drag, strict=True)]

@@ -1,0 +1,165 @@
+"""Stage graph: expressions and numbers -> values with bounds of their rounding; which expressions vanish identically.
+
+Running error analysis (J. H. Wilkinson; N. J. Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed. 2002,
+3.3): beside every value x stands a bound e such that x is known to about eps e.  A sum adds the bounds of its terms, so
+that what cancels is judged by the magnitudes of the terms that were added, not by their sum.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..limits.rounding import ROUNDED
+from ..operations import OPERATIONS, operations_with
+from .core import Expr, Graph
+from .differentiate import gradient
+from .evaluate import Evaluator
+from .substitute import symbols_of
+from .traverse import LEAVES, common_graph, reachable
+from .vectors import Mat3, Vec3
+
+TRIES = 3  #: random points at which an identity is tried
+
+
+def with_bounds(outputs: Sequence[Expr], values: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Values of expressions and the bounds of their rounding.
+
+    Parameters
+    ----------
+    outputs : sequence of Expr
+        Expressions of one graph.
+    values : mapping of str to float
+        Of all symbols, taken as exact.
+
+    Returns
+    -------
+    values : (n,) array
+        NaN outside of an operation's domain.
+    bounds : (n,) array
+        In units of eps; infinite where nothing is known, as of a square root at 0.
+    """
+    return _spread(outputs, values, {})
+
+
+def _spread(
+    outputs: Sequence[Expr], values: Mapping[str, float], given: Mapping[str, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of expressions, and what the bounds of some symbols make of theirs; of rounding, if none is given."""
+    graph = common_graph(outputs)
+    if graph is None:
+        return np.empty(0), np.empty(0)
+    order = reachable(graph, (y.id for y in outputs))
+    names = list(values)
+    found = dict(zip(order, Evaluator([Expr(graph, i) for i in order], names)([values[n] for n in names]), strict=True))
+    bounds: dict[int, float] = {}
+    nodes = graph.nodes
+    with np.errstate(all="ignore"):
+        for i in order:
+            operation, *operands = nodes[i]
+            if operation == "sym":
+                bounds[i] = given.get(operands[0], 0.0)
+                continue
+            y, row = found[i], OPERATIONS.get(operation)
+            bound = 0.0 if given or (row is not None and row.exact) else abs(y)
+            if row is not None and row.rates:  # a table or a function in C knows its value
+                try:
+                    x = [found[k] for k in operands]
+                    for rate, k in zip(row.rates, operands, strict=True):
+                        if bounds[k]:
+                            bound += rate(y, *x) * bounds[k]
+                except (ValueError, ArithmeticError):
+                    bound = math.inf
+            bounds[i] = float(bound)
+    return np.array([found[y.id] for y in outputs]), np.array([bounds[y.id] for y in outputs])
+
+
+def vanishing(outputs: Sequence[Expr]) -> list[bool]:
+    """Which expressions are zero, to rounding, at all values of their symbols.
+
+    Tried at random values: an analytic expression that is zero at some of them is zero everywhere, with probability 1.
+    Others, such as ``max(x, 0)``, may vanish in a part of their domain and do not count.  Its derivatives must be
+    rounding too: beside large numbers that cancel, a term of size 1 may be lost in the value.
+    """
+    graph = common_graph(outputs)
+    left = [k for k, analytic in enumerate(_analytic(graph, outputs)) if analytic] if graph is not None else []
+    random = np.random.default_rng(11)
+    names: dict[str, float] = {}
+    for _ in range(TRIES):
+        if not left or graph is None:
+            break
+        for i in reachable(graph, (outputs[k].id for k in left)):
+            if graph.nodes[i][0] == "sym":
+                names[graph.nodes[i][1]] = float(random.uniform(0.2, 1.4) * random.choice((-1.0, 1.0)))
+        values, bounds = with_bounds([outputs[k] for k in left], names)
+        zero = is_rounding(values, bounds)
+        left = [k for k, z in zip(left, zero, strict=True) if z]
+    left = [k for k in left if _is_flat(outputs[k], names)]
+    found = set(left)
+    return [k in found for k in range(len(outputs))]
+
+
+def _is_flat(x: Expr, values: Mapping[str, float]) -> bool:
+    """Whether the slope by each symbol is rounding, also of the terms' own slopes, which folded constants hide."""
+    names = sorted(symbols_of([x]))
+    slopes, bounds = with_bounds(gradient(x, [x.graph.symbol(name) for name in names]), values)
+    terms = [_spread([x], values, {name: 1.0})[1][0] for name in names]
+    return bool(is_rounding(slopes, np.maximum(bounds, terms)).all())
+
+
+def is_rounding(values: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """Whether each value is not told from zero by what is known of its rounding."""
+    return np.asarray(np.isfinite(bounds) & (np.abs(values) <= ROUNDED * bounds))
+
+
+def terms_of(x: Expr) -> Expr:
+    """The sum of the magnitudes of the terms of a sum of products, as an expression; |x| where nothing is added."""
+    graph = x.graph
+    found: dict[int, Expr] = {}
+    for i in reachable(graph, [x.id]):
+        operation, *operands = graph.nodes[i]
+        if operation in ("add", "sub"):
+            found[i] = found[operands[0]] + found[operands[1]]
+        elif operation == "mul":
+            found[i] = found[operands[0]] * found[operands[1]]
+        elif operation == "div":
+            found[i] = found[operands[0]] / graph.apply("abs", Expr(graph, operands[1]))
+        elif operation == "neg":
+            found[i] = found[operands[0]]
+        else:
+            found[i] = graph.apply("abs", Expr(graph, i))
+    return found[x.id]
+
+
+def _analytic(graph: Graph, outputs: Sequence[Expr]) -> list[bool]:
+    found: dict[int, bool] = {}
+    analytic = operations_with(lambda row: row.analytic)
+    for i in reachable(graph, (y.id for y in outputs)):
+        operation, *operands = graph.nodes[i]
+        found[i] = operation in LEAVES or (operation in analytic and all(found[k] for k in operands))
+    return [found[y.id] for y in outputs]
+
+
+def settled_vector(a: Vec3, size: float) -> Vec3:
+    """A vector whose constant components are exactly 0 where they are rounding of terms of a size."""
+    x, y, z = (c.graph.zero if c.value is not None and abs(c.value) <= ROUNDED * size else c for c in a)
+    return (x, y, z)
+
+
+def settled_rotation(m: Mat3) -> Mat3:
+    """A rotation whose constant entries are exactly 0, 1 or -1 where rounding alone keeps them from it."""
+    rows = [list(settled_vector(row, 1.0)) for row in m]
+    graph = m[0][0].graph
+    for i, row in enumerate(rows):
+        found = [j for j, x in enumerate(row) if not x.is_zero]
+        alone = len(found) == 1 and all(other[found[0]].is_zero for k, other in enumerate(rows) if k != i)
+        if alone and (value := row[found[0]].value) is not None:
+            row[found[0]] = graph.constant(math.copysign(1.0, value))
+    return tuple((x, y, z) for x, y, z in rows)  # type: ignore[return-value]
+
+
+def size_of(*vectors: Vec3) -> float:
+    """The sum of the largest constant components of some vectors."""
+    return sum(max((abs(c.value) for c in a if c.value is not None), default=0.0) for a in vectors)

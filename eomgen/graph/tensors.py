@@ -1,0 +1,84 @@
+"""Stage graph: 3 x 3 matrices and inertia tensors of expressions, with few operations.
+
+A turn about a coordinate axis touches only what it changes.
+"""
+
+from __future__ import annotations
+
+from . import vectors as vec
+from .core import Expr
+from .vectors import Mat3, Vec3
+
+
+def symmetric(a: Mat3) -> Mat3:
+    """The upper triangle, mirrored."""
+    return (a[0], (a[0][1], a[1][1], a[1][2]), (a[0][2], a[1][2], a[2][2]))
+
+
+def add_matrices(a: Mat3, b: Mat3) -> Mat3:
+    """a + b"""
+    return (vec.add(a[0], b[0]), vec.add(a[1], b[1]), vec.add(a[2], b[2]))
+
+
+def subtract_matrices(a: Mat3, b: Mat3) -> Mat3:
+    """a - b"""
+    return (vec.sub(a[0], b[0]), vec.sub(a[1], b[1]), vec.sub(a[2], b[2]))
+
+
+def skew(a: Vec3) -> Mat3:
+    """[a]: [a] b = a x b"""
+    o = a[0].graph.zero
+    return ((o, -a[2], a[1]), (a[2], o, -a[0]), (-a[1], a[0], o))
+
+
+def axis_of(rotation: Mat3) -> int | None:
+    """The coordinate axis that a rotation turns about by an angle; None for other rotations and quarter turns."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        alone = all(rotation[k][m].is_zero and rotation[m][k].is_zero for m in (i, j))
+        if alone and rotation[k][k].value == 1.0:
+            c, s = rotation[i][i], rotation[j][i]
+            if c.is_zero or s.is_zero or c != rotation[j][j] or rotation[i][j] != -s:
+                return None
+            return k
+    return None
+
+
+def rotate_symmetric(rotation: Mat3, a: Mat3) -> Mat3:
+    """R a R^T of a symmetric a."""
+    k = axis_of(rotation)
+    if k is not None:
+        return symmetric(_turn(rotation, a, k))
+    half = vec.product(rotation, a)
+    upper = [[vec.dot(half[i], rotation[j]) if j >= i else half[i][j] for j in range(3)] for i in range(3)]
+    return symmetric(tuple(tuple(row) for row in upper))  # type: ignore[arg-type]
+
+
+def rotate(rotation: Mat3, a: Mat3) -> Mat3:
+    """R a R^T"""
+    k = axis_of(rotation)
+    if k is not None:
+        return _turn(rotation, a, k)
+    return vec.product(vec.product(rotation, a), vec.transpose(rotation))
+
+
+def _turn(rotation: Mat3, a: Mat3, k: int) -> Mat3:
+    """R a R^T for a turn by an angle about axis k; c^2 + s^2 = 1 saves half of the operations."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    c, s = rotation[i][i], rotation[j][i]
+    t = s * (a[i][i] - a[j][j]) + c * (a[i][j] + a[j][i])
+    result = [list(row) for row in a]
+    result[i][i], result[j][j] = a[i][i] - s * t, a[j][j] + s * t
+    result[i][j], result[j][i] = c * t - a[j][i], c * t - a[i][j]
+    result[i][k], result[j][k] = c * a[i][k] - s * a[j][k], s * a[i][k] + c * a[j][k]
+    result[k][i], result[k][j] = c * a[k][i] - s * a[k][j], s * a[k][i] + c * a[k][j]
+    return tuple(tuple(row) for row in result)  # type: ignore[return-value]
+
+
+def shift_tensor(mass: Expr, arm: Vec3) -> Mat3:
+    """mass (|d|^2 1 - d d^T): what a point at a distance d adds (Huygens-Steiner)."""
+    x, y, z = arm
+    mx, my, mz = vec.scale(mass, arm)
+    return symmetric(
+        ((my * y + mz * z, -(mx * y), -(mx * z)), (x, mx * x + mz * z, -(my * z)), (x, x, mx * x + my * y))
+    )

@@ -1,0 +1,42 @@
+"""Stage kinematics: constraint elements -> equations in the tree's own symbols."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..describe.mechanism import Mechanism
+from ..graph.core import Expr
+from ..graph.substitute import substitute, symbols_of
+from .loops import Row
+from .motion import MarkerMotion
+
+
+class Coupled(NamedTuple):
+    """What all constraint elements say, in terms of the tree.
+
+    Equations; expressions that must be positive, each with the element's name; and (coordinate, value) pairs from
+    which assembly starts where nothing is said about the coordinate.
+    """
+
+    rows: list[Row]
+    aligned: list[tuple[str, Expr]]
+    hints: list[tuple[str, Expr]]
+
+
+def couple(mechanism: Mechanism, motion: MarkerMotion) -> Coupled:
+    """Ask every constraint element for its equations; coordinates of cut joints become functions of the tree's."""
+    rows: list[Row] = []
+    aligned: list[tuple[str, Expr]] = []
+    hints: list[tuple[str, Expr]] = []
+    for constraint in mechanism.constraints:
+        conditions = constraint.conditions(motion)
+        positive = constraint.aligned(motion)
+        near = constraint.hints(motion)
+        flat = [*(c.expression for c in conditions), *positive, *(value for _, value in near)]
+        mapping = motion.derived_symbols(mechanism, symbols_of(flat))
+        values = iter(substitute(flat, mapping) if mapping else flat)
+        written = constraint.written
+        rows += [Row(f"{constraint.name}.{c.label}", next(values), c.kind, c.level, written) for c in conditions]
+        aligned += [(constraint.name, next(values)) for _ in positive]
+        hints += [(str(symbol.node[1]), next(values)) for symbol, _ in near]
+    return Coupled(rows, aligned, hints)

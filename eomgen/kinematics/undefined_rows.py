@@ -1,0 +1,95 @@
+"""Stage kinematics: what no motion can mend: springs of no length, discs that always lie flat, undefined rows."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from ..constraints import RollingDisc
+from ..describe.mechanism import Mechanism
+from ..errors import ModelError, Problem
+from ..forces import Line, Route
+from ..frames import Marker, WrapCylinder
+from ..graph.core import Expr
+from ..graph.evaluate import evaluate
+from ..graph.substitute import symbols_of
+from .motion import MarkerMotion
+
+if TYPE_CHECKING:
+    from .loops import Constraints
+
+
+def find_flaws(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
+    """Force elements whose ends never part or lie in a cylinder, and discs that lie flat, at every position."""
+    problems = []
+    for force in mechanism.forces:
+        path = getattr(force, "path", None)
+        place = f"forces.{force.name}"
+        if isinstance(path, Line) and _meet(motion, path.start, path.end):
+            what = "both ends are always at the same point"
+            problems.append(mechanism.problem(place, what, "a line needs two points that can part; move one of them"))
+        if isinstance(path, Route):
+            problems += _flaws_of_route(mechanism, motion, place, path)
+    for constraint in mechanism.constraints:
+        if isinstance(constraint, RollingDisc) and constraint.lies_flat(motion):
+            what = f"{constraint.wheel.label} always lies flat: its axle (z) is along the plane's normal"
+            remedy = "turn the marker of the wheel or of the plane (rpy), or take a joint that lets the disc stand"
+            problems.append(mechanism.problem(f"constraints.{constraint.name}", what, remedy))
+    return problems
+
+
+def _meet(motion: MarkerMotion, start: Marker, end: Marker) -> bool:
+    return all(x.is_zero for x in motion.relative(start, end).position)
+
+
+def _flaws_of_route(mechanism: Mechanism, motion: MarkerMotion, place: str, route: Route) -> list[Problem]:
+    problems = []
+    stops = [route.start, *route.via, route.end]
+    for k, (one, other) in enumerate(pairwise(stops)):
+        if isinstance(one, Marker) and isinstance(other, Marker) and _meet(motion, one, other):
+            what = f"{one.label} and {other.label}, which follow each other, are always at the same point"
+            problems.append(mechanism.problem(place, what, "leave one of them out"))
+        for cylinder, end in ((one, other), (other, one)):
+            if isinstance(cylinder, WrapCylinder) and isinstance(end, Marker):
+                x, y, _ = motion.relative(cylinder.marker, end).position
+                number = _number(mechanism, x * x + y * y - cylinder.radius * cylinder.radius)
+                if number is not None and number < 0.0:
+                    index = k if cylinder is other else k - 1
+                    what = f"{end.label} lies inside the cylinder around {cylinder.marker.label}"
+                    remedy = "a path starts and ends outside; give a smaller radius or move the point"
+                    problems.append(mechanism.problem(f"{place}.via[{index}]", what, remedy))
+    return problems
+
+
+def _number(mechanism: Mechanism, value: Expr) -> float | None:
+    """The value, if it depends on nothing but parameters whose values are declared."""
+    declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
+    return float(evaluate([value], declared)[0]) if symbols_of([value]) <= declared.keys() else None
+
+
+def refuse_rows_of_time(mechanism: Mechanism, constraints: Constraints) -> None:
+    """Refuse constraints in which only time, inputs and parameters stand: no coordinate can hold them.
+
+    Raises
+    ------
+    ModelError
+        Names the constraints.
+    """
+    problems, clock = [], {"t", *(u.name for u in mechanism.inputs)}
+    free = [*constraints.values, *constraints.velocity[len(constraints.values) :]]
+    for label, row, left in zip(constraints.labels, constraints.jacobian, free, strict=True):
+        moving = sorted(symbols_of([left]) & clock)
+        if moving and all(x.is_zero for x in row):
+            what = f"{label} depends on {', '.join(moving)} and on no coordinate, so nothing can hold it"
+            remedy = "let a coordinate follow it, or take it away"
+            problems.append(mechanism.problem(place_of(mechanism, label), what, remedy))
+    if problems:
+        raise ModelError(problems)
+
+
+def place_of(mechanism: Mechanism, label: str) -> str:
+    """The path of the element that a constraint row belongs to."""
+    if mechanism.lagrangian or mechanism.given:
+        return "lagrangian.constraints" if mechanism.lagrangian else "equations.constraints"
+    name = label.partition(".")[0]
+    return f"joints.{name}" if any(spec.name == name for spec in mechanism.joints) else f"constraints.{name}"

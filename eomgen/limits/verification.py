@@ -1,0 +1,36 @@
+"""Limits: verification, by differences and runs of limited length."""
+
+from __future__ import annotations
+
+# -- differences -----------------------------------------------------------------------------------------------------
+#: Relative step by which a slope is estimated where only its size matters: the root of its rounding, and more.
+NUDGE = 1e-6
+#: Added to limits, relative to the size of the result: truncation of first differences in sixty digits is 1e-32, of
+#: second differences 1e-24.
+FIRST_DIFFERENCE, SECOND_DIFFERENCE = 1e-30, 1e-24
+#: The same of a sum of such differences (in units of the force).
+NO_FORCE = 1e-40
+#: First step off the constraints.  The projection adds a term that grows with the residual: x' then has a part that
+#: goes with the third power of the distance, without its sign, and farther away takes another number of passes.
+OFF_CONSTRAINTS = 2.5e-3
+
+# -- runs ------------------------------------------------------------------------------------------------------------
+#: Relative tolerances of runs that are compared, of a stepper judged by itself, and of SciPy's run beside them.
+COMPARED, TIGHT = 1e-10, 1e-13
+#: Absolute ones, relative to them.
+ABSOLUTE = 1e-3
+#: Difference of the ends of two runs, in tolerances of one step, of which there are many.
+COLLECTED = 1e3
+LOOSE = 1e6  #: tolerance that accepts every step
+LARGE = 1e-2  #: relative error from which on a step is too long to tell an order
+SLOWEST = 1e-3  #: rate (1/s) below which nothing changes
+#: Tolerances of runs of a model written otherwise, and by how much their ends may differ.
+RTOL, ATOL, RUNS = 1e-10, 1e-12, 1e-7
+
+# -- states ----------------------------------------------------------------------------------------------------------
+CLOSED = 1e-9  #: scaled residual of a state that counts as closed
+#: Least part of the largest singular value of J, and of the freedoms' in coordinates, of a state that is regular.
+REGULAR = 1e-3
+DEPENDENT = 1e-9  #: part of the largest below which a singular value is that of a redundant row
+#: Rounding of a result over its size, at least: 45 eps.
+ROUNDED = 1e-14

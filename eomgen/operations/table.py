@@ -1,0 +1,218 @@
+"""The table of operations: all that eomgen knows of each operation of an expression, one row an operation."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .row import ARITHMETIC, EVEN, ODD, Operation, choice, condition, function
+
+
+def over(g: Any, a: int) -> int:
+    """1 / a."""
+    return int(g.div(g.one.id, a))
+
+
+def _one_and(g: Any, way: str, a: int) -> int:
+    """1 + a^2, or with "sub" 1 - a^2."""
+    return int(getattr(g, way)(g.one.id, g.mul(a, a)))
+
+
+def _root(g: Any, a: int) -> int:
+    return int(g.make("sqrt", a))
+
+
+def _squares(g: Any, a: int, b: int) -> int:
+    return int(g.add(g.mul(a, a), g.mul(b, b)))
+
+
+def _root_of_square(g: Any, a: int) -> int | None:
+    kind, *factors = g.nodes[a]
+    return g.make("abs", factors[0]) if kind == "mul" and factors[0] == factors[1] else None
+
+
+def _chosen(g: Any, c: int, a: int, b: int) -> int | None:
+    kind, *known = g.nodes[c]
+    return (a if known[0] else b) if kind == "const" else a if a == b else None
+
+
+def _one(g: Any, *ids: int) -> int:
+    return int(g.one.id)
+
+
+def _unit(y: Any, *x: Any) -> float:
+    return 1.0
+
+
+def _turned(y: Any, a: Any) -> Any:
+    """Of a sine or cosine: also formed from those of the parts of a sum, by two products and a sum."""
+    return abs(y) + 2.0
+
+
+def _sign(a: float) -> float:
+    return float((a > 0) - (a < 0)) if a == a else a
+
+
+ROWS = (
+    Operation(
+        "add", ARITHMETIC, operator.add, np.add, "{} + {}", "{} + {}", 2, (_one, _one), (_unit, _unit),
+        rule=lambda g, a, b: g.add(a, b), sympy=lambda s, a, b: a + b, commutative=True, analytic=True,
+    ),
+    Operation(
+        "sub", ARITHMETIC, operator.sub, np.subtract, "{} - {}", "{} - {}", 2,
+        (_one, lambda g, y, a, b: g.neg(g.one.id)), (_unit, _unit),
+        rule=lambda g, a, b: g.sub(a, b), sympy=lambda s, a, b: a - b, analytic=True,
+    ),
+    Operation(
+        "mul", ARITHMETIC, operator.mul, np.multiply, "{}*{}", "{} * {}", 2,
+        (lambda g, y, a, b: b, lambda g, y, a, b: a), (lambda y, a, b: abs(b), lambda y, a, b: abs(a)),
+        error=lambda y, x, e: abs(x[0]) * e[1] + abs(x[1]) * e[0] + e[0] * e[1],
+        rule=lambda g, a, b: g.mul(a, b), sympy=lambda s, a, b: a * b, commutative=True, analytic=True,
+    ),
+    Operation(
+        "div", ARITHMETIC, operator.truediv, np.divide, "{}/{}", "{} / {}", 2,
+        (lambda g, y, a, b: over(g, b), lambda g, y, a, b: g.neg(g.mul(y, over(g, b)))),
+        (lambda y, a, b: 1.0 / abs(b), lambda y, a, b: abs(y / b)),
+        rule=lambda g, a, b: g.div(a, b), sympy=lambda s, a, b: a / b, analytic=True, fragile=True,
+    ),
+    Operation(
+        "neg", ARITHMETIC, operator.neg, np.negative, "-{}", "-{}", 1, (lambda g, y, a: g.neg(g.one.id),), (_unit,),
+        rule=lambda g, a: g.neg(a), sympy=lambda s, a: -a, exact=True, analytic=True,
+    ),
+    choice(
+        "abs", abs, np.abs, "abs_of({})", slopes=(lambda g, y, a: g.make("sign", a),), rates=(_unit,),
+        sympy="Abs", sympy_class="Abs", parity=EVEN,
+    ),
+    choice(
+        "sign", _sign, np.sign, "sign_of({})",
+        body="choose(a > 0.0, same(1.0), choose(a < 0.0, same(-1.0), choose(a == 0.0, same(0.0), a)))",
+        sympy="sign", sympy_class="sign", jumps=True,
+    ),
+    choice(  # NaN wins, as in numpy.minimum
+        "min", lambda a, b: a if a <= b or a != a else b, np.minimum, "smaller({}, {})", arity=2,
+        body="choose((a <= b) | (a != a), a, b)", choice=lambda g, a, b: (g.make("le", a, b), a, b),
+        rates=(lambda y, a, b: y == a, lambda y, a, b: y != a), error=lambda y, x, e: np.maximum(*e),
+        rule=lambda g, a, b: a if a == b else None,
+        sympy="Min", sympy_class="Min", commutative=True, many=True,
+    ),
+    choice(
+        "max", lambda a, b: a if a >= b or a != a else b, np.maximum, "larger({}, {})", arity=2,
+        body="choose((a >= b) | (a != a), a, b)", choice=lambda g, a, b: (g.make("le", b, a), a, b),
+        rates=(lambda y, a, b: y == a, lambda y, a, b: y != a), error=lambda y, x, e: np.maximum(*e),
+        rule=lambda g, a, b: a if a == b else None,
+        sympy="Max", sympy_class="Max", commutative=True, many=True,
+    ),
+    function(
+        "pow", math.pow, np.power,
+        (lambda g, y, a, b: g.mul(b, g.make("pow", a, g.sub(b, g.one.id))),
+         lambda g, y, a, b: g.mul(y, g.make("log", a))),
+        (lambda y, a, b: abs(b * np.power(a, b - 1.0)), lambda y, a, b: abs(y * np.log(abs(a)))),
+        rounding=lambda y, a, b: (2.0 + abs(b)) * abs(y),  # repeated products where b is whole
+        rule=lambda g, a, b: g.power(a, b), recurrence=None,
+        sympy=lambda s, a, b: a**b, word="", digits="power", fragile=True,
+    ),
+    function(
+        "atan2", math.atan2, np.arctan2,  # a = opposite, b = adjacent
+        (lambda g, y, a, b: g.mul(b, over(g, _squares(g, a, b))),
+         lambda g, y, a, b: g.neg(g.mul(a, over(g, _squares(g, a, b))))),
+        (lambda y, a, b: abs(b) / (a * a + b * b), lambda y, a, b: abs(a) / (a * a + b * b)),
+        recurrence=lambda g, y, a, b: ((b, g.neg(a)), _squares(g, a, b)),
+    ),
+    function(
+        "hypot", math.hypot, np.hypot, (lambda g, y, a, b: g.div(a, y), lambda g, y, a, b: g.div(b, y)),
+        (lambda y, a, b: abs(a) / y, lambda y, a, b: abs(b) / y), recurrence=lambda g, y, a, b: ((a, b), y),
+        sympy=lambda s, a, b: s.sqrt(a**2 + b**2), sympy_class="hypot", commutative=True,
+    ),
+    function(
+        "sqrt", math.sqrt, np.sqrt, (lambda g, y, a: g.div(g.constant(0.5).id, y),), (lambda y, a: 0.5 / y,),
+        error=lambda y, x, e: np.fmin(0.5 * e[0] / y, np.sqrt(e[0])),
+        rule=_root_of_square, recurrence=None, fragile=True,
+    ),
+    function("exp", math.exp, np.exp, (lambda g, y, a: y,), (lambda y, a: y,), analytic=True, fragile=True),
+    function(
+        "log", math.log, np.log, (lambda g, y, a: over(g, a),), (lambda y, a: 1.0 / abs(a),),
+        recurrence=lambda g, y, a: ((g.one.id,), a), fragile=True,
+    ),
+    function(
+        "sin", math.sin, np.sin, (lambda g, y, a: g.make("cos", a),), (lambda y, a: abs(np.cos(a)),),
+        c="sine_of({})", rounding=_turned, parity=ODD, analytic=True,
+    ),
+    function(
+        "cos", math.cos, np.cos, (lambda g, y, a: g.neg(g.make("sin", a)),), (lambda y, a: abs(np.sin(a)),),
+        c="cosine_of({})", rounding=_turned, parity=EVEN, analytic=True,
+    ),
+    function(
+        "tan", math.tan, np.tan, (lambda g, y, a: _one_and(g, "add", y),), (lambda y, a: 1.0 + y * y,),
+        parity=ODD, analytic=True, fragile=True,
+    ),
+    function(
+        "asin", math.asin, np.arcsin, (lambda g, y, a: over(g, _root(g, _one_and(g, "sub", a))),),
+        (lambda y, a: 1.0 / np.sqrt(1.0 - a * a),), parity=ODD, fragile=True,
+        recurrence=lambda g, y, a: ((g.one.id,), _root(g, _one_and(g, "sub", a))),
+    ),
+    function(
+        "acos", math.acos, np.arccos, (lambda g, y, a: g.neg(over(g, _root(g, _one_and(g, "sub", a)))),),
+        (lambda y, a: 1.0 / np.sqrt(1.0 - a * a),), fragile=True,
+        recurrence=lambda g, y, a: ((g.neg(g.one.id),), _root(g, _one_and(g, "sub", a))),
+    ),
+    function(
+        "atan", math.atan, np.arctan, (lambda g, y, a: over(g, _one_and(g, "add", a)),),
+        (lambda y, a: 1.0 / (1.0 + a * a),), parity=ODD,
+        recurrence=lambda g, y, a: ((g.one.id,), _one_and(g, "add", a)),
+    ),
+    function(
+        "sinh", math.sinh, np.sinh, (lambda g, y, a: g.make("cosh", a),), (lambda y, a: np.cosh(a),),
+        parity=ODD, analytic=True, fragile=True,
+    ),
+    function(
+        "cosh", math.cosh, np.cosh, (lambda g, y, a: g.make("sinh", a),), (lambda y, a: abs(np.sinh(a)),),
+        parity=EVEN, analytic=True, fragile=True,
+    ),
+    function(
+        "tanh", math.tanh, np.tanh, (lambda g, y, a: _one_and(g, "sub", y),), (lambda y, a: 1.0 - y * y,),
+        parity=ODD, analytic=True,
+    ),
+    function(
+        "asinh", math.asinh, np.arcsinh, (lambda g, y, a: over(g, _root(g, _one_and(g, "add", a))),),
+        (lambda y, a: 1.0 / np.sqrt(1.0 + a * a),), parity=ODD,
+    ),
+    function(
+        "acosh", math.acosh, np.arccosh,
+        (lambda g, y, a: g.div(over(g, _root(g, g.sub(a, g.one.id))), _root(g, g.add(a, g.one.id))),),
+        (lambda y, a: 1.0 / np.sqrt((a - 1.0) * (a + 1.0)),), fragile=True,
+    ),
+    function(
+        "atanh", math.atanh, np.arctanh, (lambda g, y, a: over(g, _one_and(g, "sub", a)),),
+        (lambda y, a: 1.0 / (1.0 - a * a),), parity=ODD, fragile=True,
+    ),
+    condition("lt", operator.lt, np.less, "({} < {})", "Lt", jumps=True),
+    condition("le", operator.le, np.less_equal, "({} <= {})", "Le", jumps=True),
+    condition("eq", operator.eq, np.equal, "({} == {})", "Eq", commutative=True, jumps=True),
+    condition("not", operator.not_, np.logical_not, "({} == 0.0)", "Not"),
+    condition(
+        "and", lambda a, b: bool(a and b), np.logical_and, "(({} != 0.0) & ({} != 0.0))", "And",
+        commutative=True, many=True,
+    ),
+    condition(
+        "or", lambda a, b: bool(a or b), np.logical_or, "(({} != 0.0) | ({} != 0.0))", "Or",
+        commutative=True, many=True,
+    ),
+    choice(
+        "select", lambda c, a, b: a if c else b, lambda c, a, b: np.where(np.asarray(c) != 0.0, a, b),
+        "choose({}, {}, {})", arity=3, numpy="np.where({}, {}, {})", choice=lambda g, c, a, b: (c, a, b),
+        rates=(lambda y, c, a, b: 0.0, lambda y, c, a, b: c != 0.0, lambda y, c, a, b: c == 0.0),
+        rule=_chosen,
+        sympy=lambda s, c, a, b: s.Piecewise((a, c), (b, True)), word="where",
+    ),
+)  # fmt: skip
+
+OPERATIONS: dict[str, Operation] = {row.name: row for row in ROWS}
+
+
+def operations_with(test: Callable[[Operation], bool]) -> frozenset[str]:
+    """Names of the operations that pass a test."""
+    return frozenset(name for name, row in OPERATIONS.items() if test(row))

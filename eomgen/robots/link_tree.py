@@ -1,0 +1,242 @@
+"""Robots, the tree: a Robot -> its links in order from the root, each in the body it is part of; faults of the tree.
+
+Links welded to each other make one body, in the frame of the link nearest to the root.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..describe.names import nearest
+from ..errors import ModelError
+from ..numeric.rigid_inertia import fault_of_inertia, inertia_scales, longest_within
+from ..numeric.rotation_matrices import about
+from .robot import Robot, RobotJoint, RobotLink, RobotOptions
+from .robot_frames import IDENTITY, Inertia, Placement, moved, sum_inertias
+
+GROUND = ""  #: the body that stands still
+
+
+@dataclass
+class RobotBody:
+    """Links that move as one: frames of the links in the body, and the joint that carries it."""
+
+    name: str
+    joint: RobotJoint | None
+    members: list[tuple[RobotLink, Placement]] = field(default_factory=list)
+
+    def inertia(self) -> Inertia:
+        """Of all links together, in body axes."""
+        return sum_inertias([link.inertia.seen(frame) for link, frame in self.members])
+
+
+@dataclass
+class Bodies:
+    """The bodies of a robot in order from the root (ground first), and where each link is."""
+
+    bodies: dict[str, RobotBody]
+    home: dict[str, tuple[str, Placement]]  #: link -> body and frame in it
+    massless: bool = False  #: nothing that moves has a mass: a robot for kinematics
+
+
+def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
+    """Sort the links into bodies.
+
+    Raises
+    ------
+    ModelError
+        The robot has faults: all of them, those of its elements included.
+    """
+    _lock(robot, options)
+    _check_ends(robot)
+    root = _root(robot)
+    for joint in robot.joints.values():
+        if options.mimic != "independent":
+            _check_mimic(robot, joint)
+    if robot.problems:
+        if options.check_inertia == "error":
+            _check_inertias(robot)
+        raise ModelError(sorted(robot.problems, key=lambda p: p.line))
+    carried: dict[str, list[RobotJoint]] = {}
+    for joint in robot.joints.values():
+        carried.setdefault(joint.parent, []).append(joint)
+    base = RobotBody(GROUND, None)
+    found = Bodies({GROUND: base}, {})
+    link = robot.links[root]
+    if options.floating:
+        free = RobotJoint("base", "free", GROUND, root, link.place)
+        found.bodies[root] = RobotBody(root, free, [(link, IDENTITY)])
+        found.home[root] = root, IDENTITY
+    else:
+        base.members.append((link, IDENTITY))
+        found.home[root] = GROUND, IDENTITY
+    waiting = list(reversed(carried.get(root, ())))
+    while waiting:
+        joint = waiting.pop()
+        link = robot.links[joint.child]
+        if joint.type == "weld" and options.merge:
+            body, frame = found.home[joint.parent]
+            frame = frame @ joint.outer @ joint.inner.inverse()
+        else:
+            body, frame = link.name, IDENTITY
+            found.bodies[body] = RobotBody(body, joint)
+        found.bodies[body].members.append((link, frame))
+        found.home[link.name] = body, frame
+        waiting.extend(reversed(carried.get(link.name, ())))
+    if len(found.bodies) == 1:
+        robot.problem(
+            "robot",
+            "no link can move",
+            "give it joints; the base of a URDF robot floats with floating=True, or --floating",
+            (robot.file, 1),
+        )
+    _check_masses(robot, found, options.check_inertia)
+    if robot.problems:
+        raise ModelError(sorted(robot.problems, key=lambda p: p.line))
+    return found
+
+
+def find_tied(robot: Robot, found: Bodies) -> set[str]:
+    """Joints that a loop or an equality of coordinates ties to others."""
+    tied = {joint for tie in robot.ties for joint, _ in (*tie.left.parts, *tie.right.parts)}
+    for loop in robot.loops:
+        ends = []
+        for link, _ in (loop.first, loop.second):
+            chain: set[str] = set()
+            joint = found.bodies[found.home[link][0]].joint
+            while joint is not None:
+                chain.add(joint.name)
+                joint = found.bodies[found.home[joint.parent][0]].joint if joint.parent else None
+            ends.append(chain)
+        tied |= ends[0] ^ ends[1]  # those towards ground of both turn them alike
+    return tied
+
+
+def _lock(robot: Robot, options: RobotOptions) -> None:
+    """Turn locked joints into welds at their values."""
+    for name, value in options.locked.items():
+        joint = robot.joints.get(name)
+        if joint is None:
+            robot.problem(f"lock.{name}", "no such joint", nearest(name, robot.joints, "joints"), (robot.file, 1))
+            continue
+        if joint.type not in ("revolute", "prismatic", "weld"):
+            robot.problem(
+                f"lock.{name}", f"is a {joint.type} joint", "only joints of one degree are locked", joint.place
+            )
+            continue
+        axis = np.array(joint.axis) / max(map(abs, joint.axis))  # first, as squares of small numbers vanish
+        axis /= np.linalg.norm(axis)
+        motion = (
+            moved(value * axis) if joint.type == "prismatic" else Placement(about(axis.tolist(), value), np.zeros(3))
+        )
+        if joint.type != "weld":
+            robot.joints[name] = replace(joint, type="weld", outer=joint.outer @ motion)  # what it mimics is held too
+
+
+def _check_ends(robot: Robot) -> None:
+    """Note joints whose links do not exist, and links that two joints carry."""
+    carrier: dict[str, RobotJoint] = {}
+    for joint in robot.joints.values():
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link and link not in robot.links:
+                remedy = nearest(link, robot.links, "links")
+                robot.problem(f"joint.{joint.name}.{end}", f"no link {link!r}", remedy, joint.place)
+        if joint.child and joint.child in carrier:
+            other = carrier[joint.child].name
+            message = f"the link {joint.child!r} is also the child of the joint {other!r}"
+            robot.problem(f"joint.{joint.name}.child", message, "the links of a URDF file make a tree", joint.place)
+        carrier.setdefault(joint.child, joint)
+
+
+def _root(robot: Robot) -> str:
+    """The link that no joint carries; other than one are a fault."""
+    children = {joint.child for joint in robot.joints.values()}
+    roots = [link for link in robot.links.values() if link.name not in children]
+    if robot.links and not roots:
+        robot.problem("robot", "the joints form a ring: no link is the root", "make them a tree", (robot.file, 1))
+    for link in roots[1:]:
+        message = f"has no parent, like {roots[0].name!r}: a robot has one root"
+        robot.problem(f"link.{link.name}", message, "connect it by a joint, or remove it", link.place)
+    if len(roots) == 1 and not robot.problems:
+        reached, waiting = set(), [roots[0].name]
+        carried: dict[str, list[str]] = {}
+        for joint in robot.joints.values():
+            carried.setdefault(joint.parent, []).append(joint.child)
+        while waiting:
+            name = waiting.pop()
+            reached.add(name)
+            waiting.extend(carried.get(name, ()))
+        for link in robot.links.values():
+            if link.name not in reached:
+                message = f"the joints do not connect it to the root {roots[0].name!r}: they form a ring"
+                robot.problem(f"link.{link.name}", message, "make the joints a tree", link.place)
+    return roots[0].name if roots else ""
+
+
+def _check_mimic(robot: Robot, joint: RobotJoint) -> None:
+    if joint.mimic is None:
+        return
+    other = robot.joints.get(joint.mimic.joint)
+    path = f"joint.{joint.name}.mimic"
+    if other is None:
+        remedy = nearest(joint.mimic.joint, robot.joints, "joints")
+        robot.problem(path, f"no joint {joint.mimic.joint!r}", remedy, joint.place)
+    elif other is joint:
+        robot.problem(path, "the joint mimics itself", "name another joint", joint.place)
+
+
+def _check_inertias(robot: Robot) -> None:
+    """Note inertias that no link can have, of a robot with other faults, whose bodies are not known.
+
+    Links welded to others are left out: the body they make may be sound.
+    """
+    faulty = {problem.line for problem in robot.problems}
+    sound = [joint for joint in robot.joints.values() if joint.place[1] not in faulty]
+    welded = {end for joint in sound if joint.type == "weld" for end in (joint.parent, joint.child)}
+    moved_links = {joint.child for joint in robot.joints.values()}
+    points = {x.name: [x.inertia.com] if x.inertia.mass else [] for x in robot.links.values()}
+    for joint in robot.joints.values():
+        points.setdefault(joint.parent, []).append(joint.outer.position)
+        points.setdefault(joint.child, []).append(joint.inner.position)
+    inertias = [link.inertia for link in robot.links.values()]
+    longest = longest_within(own for name, own in points.items() if name in robot.links)
+    scales = inertia_scales([i.mass for i in inertias], [i.tensor for i in inertias], longest)
+    for link, scale in zip(robot.links.values(), scales, strict=True):
+        fault = fault_of_inertia(link.inertia.tensor, scale=scale)
+        if fault and link.name in moved_links - welded and link.place[1] not in faulty:
+            robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
+
+
+def _check_masses(robot: Robot, found: Bodies, check: str) -> None:
+    """Note joints that move nothing, which no force could accelerate by a finite amount; with ``check`` as a fault.
+
+    A robot without any mass is no slip of the pen: it is one for kinematics, and a note says so.
+    """
+    heavy: set[str] = set()
+    idle: list[RobotJoint] = []
+    for body in reversed(found.bodies.values()):  # children come after their parents
+        inertia = body.inertia()
+        if not inertia.is_nothing:
+            heavy.add(body.name)
+        if body.joint is None:
+            continue
+        if body.name in heavy:
+            heavy.add(found.home[body.joint.parent][0] if body.joint.parent else GROUND)
+        elif body.joint.type != "weld" and not body.joint.armature:
+            idle.append(body.joint)
+    moving = [body for body in found.bodies.values() if body.joint is not None]
+    found.massless = bool(moving) and all(b.inertia().is_nothing and not b.joint.armature for b in moving if b.joint)
+    if found.massless and check == "error":
+        robot.notes.append("for kinematics only: no link that moves has mass or inertia")
+    elif check == "note" and idle:
+        names = ", ".join(joint.name for joint in reversed(idle))
+        robot.notes.append(f"for kinematics only: joints that move nothing with mass or inertia ({names})")
+    for joint in idle if check == "error" and not found.massless else ():
+        message = f"the link {joint.child!r} that it moves has no mass, nor has any link on it"
+        remedy = (
+            f"give that link an <inertial>, make the joint fixed, or lock it: lock={{{joint.name!r}: 0}}; for "
+            "kinematics alone, check_inertia='note' (--check-inertia note)"
+        )
+        robot.problem(f"joint.{joint.name}", message, remedy, joint.place)

@@ -1,0 +1,79 @@
+"""Stage runtime: a kernel that failed at a state -> what it is due to, in words: inputs, elements, coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ..limits.inertia import SINGULAR
+from ..numeric import algebra
+from ..numeric.definite import correlated
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .layout import Layout
+    from .protocols import State
+
+
+class Evaluates(Protocol):
+    """The calls of a model, as :class:`~.kernels.Kernels` has them."""
+
+    core: Any
+    context: Any
+    layout: Layout
+
+    def state(self, name: str, nan: bool = False) -> State: ...
+
+
+def find_culprit(
+    kernels: Evaluates, status: int, t: float, x: Array, p: Array | None = None, u: Array | None = None
+) -> str:
+    """Names what a failure at a state is due to, as far as it can be told, with p and u of the call."""
+    layout, q = kernels.layout, x[: kernels.layout.n_q]
+    if status == 1:
+        return _not_finite(kernels, t, x, p, u)
+    if status == 2:
+        M = kernels.state("embedded_mass_matrix", nan=True)(q, t=t, p=p, u=u)
+        if not np.isfinite(M).all():
+            return ""
+        values, vectors = algebra.eigh(correlated(M))  # whatever the units of the coordinates
+        if layout.metadata.get("indefinite"):
+            return f"the eigenvalue nearest to 0 is {values[np.abs(values).argmin()]:.2g}"
+        if values[0] > SINGULAR:
+            return "or its reactions cannot be told apart, since alone it is: method='embedding' needs none"
+        weights = np.abs(vectors[:, 0])
+        moved = zip(layout.independent, weights, strict=True)
+        names = [layout.velocity_labels[i] for i, w in moved if w > 0.1 * weights.max()]
+        moving = " and ".join(names) if len(names) < 5 else ", ".join(names[:4]) + ", ..."
+        size = "negative" if values[0] < -SINGULAR else "no"
+        return f"moving {moving} meets {size} inertia (smallest eigenvalue {values[0]:.2g})"
+    if status == 3:
+        e = kernels.state("constraints", nan=True)(q, t=t, p=p, u=u)
+        if not np.isfinite(e).all() or not e.size:
+            return ""
+        worst = int(np.abs(layout.scales.residual(e)).argmax())
+        return f"largest residual at {layout.constraint_labels[worst]}, {abs(e[worst]):.3g}"
+    if status == 4:
+        return f"independent are {', '.join(layout.velocity_labels[i] for i in layout.independent)}"
+    return ""
+
+
+def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Array | None) -> str:
+    """Names what makes a result that is no number: inputs, loads of elements, the mass matrix."""
+    layout = kernels.layout
+    inputs = kernels.context.u if u is None else u
+    bad = [name for name, value in zip(layout.u, inputs, strict=True) if not np.isfinite(value).all()]
+    if bad:
+        return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
+    if layout.n_e and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
+        finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
+        loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
+        if loads:
+            why = "ends that meet or lie inside the cylinder, or a law outside its domain"
+            return f"the loads of {loads} are not ({why})"
+    if "mass_matrix" in kernels.core.names and x.size >= layout.n_q:
+        M = kernels.state("mass_matrix", nan=True)(x[: layout.n_q], t=t, p=p, u=u)
+        if not np.isfinite(M).all():
+            return "the mass matrix is not (a mass, an inertia or a length outside the domain of its law)"
+    return ""

@@ -1,0 +1,120 @@
+"""Stage runtime: a name that does not fit -> an error that suggests the nearest ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from types import ModuleType
+from typing import Any
+
+from ..errors import MissingDependencyError, UsageError
+from ..texts import shown
+
+
+class UnknownNameError(UsageError, KeyError):
+    """A key that does not exist; also a KeyError, so that mappings behave as expected."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
+    """The error for an unknown name, with near misses or, if there are none, what there is."""
+    return UnknownNameError(f"no {what} {name!r}; {_hint(name, allowed)}")
+
+
+def find_lacking(one: object, kind: str, name: str) -> Any:
+    """What ``__getattr__`` of a class has to say of an attribute that Python did not find.
+
+    Names that begin with an underscore are asked for by copy, pickle and notebooks, and are looked up nowhere.
+
+    Raises
+    ------
+    AttributeError
+        With near misses; a property that raised one raises its own again.
+    """
+    if name.startswith("_"):
+        raise AttributeError(f"{kind} has no attribute {name!r}", name=name)
+    if (own := next((vars(base)[name] for base in type(one).__mro__ if name in vars(base)), None)) is not None:
+        return own.__get__(one, type(one))
+    public = sorted(n for n in {*dir(type(one)), *vars(one)} if not n.startswith("_"))
+    raise AttributeError(f"{kind} has no attribute {name!r}; {_hint(name, public, len(public))}", name=name)
+
+
+def _hint(name: object, allowed: Iterable[str], most: int = 20) -> str:
+    from difflib import get_close_matches  # only needed when something went wrong
+
+    choice = list(dict.fromkeys(allowed))
+    near = get_close_matches(str(name), choice, n=3, cutoff=0.6)
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    if not choice:
+        return "there are none"
+    first = ", ".join(choice[:most])
+    return f"there {'is' if len(choice) == 1 else 'are'} {first}{' ...' if len(choice) > most else ''}"
+
+
+def check_names(
+    what: str, given: Mapping[str, object], allowed: Collection[str], further: Collection[str] = ()
+) -> None:
+    """Raise :class:`UnknownNameError` for the first name not allowed; `further` ones are suggested too."""
+    for name in given:
+        if name not in allowed:
+            raise unknown(what, name, [*allowed, *further])
+
+
+def read_names(what: str, given: Any) -> tuple[str, ...]:
+    """One name or several as a tuple of texts.
+
+    Raises
+    ------
+    UsageError
+    """
+    if isinstance(given, str):
+        return (given,)
+    try:
+        names = tuple(given)
+    except TypeError:
+        names = (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise UsageError(f"{what} must be a name or a list of names, not {shown(given)}")
+    return names
+
+
+def require_mapping(what: str, given: Any) -> None:
+    """Refuse what does not give values by name.
+
+    Raises
+    ------
+    UsageError
+    """
+    if not isinstance(given, Mapping):
+        raise UsageError(f"{what} must give values by name, as a mapping does, not {shown(given)}")
+
+
+def require(module: str, extra: str, purpose: str) -> ModuleType:
+    """Import an optional package, or say in one line what to install."""
+    from importlib import import_module
+
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        if error.name is not None and error.name.partition(".")[0] != package:
+            raise  # the package is there and something it needs is not
+        raise MissingDependencyError(f"{purpose} needs {package}: pip install {extra}") from error
+
+
+def require_time_and_state(label: str, function: Callable[..., Any]) -> None:
+    """Refuse a function that cannot be called as f(t, x); one that shows no signature is left to its first call."""
+    from inspect import signature
+
+    try:
+        taken = signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        taken.bind(0.0, None)
+    except TypeError:
+        given = f"{getattr(function, '__name__', type(function).__name__)}{taken}"
+        remedy = "write it with both, as lambda t, x: ..." if len(taken.parameters) < 2 else "bind its other arguments"
+        raise UsageError(f"{label} is called as f(t, x), which {given} does not take; {remedy}") from None

@@ -1,0 +1,72 @@
+"""Stage runtime: a module -> a short description of it, as text and as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from ..texts import html_table, visible
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+SHOWN = 12  #: names listed
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names separated by commas, cut when there are many."""
+    text = ", ".join(names[:SHOWN])
+    return f"{text}, ... ({len(names)})" if len(names) > SHOWN else text or "-"
+
+
+def facts(module: BoundModel) -> list[tuple[str, str]]:
+    """Label and value of each line of the report."""
+    layout, data = module.layout, module.metadata
+    lines = [
+        ("degrees of freedom", str(layout.n_dof)),
+        ("coordinates", listed(layout.q)),
+    ]
+    if layout.n_c:
+        lines.append(("independent", listed([layout.velocity_labels[i] for i in layout.independent])))
+        lines.append(("cut joints", listed(data.get("loop_joint_names", ()))))
+        redundant = [layout.constraint_labels[i] for i in data.get("redundant_rows", ())]
+        rows = f"{layout.n_c}" + (f", redundant at the reference: {listed(redundant)}" if redundant else "")
+        lines.append(("constraint rows", rows))
+    if layout.loops:
+        lines.append(("loop coordinates", listed(layout.loops)))
+    p = module.kernels.context.p
+    values = [f"{name} = {value:.6g}" for name, value in zip(layout.p, p, strict=True)]
+    lines += [
+        ("bodies", listed(layout.bodies)),
+        ("parameters", listed(values)),
+        ("inputs", listed(layout.u)),
+        ("outputs", listed(layout.y)),
+        ("method, target", f"{data.get('method', '-')}, {data.get('target', '-')}"),
+    ]
+    operations = data.get("operations", {})
+    parts = next((p for p in (("rhs",), ("closing", "dynamics"), ("terms",)) if operations.get(p[-1])), None)
+    if parts:  # terms alone: linear algebra comes on top
+        kinds = [kind for kind, n in operations[parts[-1]].items() if isinstance(n, int)]
+        totals = {kind: sum(operations[part][kind] for part in parts) for kind in kinds}
+        counts = (f"{n} {kind}" for kind, n in totals.items() if n)
+        lines.append((f"operations of {'terms' if parts == ('terms',) else 'rhs'}", ", ".join(counts)))
+    return lines
+
+
+def line(module: BoundModel) -> str:
+    """One line."""
+    n = module.n_dof
+    return f"<Module {module.name}: {n} degree{'s' if n != 1 else ''} of freedom, x = [{listed(module.x_names)}]>"
+
+
+def report(module: BoundModel, /) -> str:
+    """What the model is made of, as text."""
+    lines = facts(module)
+    width = max(len(label) for label, _ in lines)
+    head = module.name + (f": {visible(module.doc)}" if module.doc else "")
+    return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
+
+
+def html(module: BoundModel) -> str:
+    """A small table for notebooks."""
+    return html_table(module.name, facts(module), module.doc)

@@ -1,0 +1,67 @@
+"""Targets: what code is generated for, one row each; `eomgen generate --target` and ``compile(target=)`` read it.
+
+Kept light: the command line lists the targets before it loads anything that generates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from .errors import UsageError
+
+Files = dict[str, str]
+
+
+class Target(NamedTuple):
+    """One target.
+
+    Attributes
+    ----------
+    about : str
+        What comes of it, for help.
+    package : callable or str
+        (Program, context) -> the files of a package that stands alone, by name; or "file.function" within eomgen.  The
+        context is what templates are rendered with: name, doc, metadata, layouts, calls.
+    module : bool
+        Whether a module can be compiled and loaded in this process.
+    arrays : bool
+        Whether loops over arrays do better than straight-line code.
+    """
+
+    about: str
+    package: Callable[[Any, dict[str, Any]], Files] | str
+    module: bool = False
+    arrays: bool = False
+
+    def files(self, program: Any, context: dict[str, Any]) -> Files:
+        """The package of a program."""
+        if callable(self.package):
+            return self.package(program, context)
+        home, name = self.package.rsplit(".", 1)
+        found: Files = getattr(import_module(f".{home}", __package__), name)(program, context)
+        return found
+
+
+TARGETS: dict[str, Target] = {
+    "cython": Target("extension module", "emit.package.cython_package", module=True),
+    "numpy": Target(
+        "Python that imports NumPy alone, no compiler", "emit.package.numpy_package", module=True, arrays=True
+    ),
+    "c": Target("C library", "emit.package.c_library"),
+}
+
+
+def find_target(name: str, allowed: Iterable[str] | None = None) -> Target:
+    """The row of a name.
+
+    Raises
+    ------
+    UsageError
+        There is none, or none among those allowed.
+    """
+    names = list(TARGETS if allowed is None else allowed)
+    if name not in names:
+        raise UsageError(f"no target {name!r}; there are {', '.join(names)}")
+    return TARGETS[name]

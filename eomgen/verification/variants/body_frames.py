@@ -1,0 +1,227 @@
+"""Stage verification, frames: every body's own frame, and ground, turned and shifted at random.
+
+The old frame of a body stays as a marker of it, so that references keep their meaning; what is given in body axes
+(centre of mass, inertia, solids, points, markers) is written in the new axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...describe.description import GROUND_NAME, DescribedEntry, Description, items
+from ...describe.fields import INERTIA
+from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
+from .rewritten_texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
+from .variant import NotApplicable, Variant
+from .visit import Slot, Visitor, bodies_of, copied, visit
+
+WAS = "old_frame"  #: the marker that a body's former frame becomes
+_PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+_KINDS = (
+    *(("x", "y", "z"), ("vx", "vy", "vz"), ("ax", "ay", "az")),
+    *(("wx", "wy", "wz"), ("wx_dot", "wy_dot", "wz_dot")),
+    ("angular_momentum_x", "angular_momentum_y", "angular_momentum_z"),
+)
+
+
+def random_turn(random: Any) -> Any:
+    """A turn (3, 3) of any angle about any axis."""
+    return from_quaternion(*random.normal(size=4))
+
+
+def values_of(description: Description) -> dict[str, float]:
+    """Declared values of parameters, texts such as ``pi/10`` evaluated."""
+    return {
+        entry.name: number_of(entry.values["value"], {})
+        for entry in description.sections["parameters"]
+        if entry.values.get("value") is not None
+    }
+
+
+class MovedBodyFrame:
+    """The new frame of one body: new coordinates = turn old + shift."""
+
+    def __init__(self, turn: Any, shift: Any, parameters: Mapping[str, float]) -> None:
+        self.turn, self.shift, self.parameters = (
+            np.asarray(turn, dtype=float),
+            np.asarray(shift, dtype=float),
+            parameters,
+        )
+
+    def point(self, at: Sequence[Any]) -> list[Any]:
+        """A point, entries numbers or texts."""
+        return [total([*row, 1.0], [*at, float(d)]) for row, d in zip(self.turn.tolist(), self.shift, strict=True)]
+
+    def vector(self, value: Sequence[Any]) -> list[Any]:
+        """A direction or a vector."""
+        return [total(row, value) for row in self.turn.tolist()]
+
+    def angles(self, rpy: Sequence[Any]) -> list[float]:
+        """Roll, pitch, yaw; parameters in them are taken at their declared values."""
+        turn = from_roll_pitch_yaw([number_of(x, self.parameters) for x in rpy])
+        return [float(x) for x in roll_pitch_yaw(self.turn @ turn)]
+
+    def tensor(self, rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+        """A symmetric tensor, R I R^T; the lower triangle is the mirror image of the upper."""
+        flat = [x for row in rows for x in row]
+        made = [[total([*np.outer(a, b).ravel().tolist()], flat) for b in self.turn] for a in self.turn]
+        return [[made[min(i, j)][max(i, j)] for j in range(3)] for i in range(3)]
+
+
+class _Moved(Visitor):
+    """References and placements of bodies whose frames have moved."""
+
+    def __init__(self, places: Mapping[str, MovedBodyFrame]) -> None:
+        self.places = places
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        def locate(quantity: str, marker: str) -> str:
+            return f"{quantity}({marker}.{WAS})" if marker in self.places else f"{quantity}({marker})"
+
+        return rewritten(value, lambda name: name, locate)
+
+    def marker(self, reference: Any, slot: Slot) -> Any:
+        if isinstance(reference, str):
+            return f"{reference}.{WAS}" if reference in self.places else reference
+        return super().marker(reference, slot)
+
+    def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
+        place = self.places.get(body)
+        if place is None:
+            return dict(placed)
+        at, rpy = placed.get("at", [0, 0, 0]), placed.get("rpy", [0, 0, 0])
+        moved = {"at": place.point(at), "rpy": place.angles(rpy)}
+        return moved if "rpy" in placed else {"at": moved["at"]}
+
+
+def turn_bodies(description: Description, random: Any) -> Variant:
+    """Every body's frame turned and shifted."""
+    _require_bodies(description)
+    parameters, size = values_of(description), length_of(description)
+    places = {
+        entry.name: MovedBodyFrame(random_turn(random), size * random.uniform(-0.5, 0.5, 3), parameters)
+        for entry in bodies_of(description)
+    }
+    made = visit(description, _Moved(places))
+    for entry in bodies_of(made):
+        _turn_body(entry, places[entry.name])
+    return Variant(made)
+
+
+def _turn_body(entry: DescribedEntry, place: MovedBodyFrame) -> None:
+    values = entry.values
+    values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
+    solids = "solids" in values or ("points" in values and "mass" not in values)
+    if "first_moment" in values:
+        moved = [product(values["mass"], float(d)) for d in place.shift]
+        values["first_moment"] = [
+            total([1.0, 1.0], pair) for pair in zip(place.vector(values["first_moment"]), moved, strict=True)
+        ]
+    elif not solids:
+        values["com"] = place.point(values.get("com", [0, 0, 0]))
+    about = values.get("about", "com")
+    if isinstance(about, str) and about not in ("com", "origin"):
+        return  # a marker, whose axes count
+    if not isinstance(about, str):
+        values["about"] = place.point(about)
+    elif about == "origin":
+        values["about"] = place.point([0, 0, 0])
+    if "principal" in values or "axes" in values or _one_moment(values.get("inertia")):
+        if "principal" in values or "inertia" in values:
+            values["axes"] = place.angles(values.get("axes", [0, 0, 0]))
+    elif "inertia" in values:
+        values["inertia"] = place.tensor(tensor_of(values["inertia"]))
+
+
+def _one_moment(inertia: Any) -> bool:
+    """Whether a moment about one axis alone is given, as of a planar body: no tensor of a body has but one."""
+    return inertia is not None and sum(not is_zero(x) for row in tensor_of(inertia) for x in row) == 1
+
+
+def tensor_of(given: Any) -> list[list[Any]]:
+    """An inertia as a full tensor."""
+    if isinstance(given, Mapping):
+        full = [[0.0] * 3 for _ in range(3)]
+        for name in INERTIA:
+            i, j = _PAIRS[name]
+            full[i][j] = full[j][i] = given.get(name, 0.0)
+        return full
+    if any(items(row) is not None for row in given):
+        return [list(row) for row in given]
+    return [[given[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+
+
+def _require_bodies(description: Description) -> None:
+    if not bodies_of(description):
+        raise NotApplicable("there are no bodies")
+
+
+def turn_ground(description: Description, random: Any) -> Variant:
+    """Ground turned and shifted: gravity, markers of ground, and whatever is written in ground axes follow.
+
+    Where an angle about z of ground is measured, ground is shifted only.
+    """
+    _require_bodies(description)
+    texts: set[tuple[str, str]] = set()
+
+    class Seen(Visitor):
+        def scalar(self, value: Any, slot: Slot) -> Any:
+            if isinstance(value, str):
+                texts.update(markers_of(value))
+            return value
+
+    visit(description, Seen())
+    angles = any(quantity == "angle" for quantity, _ in texts)
+    turn = np.eye(3) if angles else random_turn(random)
+    place = MovedBodyFrame(turn, length_of(description) * random.uniform(-0.5, 0.5, 3), values_of(description))
+    made = visit(copied(description), _Ground(place))
+    ground = next((entry for entry in made.sections["bodies"] if entry.name == GROUND_NAME), None)
+    if ground is not None:
+        ground.values["markers"][WAS] = {"at": place.point([0, 0, 0]), "rpy": place.angles([0, 0, 0])}
+    return Variant(made, turn=place.turn)
+
+
+class _Ground(_Moved):
+    """What refers to ground, or is written in its axes."""
+
+    def __init__(self, place: MovedBodyFrame) -> None:
+        super().__init__({GROUND_NAME: place})
+        self.place = place
+
+    def vector(self, value: Any, slot: Slot) -> Any:
+        result = super().vector(value, slot)
+        if not isinstance(value, list):
+            return result
+        load = slot.section == "forces" and slot.key == "value" and slot.entry is not None
+        if load and slot.entry is not None and slot.entry.values.get("axes", "ground") == "ground":
+            return self.place.vector(result)
+        return self.place.vector(result) if slot.key == "gravity" else result
+
+    def scalar(self, value: Any, slot: Slot) -> Any:
+        def locate(quantity: str, marker: str) -> str:
+            marker = f"{marker}.{WAS}" if marker == GROUND_NAME else marker
+            for names in _KINDS:
+                if quantity in names:
+                    column = self.place.turn[:, names.index(quantity)]
+                    shift = self.place.shift if quantity in _KINDS[0] else np.zeros(3)
+                    parts = [scaled(f"{q}({marker})", float(c)) for q, c in zip(names, column, strict=True)]
+                    return "(" + " + ".join([*parts, repr(-float(column @ shift))]) + ")"
+            return f"{quantity}({marker})"
+
+        return rewritten(value, lambda name: name, locate)
+
+
+def length_of(description: Description) -> float:
+    """A length of the order of the mechanism's: the largest distance of a marker from its body's origin."""
+    parameters, found = values_of(description), [0.0]
+
+    class Note(Visitor):
+        def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
+            found.append(float(np.linalg.norm([number_of(x, parameters) for x in placed.get("at", (0, 0, 0))])))
+            return dict(placed)
+
+    visit(description, Note())
+    return max(found) or 1.0
