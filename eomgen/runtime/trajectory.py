@@ -335,7 +335,7 @@ class Trajectory:
         plot : str or sequence of str
             Columns to draw over time under the mechanism (.gif, .mp4).
         names, axes : bool
-            As for :meth:`Module.draw`.
+            As for ``module.draw``.
         dpi : float
             Dots in an inch, 80 by default (.gif, .mp4).
 

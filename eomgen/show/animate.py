@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import MissingDependencyError, UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
+from ..limits.pictures import ROUNDED
 from .draw import new_artist
 from .flat import figure_size
 from .motion import Motion, moving_scene, sample
@@ -120,7 +121,7 @@ class Frames:
     def _show(self, k: int) -> None:
         self.artist.show(k)
         speed = self.motion.speed
-        slow = "" if abs(speed - 1.0) < 1e-12 else f"  x{speed:.2g}"
+        slow = "" if abs(speed - 1.0) < ROUNDED else f"  x{speed:.2g}"
         self.title.set_text(f"{self.scene.name}  t = {self.motion.t[k]:.2f} s{slow}")
         if self.cursor is not None:
             self.cursor.set_xdata([self.motion.t[k]] * 2)

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.pictures import ROUNDED
 from .colors import color_of, style_of
 from .data import Array
 from .motion import Motion
 from .optional import k3d
 from .scene import Item, Scene
 
-STILL = 1e-12  #: poses that differ by less are one
+STILL = ROUNDED  #: poses that differ by less are one
 
 
 def _number(color: str) -> int:

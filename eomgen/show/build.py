@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.pictures import ROUNDED, SAME
 from .data import GROUND, Array, Frame, PictureData, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
@@ -100,7 +101,7 @@ def _with_ground(poses: Array) -> Array:
 def _up(gravity: Array) -> Array:
     """Upwards: against gravity where it is along an axis, else z."""
     strength = float(np.linalg.norm(gravity))
-    if strength and float(np.abs(gravity).max()) > (1.0 - 1e-9) * strength:
+    if strength and float(np.abs(gravity).max()) > (1.0 - SAME) * strength:
         up: Array = -gravity / strength
         return np.round(up)
     return np.array([0.0, 0.0, 1.0])
@@ -117,7 +118,7 @@ def _labels(data: PictureData, points: list[Array]) -> list[Label]:
     for k, name in enumerate(data.bodies):
         if k in data.hidden:
             continue
-        own = distinct(points[k], 1e-12)
+        own = distinct(points[k], ROUNDED)
         middle = data.com[k] if data.mass[k] > 0.0 or not len(own) else own.mean(axis=0)
         if len(own) >= 2:
             middle = own.mean(axis=0)
@@ -141,5 +142,5 @@ def _bounds(items: list[Item], frames: Array, view: Array | None) -> tuple[Array
     short = np.maximum(LEAST * float((high - low)[axes].max()) - (high - low)[axes], 0.0) / 2  # neither strip nor sheet
     low[axes] -= short
     high[axes] += short
-    margin = MARGIN * max(float((high - low).max()), 1e-12)
+    margin = MARGIN * max(float((high - low).max()), ROUNDED)
     return low - margin, high + margin

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.pictures import NOTHING, ROUNDED
 from .data import GROUND, Array, Frame, PictureData
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
@@ -105,7 +106,7 @@ def _across(along: Array, view: Array | None) -> tuple[Array, Array]:
     other = np.eye(3)[int(np.argmin(np.abs(along)))] if view is None else view[2]
     across = np.cross(other, along)
     length = float(np.linalg.norm(across))
-    if length < 1e-12:  # seen end on
+    if length < ROUNDED:  # seen end on
         other = view[0] if view is not None else np.eye(3)[0]
         across = np.cross(other, along)
         length = float(np.linalg.norm(across))
@@ -154,7 +155,7 @@ def _wound(poses: Array, frame: Frame, r: float, sense: int, a: Array, b: Array)
     angle = sense * (end - begin) % (2 * np.pi)
     across = np.array([np.sqrt(far[0] ** 2 - r * r), r * angle, np.sqrt(far[1] ** 2 - r * r)])
     direct = q[:2] - p[:2]
-    closest = abs(p[0] * q[1] - p[1] * q[0]) / max(float(np.hypot(*direct)), 1e-300)
+    closest = abs(p[0] * q[1] - p[1] * q[0]) / max(float(np.hypot(*direct)), NOTHING)
     ahead = -p[:2] @ direct > 0.0 and q[:2] @ direct > 0.0
     left = sense * (p[0] * q[1] - p[1] * q[0]) > 0.0
     if (angle > np.pi and not (ahead and closest < r)) or (not left and not (ahead and closest < r) and angle > np.pi):

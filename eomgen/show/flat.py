@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.pictures import SAME
 from .colors import color_of, style_of
 from .data import Array
 from .scene import ROLES, Item, Scene
@@ -99,7 +100,7 @@ class Flat:
 def _axis_name(direction: Array) -> str:
     """x, y, z, with a sign where it runs backwards; a page that lies askew has no names."""
     k = int(np.argmax(np.abs(direction)))
-    if abs(direction[k]) < 1.0 - 1e-9:
+    if abs(direction[k]) < 1.0 - SAME:
         return "right" if k == 0 else "up"
     return ("" if direction[k] > 0.0 else "-") + "xyz"[k]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..limits.pictures import SAME
 from .data import GROUND, Array, Frame, JointData, PictureData
 from .scene import BAR, Item, _is_block, attached, placed, symbol_mesh
 from .solids import Mesh, cone, turned
@@ -62,7 +63,7 @@ def _rail(joint: JointData, view: Array | None, up: Array, symbol: float, frames
     normal = view[2]
     down = np.cross(normal, axis)
     down /= np.linalg.norm(down)
-    if down @ up > 1e-9 or (abs(float(down @ up)) <= 1e-9 and down @ view[0] > 0.0):
+    if down @ up > SAME or (abs(float(down @ up)) <= SAME and down @ view[0] > 0.0):
         down = -down
     shifted = line + 1.1 * symbol * down
     return [_hatching(joint.name, shifted[0], shifted[1], down, symbol)]

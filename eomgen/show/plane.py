@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..limits.pictures import NOTHING, SAME
 from .data import Array
 
 TRIALS = 6  #: positions that are looked at
-ROUNDING = 1e-9  #: relative size of what is rounding and not motion
+ROUNDING = SAME  #: relative size of what is rounding and not motion
 
 
 def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravity: Array) -> Array | None:
@@ -36,7 +37,7 @@ def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravi
         return None
     travel = moved[:, :3, 3] - first[:, :3, 3, None]
     turns = np.einsum("bijk,blj->bilk", moved[:, :3, :3], first[:, :3, :3])  # relative rotation
-    size = max(float(np.abs(travel).max(initial=0.0)), 1e-300)
+    size = max(float(np.abs(travel).max(initial=0.0)), NOTHING)
     # the normal n has n . travel = 0 and R n = n
     rows = [(travel / size).transpose(0, 2, 1).reshape(-1, 3)]
     rows.append((turns.transpose(0, 3, 1, 2) - np.eye(3)).reshape(-1, 3))

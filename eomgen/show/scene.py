@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..limits.pictures import SAME
 from .data import GROUND, Array, Frame, JointData, PictureData
 from .solids import Mesh, Triangles, box, rounded, solid, sphere, turned
 
@@ -17,7 +18,7 @@ SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
 OF_LINK = 0.16  #: and of the middle link's length, at most
 BAR = 0.55  #: radius of a bar in sizes of a symbol
 OFF = 0.3  #: of a link's length: a centre of mass so far beside it belongs to its outline
-NEAR = 1e-9  #: of the extent: points that are one
+NEAR = SAME  #: of the extent: points that are one
 
 #: Order in which roles lie over each other.
 ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace")
@@ -171,7 +172,7 @@ def equivalent_solid(data: PictureData, k: int, least: float) -> tuple[Mesh, flo
     moments, edges = data.inertia[k], equivalent_box(data, k)
     order = np.argsort(moments)
     small, other, great = moments[order]
-    if other - small < 1e-9 * great < 0.5 * (great - other):
+    if other - small < SAME * great < 0.5 * (great - other):
         radius = float(np.sqrt(2.0 * great / data.mass[k]))
         length = float(np.sqrt(max(12.0 * small / data.mass[k] - 3.0 * radius**2, 0.0)))
         mesh = disc(radius, max(length, least))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..limits.pictures import NOTHING
 from .colors import color_of, style_of
 from .scene import Item, Scene
 from .solids import Triangles
@@ -38,7 +39,7 @@ class Space:
                 continue
             corners = item.at(scene.frames[0])[item.faces]
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), NOTHING)
             bright = 0.62 + 0.38 * np.clip(normals @ light, -0.4, 1.0)
             base = np.array(to_rgb(style.face or color))
             faces = np.clip(base * bright[:, None], 0.0, 1.0)
