@@ -1,4 +1,4 @@
-# make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png
+# make demo   derive, compile and simulate a slider-crank; writes demo_output/slider_crank.png and .gif
 # make test   ruff, mypy, then every test, fast ones first, on all processors; fails if anything was skipped
 # make bench  timings beside SymPy; BENCHMARKS='derive call' runs only these, results in benchmarks/results
 # make lint   ruff and mypy alone
@@ -18,7 +18,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed-plot
-	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png
+	@$(BIN)/eomgen run examples/slider_crank.yaml --plot demo_output/slider_crank.png --animate demo_output/slider_crank.gif
 
 test: lint
 	@$(BIN)/python -m pytest --no-skips --numprocesses=logical --maxprocesses=8 --dist=worksteal

@@ -81,7 +81,7 @@ class KinematicAnalysis(Trajectory):
         led: tuple[str, ...],
         **rest: Any,
     ) -> None:
-        t, self.q, self.v, self.a = motion
+        t, _, _, self.a = motion
         super().__init__(t, columns.x, columns, header, **rest)
         self._module = module
         self.singular, self.stop, self.led = list(found), stop, led
@@ -90,10 +90,6 @@ class KinematicAnalysis(Trajectory):
     def complete(self) -> bool:
         """Whether the whole range was reached."""
         return self.stop is None
-
-    def poses(self) -> Array:
-        """Body frames to ground, (n_bodies, 4, 4, n_t)."""
-        return self._module.poses(self.q, t=self.t)
 
     def turning_points(self, name: str) -> list[tuple[float, float]]:
         """Dead centres of a coordinate: (time, value) where its rate changes sign.

@@ -57,6 +57,18 @@ class Model(Builder):
         """Check all that can be checked before a simulation, assembly included; see ``eomgen.pipeline.check``."""
         return pipeline.check(self)
 
+    def draw(self, x: Any = None, ax: Any = None, **options: Any) -> Any:
+        """Draw the mechanism at a configuration, without compiling C; see :meth:`.module.Module.draw`, with its arguments.
+
+        Examples
+        --------
+        >>> model = Model("pendulum", gravity=(0, -9.81, 0))
+        >>> rod = model.body("rod", mass=1, com=(0, -0.5, 0))
+        >>> hinge = model.revolute("hinge", model.ground, rod, coordinate="theta")
+        >>> axes = model.draw({"theta": 0.3})  # doctest: +SKIP
+        """
+        return self.compile(target="numpy").draw(x, ax, **options)
+
     def derive(
         self,
         method: str = "auto",

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from ..analysis.workspace import workspace as _workspace
     from ..ensembles.simulate_many import simulate_many as _simulate_many
     from ..runtime.canonical import Canonical
+    from ..runtime.drawing import draw as _draw
+    from ..runtime.drawing import draw_branches as _draw_branches
     from ..runtime.minimal import Minimal
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
@@ -65,6 +67,8 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "motion_range": "analysis.coordinate_range",
     "workspace": "analysis.workspace",
     "report": "runtime.summary",
+    "draw": "runtime.drawing",
+    "draw_branches": "runtime.drawing",
 }
 
 
@@ -170,6 +174,8 @@ class Module(BoundModel):
         motion_range = _motion_range
         workspace = _workspace
         report = _report
+        draw = _draw
+        draw_branches = _draw_branches
 
     @cached_property
     def minimal(self) -> Minimal:

@@ -19,7 +19,7 @@ BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "
 POINTS = 2000  #: of a smooth curve, from the dense output
 
 
-def require_plotting(file: Path) -> None:
+def require_plotting(file: Path, option: str = "--plot") -> None:
     """Fail before the work if there is nothing to draw with, or no such kind of picture.
 
     Raises
@@ -29,10 +29,10 @@ def require_plotting(file: Path) -> None:
     try:
         from matplotlib.backend_bases import FigureCanvasBase
     except ImportError as error:
-        raise MissingDependencyError('--plot needs matplotlib: pip install "eomgen[plot]"') from error
+        raise MissingDependencyError(f'{option} needs matplotlib: pip install "eomgen[plot]"') from error
     known = sorted(FigureCanvasBase.get_supported_filetypes())
     if file.suffix[1:].lower() not in known:
-        raise UsageError(f"--plot {file}: the ending says what kind of picture; there are .{', .'.join(known)}")
+        raise UsageError(f"{option} {file}: the ending says what kind of picture; there are .{', .'.join(known)}")
 
 
 def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:

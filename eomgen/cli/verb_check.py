@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..files.writing import save_figure
 from .failures import reports_failures
+from .plot import require_plotting
 from .screen import print_json, say
 from .shared_options import json_option, load_model, model_argument, native_option, robot_options
+
+if TYPE_CHECKING:
+    from ..api.model import Model
 
 
 def _print_schema(context: click.Context) -> None:
@@ -37,19 +42,48 @@ def _print_schema(context: click.Context) -> None:
     metavar="FILE",
     help="Draw bodies, joints and constraints as a graph (svg, png, pdf; needs matplotlib).",
 )
+@click.option(
+    "--draw",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw the mechanism at its initial position (svg, png, pdf; needs matplotlib).",
+)
 @robot_options
 @reports_failures
-def check(model: Path, allow_native: bool, as_json: bool, graph: Path | None, robot: dict[str, Any]) -> None:
+def check(
+    model: Path, allow_native: bool, as_json: bool, graph: Path | None, draw: Path | None, robot: dict[str, Any]
+) -> None:
     """Report bodies, joints, loops, constraints, rank and degrees of freedom, and everything wrong with a model.
 
     Faults are printed as FILE:LINE: path: what is wrong; the exit code is then 1.
     """
-    report = load_model(model, allow_native, robot).check()
+    if draw is not None:
+        require_plotting(draw, "--draw")
+    described = load_model(model, allow_native, robot)
+    report = described.check()
     if graph is not None:
         report.draw(graph)
+    if draw is not None:
+        save_figure(draw_position(described), draw)
     if as_json:
         print_json(report.to_dict())
     else:
         say(str(report))
         if graph is not None:
             say(f"wrote {graph}")
+        if draw is not None:
+            say(f"wrote {draw}")
+
+
+def draw_position(described: Model) -> Any:
+    """A figure of a model at its initial position."""
+    from matplotlib.figure import Figure
+
+    from ..show.build import build_scene
+    from ..show.draw import draw_scene, figure_of
+
+    module = described.compile(target="numpy")
+    scene = build_scene(module, module.x0()[: module.n_q, None])
+    figure: Figure = figure_of(scene)
+    draw_scene(scene, figure.axes[0])
+    return figure

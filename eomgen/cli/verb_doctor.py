@@ -28,10 +28,11 @@ EXTRAS = {
     "mesh": ("mass and inertia from a mesh", ("trimesh",)),
     "sundials": ("IDA, a solver of differential-algebraic equations", ("scikit-sundae",)),
     "cluster": ("ensembles on many machines", ("distributed",)),
-    "plot": ("plots", ("matplotlib",)),
+    "plot": ("plots and pictures", ("matplotlib",)),
+    "viz": ("animations as a page", ("matplotlib", "k3d")),
     "results": ("tables of results", ("pandas",)),
     "compiler": ("a C compiler from pip", ("ziglang",)),
-    "notebook": ("Jupyter notebooks", ("jupyterlab", "matplotlib", "pandas")),
+    "notebook": ("Jupyter notebooks", ("jupyterlab", "matplotlib", "k3d", "pandas")),
 }
 
 

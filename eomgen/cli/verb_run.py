@@ -60,6 +60,9 @@ POINTS = 5  #: change points listed
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write the run to FILE.npz or FILE.csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the run, e.g. to FILE.png.")
 @click.option(
+    "--animate", type=click.Path(path_type=Path), metavar="FILE", help="Show it move: FILE.gif, FILE.mp4 or FILE.html."
+)
+@click.option(
     "--checkpoint",
     type=click.Path(path_type=Path),
     metavar="FILE",
@@ -91,6 +94,7 @@ def run(
     settings: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    animate: Path | None,
     checkpoint: Path | None,
     checkpoint_every: float | None,
     resume: bool | None,
@@ -109,7 +113,12 @@ def run(
         from .plot import require_plotting
 
         require_plotting(plot)
+    if animate is not None:
+        from ..show.animate import require_kind
+
+        require_kind(animate)
     require_folder("--out", out)
+    require_folder("--animate", animate)
     require_folder("--plot", plot)
     require_folder("--checkpoint", checkpoint)
     kept: dict[str, Any] = {"checkpoint": checkpoint, "checkpoint_every": checkpoint_every, "resume": resume}
@@ -136,7 +145,7 @@ def run(
             initial=initial or None,
             parameters=parameters or None,
             inputs=inputs or None,
-            dense_output=plot is not None or counts_work(equations),
+            dense_output=plot is not None or animate is not None or counts_work(equations),
             **kept,
             **solver,
         )
@@ -144,6 +153,9 @@ def run(
     with after_integration():
         energy = balance_energy(equations, trajectory)
         files = _write(equations, trajectory, out, plot)
+        if animate is not None:
+            with stage("animate"):
+                files.append(str(trajectory.animate(animate)))
         result = to_dict(equations, trajectory, energy) | {"seconds": seconds, "files": files}
     if as_json:
         print_json(result)

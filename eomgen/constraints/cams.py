@@ -8,20 +8,28 @@ sqrt(r^2 + r'^2) (Norton, Cam Design and Manufacturing Handbook, ch. 7; Litvin a
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from typing import ClassVar
 
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import Contour, Seen, Wheel
 from ..frames import Frame, Marker
-from ..graph.core import Expr, atan2, sqrt
+from ..graph.core import Expr, atan2, cos, sin, sqrt
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
 from .profiles import Profile
 
 #: The name that stands for the angle in profiles of cams.
 CAM_ANGLE = "theta"
+
+
+def _polar(cam: Marker, contour: Profile) -> Contour:
+    """The contour r(theta) about the axis of a cam."""
+    a, r = contour.local, contour.expression
+    return Contour(cam, (r * cos(a), r * sin(a), a.graph.zero), a, 0.0, 2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,9 @@ class KnifeContact(Constraint):
     follower: Marker
     contour: Profile
 
+    def drawn(self) -> list[Seen]:
+        return [_polar(self.cam, self.contour)]
+
     def conditions(self, view: ConstraintView) -> list[Condition]:
         x, y, _ = view.relative(self.cam, self.follower).position
         return [Condition("contact", sqrt(x * x + y * y) - self.contour.toward(x, y), "length")]
@@ -66,6 +77,13 @@ class FlatSupport(Constraint):
     cam: Marker
     follower: Marker
     support: Profile
+
+    def drawn(self) -> list[Seen]:
+        """The envelope of the tangents: h n + h' t."""
+        a, h = self.support.local, self.support.expression
+        slope = self.support.slope(a)
+        x, y = h * cos(a) - slope * sin(a), h * sin(a) + slope * cos(a)
+        return [Contour(self.cam, (x, y, a.graph.zero), a, 0.0, 2.0 * math.pi)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         face = view.relative(self.cam, self.follower)
@@ -87,6 +105,9 @@ class _Contact(Constraint):
     point: Marker
     angle: Expr
 
+    def drawn(self) -> list[Seen]:
+        return [_polar(self.cam, self.contour)]
+
     def polar(self, view: ConstraintView) -> tuple[Expr, Expr, Frame]:
         """r, r' and the follower's marker in the axes (e_r, e_theta, axis) of the contact point."""
         r, slope = self.contour.at(self.angle), self.contour.slope(self.angle)
@@ -107,6 +128,9 @@ class RollerContact(_Contact):
 
     type_name: ClassVar[str] = "cam_roller"
     radius: Expr
+
+    def drawn(self) -> list[Seen]:
+        return [*super().drawn(), Wheel(self.follower, self.radius)]
 
     def toward(self, follower: Frame) -> tuple[Expr, Expr]:
         return follower.position[0], follower.position[1]

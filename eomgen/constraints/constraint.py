@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
 from ..elements.entry import Entry
+from ..elements.looks import Seen
 from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -61,6 +62,10 @@ class Constraint(ABC):
     @abstractmethod
     def conditions(self, view: ConstraintView) -> list[Condition]:
         """The equations this element adds."""
+
+    def drawn(self) -> list[Seen]:
+        """What is to be seen of it in a picture; nothing unless a type says so."""
+        return []
 
     def aligned(self, view: ConstraintView) -> list[Expr]:
         """Expressions that must be positive: the equations alone also admit contact from the wrong side."""

@@ -12,6 +12,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
+from ..elements.looks import ROUND_ARROW, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -47,6 +48,10 @@ class CoordinateDriver(Driver):
     type_name: ClassVar[str] = "driver"
     coordinate: Expr
     kind: str
+
+    def drawn(self) -> list[Seen]:
+        name = self.coordinate.node
+        return [Drawn((), str(name[1]), about=ROUND_ARROW)] if name[0] == "sym" else []
 
     def measure(self, view: ConstraintView) -> tuple[Expr, str]:
         return self.coordinate, self.kind

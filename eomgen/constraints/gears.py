@@ -7,6 +7,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr, sin
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
@@ -35,6 +36,9 @@ class Gear(Pair):
 
     type_name: ClassVar[str] = "gear"
 
+    def drawn(self) -> list[Seen]:
+        return [PitchCircles(self.a, self.b, self.ratio)]
+
 
 class Belt(Pair):
     """A belt or chain that does not stretch or slip on two pulleys: r_a a = r_b b, with b reversed where it crosses.
@@ -43,6 +47,9 @@ class Belt(Pair):
     """
 
     type_name: ClassVar[str] = "belt"
+
+    def drawn(self) -> list[Seen]:
+        return [PitchCircles(self.a, self.b, self.ratio, belt=True)]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry, Found
 from ..elements.field import Field
+from ..elements.looks import PitchCircles, Seen
 from ..graph.core import Expr
 from ..limits.descriptions import TENSOR
 from ..records import dataclass
@@ -40,6 +41,26 @@ class Planetary(Constraint):
     planet_radius: Expr | None
     phase: Expr
 
+    def drawn(self) -> list[Seen]:
+        if self.planet is None:
+            return []
+        r_s, r_r, r_p = self._radii()
+        if r_p is None:
+            return []
+        found: list[Seen] = []
+        if r_s is not None:
+            found.append(PitchCircles(self.sun, self.planet, r_p / r_s, self.carrier))
+        if r_r is not None:
+            found.append(PitchCircles(self.ring, self.planet, -(r_p / r_r), self.carrier))
+        return found
+
+    def _radii(self) -> tuple[Expr | None, Expr | None, Expr | None]:
+        """Of sun, ring and planet, as far as they are known."""
+        r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
+        if r_p is None and r_s is not None and r_r is not None:
+            r_p = 0.5 * (r_r - r_s)
+        return r_s, r_r, r_p
+
     def conditions(self, view: ConstraintView) -> list[Condition]:
         r_s, r_r, r_p = self.sun_radius, self.ring_radius, self.planet_radius
         rows: list[Condition] = []
@@ -48,8 +69,7 @@ class Planetary(Constraint):
                 mean = (r_s * self.sun + r_r * self.ring) / (r_s + r_r)
                 rows.append(Condition("ratio", mean - self.carrier - self.phase, "angle"))
             return rows
-        if r_p is None and r_s is not None and r_r is not None:
-            r_p = 0.5 * (r_r - r_s)
+        r_s, r_r, r_p = self._radii()
         if r_p is None:
             return rows
         if r_s is not None:

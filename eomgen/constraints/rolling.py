@@ -12,6 +12,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -30,6 +31,9 @@ class _Rolling(Constraint):
     wheel: Marker  #: centre; its z axis is that of the wheel
     plane: Marker
     radius: Expr
+
+    def drawn(self) -> list[Seen]:
+        return [Wheel(self.wheel, self.radius)]
 
     @abstractmethod
     def height(self, view: ConstraintView) -> Expr:

@@ -16,6 +16,7 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.traverse import LEAVES, reachable
 from ..operations import OPERATIONS
+from .body_shapes import read_shapes
 from .build_cam_points import declare_contacts
 from .build_elements import build_elements
 from .build_equations import build_equations, check_energies, declare_equations
@@ -108,6 +109,7 @@ def build(description: Description) -> Mechanism:
         check_connected(bodies, joints, faults)
     if faults:
         raise ModelError(faults.sorted())
+    described = len(bodies)
     bodies, joints = (*bodies, *contacts.bodies), (*joints, *contacts.joints)
     return Mechanism(
         name=str(name),
@@ -132,6 +134,13 @@ def build(description: Description) -> Mechanism:
         doc=doc,
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
         negative=negative,
+        named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
+        body_shapes=tuple(
+            shape
+            for entry in sections["bodies"]
+            for shape in read_shapes(reader, entry.path, reader.bodies[entry.name], entry.values)
+        ),
+        added_bodies=tuple(range(described, len(bodies))),
         notes=inertia_notes,
     )
 

@@ -20,7 +20,21 @@ if TYPE_CHECKING:
     from .mechanism import Mechanism
 
 #: Attributes that nothing is computed from.
-ASIDE = frozenset({"doc", "docs", "lines", "notes", "place", "graph", "functions", "file"})
+ASIDE = frozenset(
+    {
+        "doc",
+        "docs",
+        "lines",
+        "notes",
+        "place",
+        "graph",
+        "functions",
+        "file",
+        "named_markers",
+        "body_shapes",
+        "added_bodies",
+    }
+)
 
 
 def model_digest(mechanism: Mechanism) -> str:

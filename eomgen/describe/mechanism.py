@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import ModelError, Problem
-from ..frames import Marker
+from ..frames import Frame, Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..limits.runs import ATOL, RTOL
@@ -101,6 +101,16 @@ def velocity_names(joint: Joint, name: str, coordinates: Sequence[str]) -> tuple
         f"{name}{velocity.suffix}" if velocity.of is None else f"{coordinates[velocity.of]}_dot"
         for velocity in joint.velocities
     )
+
+
+class BodyShape(NamedTuple):
+    """A solid of a body that pictures show, in axes of its own."""
+
+    body: int
+    kind: str  #: box, cylinder, sphere, capsule, cone, ellipsoid, mesh
+    sizes: tuple[Expr, ...]  #: edges, half axes, or radius and length (m); of a mesh its scale
+    frame: Frame
+    file: str = ""  #: of a mesh
 
 
 ANGULAR_MOMENTUM, INERTIA, MOMENTUM, MASS = 3, 4, 5, 6  #: levels of a Quantity that are sums over all bodies
@@ -218,6 +228,9 @@ class Mechanism:
     doc: str = ""
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
     negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
+    named_markers: tuple[Marker, ...] = ()  #: for pictures
+    body_shapes: tuple[BodyShape, ...] = ()  #: for pictures
+    added_bodies: tuple[int, ...] = ()  #: that no one described: points of contact of cams
     notes: tuple[str, ...] = ()  #: what was taken though it is not possible, where it is only to be noted
 
     @property

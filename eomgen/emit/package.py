@@ -38,7 +38,8 @@ FORCES = ("multipliers", "reactions", "undetermined_reactions", "driving_forces"
           "simulate_impacts", "consistent")  # fmt: skip
 MOTIONS = ("kinematic_analysis", "motion_range", "workspace")
 ANALYSES = (*MOTIONS, "linearize", "modes", "equilibrium", "sensitivities", *FORCES)
-METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *ANALYSES)
+PICTURES = ("draw", "draw_branches")
+METHODS = ("x0", "assemble", "kinematics", "bind", "simulate", "simulate_many", "step", "verify", *PICTURES, *ANALYSES)
 #: What a slim package has of them.
 SLIM_METHODS = ("x0", "assemble", "bind", "simulate")
 

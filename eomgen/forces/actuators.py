@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
+from ..elements.looks import CYLINDER, ROUND_ARROW, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -24,6 +25,10 @@ class Actuator(Force):
 
     def loads(self, view: View) -> list[Load]:
         return self.path.loads(view, self.value)
+
+    def drawn(self) -> list[Seen]:
+        seen = self.path.drawn(CYLINDER, ROUND_ARROW)
+        return [seen._replace(along=()) if seen.coordinate else seen]  # a slide's own symbol says that it moves
 
 
 def _in_ground_axes(view: View, marker: Marker, value: Vec3, axes: str) -> Vec3:

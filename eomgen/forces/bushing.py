@@ -9,6 +9,7 @@ from typing import cast
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
+from ..elements.looks import RUBBER, Drawn, Seen
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -35,6 +36,9 @@ class Bushing(Force):
     second: Marker
     stiffness: Mat6
     damping: Mat6
+
+    def drawn(self) -> list[Seen]:
+        return [Drawn((self.first, self.second), along=RUBBER)]
 
     def loads(self, view: View) -> list[Load]:
         y, rate = self._displacements(view), self._rates(view)

@@ -7,6 +7,7 @@ from abc import abstractmethod
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field, Fields
+from ..elements.looks import Seen, Wheel
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -86,6 +87,9 @@ class SpherePlane(Contact):
 
     radius: Expr
 
+    def drawn(self) -> list[Seen]:
+        return [] if self.radius.is_zero else [Wheel(self.second, self.radius)]
+
     def touch(self, view: View) -> Touch:
         normal = vec.transpose(view.rotation(self.first))[2]
         reach = vec.sub(view.position(self.second), view.position(self.first))
@@ -99,6 +103,9 @@ class SphereSphere(Contact):
     """Two spheres about the markers; undefined where their centres coincide."""
 
     radii: tuple[Expr, Expr]
+
+    def drawn(self) -> list[Seen]:
+        return [Wheel(self.first, self.radii[0]), Wheel(self.second, self.radii[1])]
 
     def touch(self, view: View) -> Touch:
         reach = vec.sub(view.position(self.second), view.position(self.first))

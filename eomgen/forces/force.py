@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar, NamedTuple, Protocol
 
+from ..elements.looks import Seen
 from ..frames import Marker
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -64,6 +65,10 @@ class Force(ABC):
     def potential(self, view: View) -> Expr | None:
         """Potential energy (J) of the element's conservative part, None if it has none."""
         return None
+
+    def drawn(self) -> list[Seen]:
+        """What is to be seen of it in a picture; nothing unless a type says so."""
+        return []
 
     def remainder(self, view: View) -> list[Load]:
         """What the loads are beyond the slope of the potential, where there is one: friction, damping."""

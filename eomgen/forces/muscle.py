@@ -7,6 +7,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
+from ..elements.looks import Seen
 from ..graph.core import Expr, sin, sqrt
 from ..records import dataclass
 from .force import Force, Load, View
@@ -80,6 +81,9 @@ class Muscle(Force):
         l, v = fiber / self.fiber_length, rate * tilt / self.velocity_max
         active = self.activation * active_force_length(l) * force_velocity(v)
         return self.force_max * (active + passive_force_length(l) + self.damping * v) * tilt
+
+    def drawn(self) -> list[Seen]:
+        return [self.path.drawn()]
 
     def loads(self, view: View) -> list[Load]:
         length, rate = self.path.measure(view)

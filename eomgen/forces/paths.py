@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import Drawn, Points
 from ..frames import Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr, sqrt
@@ -31,6 +32,10 @@ class Path(ABC):
         return True
 
     @abstractmethod
+    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+        """Where an element on it is seen: with lines along it where it has a length, about it where it is an angle."""
+
+    @abstractmethod
     def loads(self, view: View, force: Expr) -> list[Load]:
         """Loads equivalent to a generalized force along increasing value: their power is force times rate."""
 
@@ -50,6 +55,9 @@ class Line(Path):
         d = self.reach(view)
         length = sqrt(vec.dot(d, d))
         return (d[0] / length, d[1] / length, d[2] / length), length
+
+    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+        return Drawn((self.start, self.end), along=along)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
         direction, length = self._geometry(view)
@@ -76,6 +84,9 @@ class Turn(Path):
     start: Marker
     end: Marker
 
+    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+        return Drawn((self.start,), about=about)
+
     def measure(self, view: View) -> tuple[Expr, Expr]:
         angle, rate, _ = view.turn(self.start, self.end)
         return angle, rate
@@ -95,6 +106,9 @@ class JointCoordinate(Path):
     """One coordinate of a joint (rad or m)."""
 
     name: str
+
+    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+        return Drawn((), self.name, along, about)
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
         return view.coordinate(self.name)

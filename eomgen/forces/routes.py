@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ..elements.entry import Entry
 from ..elements.field import Field
+from ..elements.looks import Drawn, Points
 from ..frames import Marker, WrapCylinder
 from ..graph import vectors as vec
 from ..graph.core import Expr, atan2, sqrt
@@ -41,6 +42,9 @@ class Route(Path):
     start: Marker
     end: Marker
     via: tuple[Marker | WrapCylinder, ...]
+
+    def drawn(self, along: tuple[Points, ...] = (), about: tuple[Points, ...] = ()) -> Drawn:
+        return Drawn((self.start, *self.via, self.end))
 
     def measure(self, view: View) -> tuple[Expr, Expr]:
         length = view.graph.zero

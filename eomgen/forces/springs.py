@@ -8,6 +8,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import MOTION, Field
+from ..elements.looks import COIL, DASHPOT, SPIRAL, TURNING_DASHPOT, Seen
 from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..records import dataclass
@@ -35,6 +36,9 @@ class Spring(Force):
         value, _ = self.path.measure(view)
         return self.path.loads(view, -self.stiffness * (value - self.rest))
 
+    def drawn(self) -> list[Seen]:
+        return [self.path.drawn(COIL, SPIRAL)]
+
     def potential(self, view: View) -> Expr | None:
         if not self.path.is_exact(view):
             return None  # the loads are the definition
@@ -56,6 +60,9 @@ class Damper(Force):
     def loads(self, view: View) -> list[Load]:
         _, rate = self.path.measure(view)
         return self.path.loads(view, -self.damping * rate)
+
+    def drawn(self) -> list[Seen]:
+        return [self.path.drawn(DASHPOT, TURNING_DASHPOT)]
 
 
 _STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True)

@@ -12,6 +12,7 @@ from itertools import product
 from typing import ClassVar, NamedTuple
 
 from ..elements.field import Field, Fields
+from ..elements.looks import JointLook
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
 from ..records import dataclass
@@ -83,6 +84,7 @@ class Joint(ABC):
         cut; 'loop' for a pure constraint without coordinates of its own, which always closes a loop
     counts_turns : whether :meth:`measure` tells its one angle beyond half a turn
     quaternion_slots : where four of the coordinates are Euler parameters
+    look : its symbol in pictures
     """
 
     type_name: ClassVar[str]
@@ -92,6 +94,7 @@ class Joint(ABC):
     options: ClassVar[Fields] = {}
     coordinates: ClassVar[tuple[Coordinate, ...]] = ()
     quaternion_slots: ClassVar[tuple[QuaternionSlot, ...]] = ()
+    look: ClassVar[JointLook] = JointLook()
 
     @property
     def velocities(self) -> tuple[Velocity, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.field import Field, Fields
+from ..elements.looks import JointLook, Piece
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
 from ..graph.vectors import Mat3, Vec3
@@ -21,6 +22,7 @@ class Revolute(Joint):
     """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "revolute"
+    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (0.75, 2.2)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -51,6 +53,7 @@ class Prismatic(Joint):
     """Slides along the common z axis without turning.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "prismatic"
+    look: ClassVar[JointLook] = JointLook((Piece("box", (2.2, 2.2, 4.0)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -77,6 +80,7 @@ class Screw(Joint):
     """
 
     type_name: ClassVar[str] = "screw"
+    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (1.2, 0.6)), Piece("cylinder", (0.8, 2.4))), slides=True)
     options: ClassVar[Fields] = {
         "pitch": Field(
             "expression",

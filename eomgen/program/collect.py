@@ -23,6 +23,7 @@ from ..kinematics.mobility import Mobility
 from ..kinematics.row_scales import row_scales
 from ..kinematics.state import acceleration_name
 from ..kinematics.wrenches import find_wrenches
+from .drawn import describe_picture
 from .given_multipliers import multiplier_values
 from .program import Limits
 from .rolling_discs import describe_discs
@@ -250,6 +251,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         **_signals(kinematics, equations),
         **({"input_rates": rates} if (rates := _input_rates(kinematics)) else {}),
         **({"constraint_inputs": used} if (used := _constraint_inputs(kinematics)) else {}),
+        "picture": describe_picture(m),
         "simulation": {
             "end": m.simulation.end,
             "method": m.simulation.method,

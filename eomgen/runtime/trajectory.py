@@ -20,6 +20,7 @@ from .room import read_numbers
 if TYPE_CHECKING:
     import pandas
 
+    from .bound_model import BoundModel
     from .change_points import ChangePoint
 
 
@@ -128,6 +129,26 @@ class Trajectory:
     def name(self) -> str:
         """Name of the model."""
         return str(self.metadata["name"])
+
+    @property
+    def columns(self) -> Source:
+        """Where the columns come from: the module's calls, or what a file holds."""
+        return self._columns
+
+    @property
+    def has_dense_output(self) -> bool:
+        """Whether :meth:`at` can be asked."""
+        return self._sample is not None
+
+    @property
+    def q(self) -> Array:
+        """Coordinates of the tree (n_q, n_t)."""
+        return self.x[: len(self.metadata["q_names"])]
+
+    @property
+    def v(self) -> Array:
+        """Velocities of the tree (n_v, n_t)."""
+        return self.x[len(self.metadata["q_names"]) :]
 
     @property
     def x_names(self) -> tuple[str, ...]:
@@ -265,6 +286,73 @@ class Trajectory:
         from .storage import save
 
         return save(self, path)
+
+    def poses(self, model: BoundModel | None = None) -> Array:
+        """Body frames in ground axes over the run.
+
+        Parameters
+        ----------
+        model : Module, optional
+            Of a trajectory that was read from a file: the module it was made with.
+
+        Returns
+        -------
+        (n_bodies, 4, 4, n_t) array
+            In the order of the module's ``body_names``.
+        """
+        from .moving import poses
+
+        return poses(self, model)
+
+    def position(self, name: str, model: BoundModel | None = None) -> Array:
+        """Where a named marker (``"rod.tip"``) or the origin of a body is, (3, n_t) in ground axes (m).
+
+        Raises
+        ------
+        UsageError
+            There is no such marker or body, or the trajectory was read from a file and no ``model`` is given.
+        """
+        from .moving import position
+
+        return position(self, name, model)
+
+    def animate(self, file: str | Path | None = None, *, model: BoundModel | None = None, **options: Any) -> Any:
+        """Show the mechanism as it moves.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
+            turned and zoomed and needs no network (k3d).  Without a file a widget for notebooks comes back.
+        model : Module, optional
+            Of a trajectory that was read from a file: the module it was made with.
+        fps : float
+            Frames in a second, 25 by default.
+        speed : float
+            Seconds of the run in one second of the animation; by default 1 where that lasts 3 to 12 s.
+        trace : str or sequence of str
+            Markers (``"rod.tip"``) or bodies whose ways are drawn.
+        plot : str or sequence of str
+            Columns to draw over time under the mechanism (.gif, .mp4).
+        names, axes : bool
+            As for ``module.draw``.
+        dpi : float
+            Dots in an inch, 80 by default (.gif, .mp4).
+
+        Returns
+        -------
+        Path of the file, or a k3d plot
+
+        Raises
+        ------
+        MissingDependencyError
+            matplotlib, k3d or ffmpeg is not installed.
+        UsageError
+            Another ending, an unknown name, or too many frames.
+        """
+        from .moving import animate
+
+        return animate(self, file, model, options)
 
     def plot(self, *names: str, ax: Any = None) -> Any:
         """Plot columns over time.

@@ -1,0 +1,174 @@
+"""What elements look like in a picture: solids and lines in sizes of a symbol, which a type of element names.
+
+A symbol is about a fortieth of the picture, so that a joint looks the same in a watch and in a crane.  Types of joints
+have a :class:`JointLook` in the axes of their markers (z is the axis); force elements and constraints answer
+``drawn()`` with what of themselves is to be seen.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ..frames import Marker, WrapCylinder
+from ..graph.core import Expr
+
+Points = tuple[tuple[float, ...], ...]
+
+
+class Piece(NamedTuple):
+    """A solid of a joint's symbol, in sizes of a symbol.
+
+    Attributes
+    ----------
+    shape : {'box', 'cylinder', 'sphere'}
+    size : tuple of float
+        Edges of a box; radius and length of a cylinder; radius of a sphere.
+    axis : {'x', 'y', 'z'}
+        Where a cylinder lies, in the axes of the marker.
+    on : {'P', 'S'}
+        Marker it is fixed to.
+    """
+
+    shape: str
+    size: tuple[float, ...]
+    axis: str = "z"
+    on: str = "S"
+
+
+class JointLook(NamedTuple):
+    """The symbol of a type of joint.
+
+    Attributes
+    ----------
+    pieces : tuple of Piece
+    slides : bool
+        Whether S slides along z of P: a rail is drawn, or a cylinder with its rod.
+    bar : bool
+        Whether a rod without mass joins the two origins.
+    """
+
+    pieces: tuple[Piece, ...] = ()
+    slides: bool = False
+    bar: bool = False
+
+
+class Drawn(NamedTuple):
+    """Lines from marker to marker, or at a joint.
+
+    Attributes
+    ----------
+    stops : tuple of Marker and WrapCylinder
+        What it runs over, in order; one marker: lines about its z axis.
+    coordinate : str
+        Or the coordinate of a joint that it acts on: lines about an angle, lines between the markers along a length.
+    along : tuple of Points
+        Lines from the first stop to the last: part of the way (0 .. 1), and two distances across in sizes of a symbol.
+        Without them a straight line over all stops.
+    about : tuple of Points
+        Lines in the plane across the axis, in sizes of a symbol.
+    """
+
+    stops: tuple[Marker | WrapCylinder, ...] = ()
+    coordinate: str = ""
+    along: tuple[Points, ...] = ()
+    about: tuple[Points, ...] = ()
+
+
+class Wheel(NamedTuple):
+    """A wheel of a radius (m) about the z axis of a marker."""
+
+    marker: Marker
+    radius: Expr
+
+
+class PitchCircles(NamedTuple):
+    """Two wheels on the axes of two joints, of angles a and b with ratio = r_b / r_a (negative: one is internal).
+
+    Their radii follow from the distance of the axes.  Where a stands still, the joint of ``beside`` has its axis, and a
+    is part of what carries that joint.  ``belt``: the wheels do not touch, and a belt runs over them.
+    """
+
+    a: Expr
+    b: Expr
+    ratio: Expr
+    beside: Expr | None = None
+    belt: bool = False
+
+
+class Contour(NamedTuple):
+    """A closed or open line in the axes of a marker: a point (m) as expressions of one symbol, from low to high."""
+
+    marker: Marker
+    point: tuple[Expr, Expr, Expr]
+    parameter: Expr
+    low: float
+    high: float
+
+
+Seen = Drawn | Wheel | PitchCircles | Contour
+
+
+def _arc(radius: float, start: float, end: float, steps: int) -> Points:
+    turns = [math.radians(start + (end - start) * k / steps) for k in range(steps + 1)]
+    return tuple((round(radius * math.cos(a), 3), round(radius * math.sin(a), 3)) for a in turns)
+
+
+def _helix(turns: int, begin: float, end: float, radius: float) -> Points:
+    count = 12 * turns
+    way = [(begin + (end - begin) * k / count, 2 * math.pi * turns * k / count) for k in range(count + 1)]
+    coil = tuple((round(s, 3), round(radius * math.sin(a), 3), round(radius * (math.cos(a) - 1.0), 3)) for s, a in way)
+    return ((0.0, 0.0, 0.0), *coil, (1.0, 0.0, 0.0))
+
+
+def _square(begin: float, end: float, half: float) -> Points:
+    """A closed rectangle along the way."""
+    return ((begin, half, 0.0), (end, half, 0.0), (end, -half, 0.0), (begin, -half, 0.0), (begin, half, 0.0))
+
+
+#: a helical spring
+COIL: tuple[Points, ...] = (_helix(7, 0.15, 0.85, 0.9),)
+#: a pot with a piston
+DASHPOT: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (0.35, 0.0, 0.0)),
+    ((0.65, 0.8, 0.0), (0.35, 0.8, 0.0), (0.35, -0.8, 0.0), (0.65, -0.8, 0.0)),
+    ((0.55, 0.6, 0.0), (0.55, -0.6, 0.0)),
+    ((0.55, 0.0, 0.0), (1.0, 0.0, 0.0)),
+)
+#: a hydraulic or pneumatic cylinder: barrel, piston and rod
+CYLINDER: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (0.12, 0.0, 0.0)),
+    _square(0.12, 0.6, 0.8),
+    ((0.42, 0.8, 0.0), (0.42, -0.8, 0.0)),
+    ((0.42, 0.0, 0.0), (1.0, 0.0, 0.0)),
+)
+#: rubber: a crossed block
+RUBBER: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0)),
+    _square(0.3, 0.7, 0.9),
+    ((0.3, 0.9, 0.0), (0.7, -0.9, 0.0)),
+    ((0.3, -0.9, 0.0), (0.7, 0.9, 0.0)),
+    ((0.7, 0.0, 0.0), (1.0, 0.0, 0.0)),
+)
+#: a spiral spring about an axis
+SPIRAL: tuple[Points, ...] = (
+    tuple(
+        (
+            round((1.3 + 0.025 * k) * math.cos(k * math.pi / 10), 3),
+            round((1.3 + 0.025 * k) * math.sin(k * math.pi / 10), 3),
+        )
+        for k in range(51)
+    ),
+)
+#: the turning pot of a damper about an axis
+TURNING_DASHPOT: tuple[Points, ...] = (_arc(1.6, 20, 160, 12), _arc(2.2, 0, 180, 16))
+#: a round arrow: a motor or torque about an axis
+ROUND_ARROW: tuple[Points, ...] = (
+    _arc(2.1, -60, 170, 20),
+    ((-2.5, 0.95), (-2.07, 0.36), (-1.45, 0.75)),
+)
+#: an arrow along the way
+ARROW: tuple[Points, ...] = (
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    ((0.82, 0.7, 0.0), (1.0, 0.0, 0.0), (0.82, -0.7, 0.0)),
+)

@@ -1,0 +1,151 @@
+"""Stage program, pictures: Mechanism -> what a picture of it needs, as plain data for model.json.
+
+Numbers that depend on parameters stand as ``{"at": k}``, the k-th result of a tape over the parameters; so a compiled
+module is drawn with the values it is bound to, without the description it was made from.  ``eomgen.show`` reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..describe.mechanism import JointSpec, Mechanism
+from ..elements.looks import Contour, Drawn, PitchCircles, Seen, Wheel
+from ..errors import UsageError
+from ..frames import Frame, Marker, WrapCylinder
+from ..graph.core import Expr
+from ..graph.evaluate import evaluate
+from ..graph.substitute import substitute, symbols_of
+from ..graph.tape import record_tape
+
+#: Symbols that stand for the parameters of a curve or a surface.
+RUNNING = ("$0", "$1")
+
+
+class _Numbers:
+    """Expressions -> numbers, or places on a tape."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.graph = mechanism.graph
+        self.places = {p.name: ("p", k) for k, p in enumerate(mechanism.parameters)}
+        self.places |= {name: ("s", k) for k, name in enumerate(RUNNING)}
+        self.declared = {p.name: p.value for p in mechanism.parameters if p.value is not None}
+        self.kept: list[Expr] = []
+
+    def number(self, x: Expr) -> Any:
+        """One number, or its place on the tape."""
+        if x.value is not None:
+            return x.value
+        try:
+            record_tape([x], self.places.__getitem__)
+        except UsageError:  # it calls a function of the model, which a tape does not know
+            return float(evaluate([x], self.declared)[0])
+        self.kept.append(x)
+        return {"at": len(self.kept) - 1}
+
+    def numbers(self, several: Sequence[Expr]) -> list[Any]:
+        """A list of them."""
+        return [self.number(x) for x in several]
+
+    def known(self, several: Sequence[Expr]) -> bool:
+        """Whether they depend on nothing but parameters (and on what runs along a curve)."""
+        return symbols_of(several) <= self.places.keys()
+
+    def frame(self, frame: Frame) -> dict[str, Any]:
+        """A placement: rotation (3, 3) by rows, and position."""
+        return {"rotation": [self.numbers(row) for row in frame.rotation], "position": self.numbers(frame.position)}
+
+    def marker(self, marker: Marker) -> dict[str, Any]:
+        """A marker; its body is an index, -1 for ground."""
+        return {"body": marker.body, **self.frame(marker.frame)}
+
+
+def describe_picture(mechanism: Mechanism) -> dict[str, Any] | None:
+    """What a picture of the mechanism needs; None without bodies."""
+    if mechanism.bare or not mechanism.bodies:
+        return None
+    n = _Numbers(mechanism)
+    joints = [_joint(n, spec) for spec in mechanism.joints]
+    owners = {name: k for k, spec in enumerate(mechanism.joints) for name in spec.coordinates}
+    things = [(f.name, f.drawn()) for f in mechanism.forces] + [(c.name, c.drawn()) for c in mechanism.constraints]
+    elements = [
+        {"name": name, **found}
+        for name, every in things
+        for seen in every
+        if (found := _element(n, seen, owners)) is not None
+    ]
+    gravity = n.numbers(mechanism.gravity) if n.known(mechanism.gravity) else [0.0, 0.0, 0.0]
+    data = {
+        "gravity": gravity,
+        "bodies": [
+            {
+                "com": n.numbers(b.com),
+                "mass": n.number(b.mass),
+                "inertia": [n.number(b.inertia[k][k]) for k in range(3)],
+            }
+            for b in mechanism.bodies
+        ],
+        "shapes": [
+            {"body": s.body, "kind": s.kind, "sizes": n.numbers(s.sizes), "file": s.file, **n.frame(s.frame)}
+            for s in mechanism.body_shapes
+        ],
+        "markers": [{"name": marker.label, **n.marker(marker)} for marker in mechanism.named_markers],
+        "joints": joints,
+        "elements": elements,
+        "hidden": list(mechanism.added_bodies),
+    }
+    return {**data, "tape": list(record_tape(n.kept, n.places.__getitem__))}
+
+
+def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
+    look = spec.joint.look
+    found: dict[str, Any] = {
+        "name": spec.name,
+        "type": spec.joint.type_name,
+        "P": n.marker(spec.predecessor),
+        "S": n.marker(spec.successor),
+        "pieces": [[piece.shape, list(piece.size), piece.axis, piece.on] for piece in look.pieces],
+        "slides": look.slides,
+        "bar": look.bar,
+        "coordinates": list(spec.coordinates),
+    }
+    shape = getattr(spec.joint, "shape", None)
+    if shape is not None:
+        running = {s: n.graph.symbol(name) for s, name in zip(shape.parameters, RUNNING, strict=False)}
+        point = substitute(list(shape.point), running)
+        if n.known(point):
+            found["guide"] = {"point": n.numbers(point), "running": len(shape.parameters)}
+    return found
+
+
+def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, Any] | None:
+    """One thing to be seen; None where it depends on more than parameters."""
+    if isinstance(seen, Drawn):
+        stops = [_stop(n, stop) for stop in seen.stops]
+        lines = {"along": seen.along, "about": seen.about}
+        return {"kind": "lines", "stops": stops, "joint": owners.get(seen.coordinate), **lines}
+    if isinstance(seen, Wheel):
+        return {"kind": "wheel", "marker": n.marker(seen.marker), "radius": n.number(seen.radius)}
+    if isinstance(seen, PitchCircles):
+        a, b, beside = (_owner(x, owners) for x in (seen.a, seen.b, seen.beside))
+        if (a is None and beside is None) or b is None or not n.known([seen.ratio]):
+            return None
+        joints = {"a": a, "b": b, "beside": beside}
+        return {"kind": "circles", **joints, "ratio": n.number(seen.ratio), "belt": seen.belt}
+    assert isinstance(seen, Contour)
+    point = substitute(list(seen.point), {seen.parameter: n.graph.symbol(RUNNING[0])})
+    if not n.known(point):
+        return None
+    span = {"low": seen.low, "high": seen.high}
+    return {"kind": "contour", "marker": n.marker(seen.marker), "point": n.numbers(point), **span}
+
+
+def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:
+    """The joint whose coordinate an expression is."""
+    return owners.get(str(x.node[1])) if x is not None and x.node[0] == "sym" else None
+
+
+def _stop(n: _Numbers, stop: Marker | WrapCylinder) -> dict[str, Any]:
+    if isinstance(stop, WrapCylinder):
+        return {**n.marker(stop.marker), "radius": n.number(stop.radius), "sense": stop.sense}
+    return n.marker(stop)

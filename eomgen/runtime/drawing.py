@@ -1,0 +1,98 @@
+"""Stage runtime, pictures: calls of a module that draw -> :mod:`eomgen.show`, loaded when asked for.
+
+A generated package has no copy of that: its pictures need eomgen beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from ..errors import MissingDependencyError
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+
+def load_show(part: str, purpose: str) -> ModuleType:
+    """A file of ``eomgen.show``.
+
+    Raises
+    ------
+    MissingDependencyError
+        This is a generated package, and eomgen is not installed.
+    """
+    for home in (f"{__package__.rpartition('.')[0]}.show", "eomgen.show"):
+        try:
+            return import_module(f"{home}.{part}")
+        except ModuleNotFoundError as error:
+            if error.name is None or not f"{home}.{part}".startswith(error.name):
+                raise
+    raise MissingDependencyError(f"{purpose} of a generated package needs eomgen beside it: pip install eomgen")
+
+
+def draw(
+    model: BoundModel,
+    x: Any = None,
+    ax: Any = None,
+    *,
+    t: float = 0.0,
+    names: bool | None = None,
+    axes: bool = False,
+) -> Any:
+    """Draw the mechanism at a configuration, true to scale.
+
+    A mechanism that moves in a plane is drawn in this plane, a spatial one in space.  Bodies are the shapes that their
+    ``display`` or ``solids`` give, else bars and plates between their joints and markers; joints, springs, dampers,
+    cylinders, gears and cams have their symbols.
+
+    Parameters
+    ----------
+    x : array (n_x,) or (n_q,), or mapping of str to float, optional
+        A state, a position, or values of coordinates that are assembled as by ``x0``; by default the declared initial
+        position.  An array is drawn as it is: a loop that it leaves open is seen to be open.
+    ax : matplotlib Axes, optional
+        Where to draw; a new figure by default.
+    t : float
+        Time (s); matters for driven constraints only.
+    names : bool, optional
+        Whether bodies and joints are named; by default where they are few.
+    axes : bool
+        Whether the axes of all bodies are drawn.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    MissingDependencyError
+        matplotlib is not installed.
+    UsageError
+        The model has no bodies, or x does not fit.
+    AssemblyError
+        The loops do not close with these values.
+    """
+    return load_show("draw", "draw").draw(model, x, ax, t=t, names=names, axes=axes)
+
+
+def draw_branches(
+    model: BoundModel, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+) -> Any:
+    """Draw every way in which the loops close with the given values, side by side in one scale.
+
+    Parameters
+    ----------
+    values : mapping of str to float, optional
+        Coordinates that are held; the declared initial ones by default.
+    t, names
+        As for :func:`draw`.
+
+    Returns
+    -------
+    array of matplotlib Axes
+        In the order of ``module.branches``.
+    """
+    return load_show("draw", "draw_branches").draw_branches(model, values, t=t, names=names)

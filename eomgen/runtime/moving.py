@@ -1,0 +1,69 @@
+"""Stage runtime, motion of bodies: a trajectory and the module it came from -> poses, places of markers, animations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..numeric.scales import Array
+from .drawing import load_show
+from .near_names import unknown
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+
+def module_of(trajectory: Any, model: BoundModel | None, purpose: str) -> BoundModel:
+    """The module of a run with its parameters bound.
+
+    Raises
+    ------
+    UsageError
+        The trajectory was read from a file or a pickle and no model is given, or one of other coordinates.
+    """
+    if model is not None:
+        if tuple(trajectory.x_names) != model.x_names:
+            raise UsageError(
+                f"the trajectory of {trajectory.name!r} has states {', '.join(trajectory.x_names)}; module "
+                f"{model.name!r} has {', '.join(model.x_names)}: give the module that it was made with"
+            )
+        return model.bind(p=trajectory.metadata.get("parameters"))
+    found: BoundModel | None = getattr(trajectory.columns, "module", None)
+    if found is None:
+        raise UsageError(f"{purpose} needs the model, which a saved trajectory does not hold: give model=module")
+    return found
+
+
+def poses(trajectory: Any, model: BoundModel | None = None) -> Array:
+    """See :meth:`.trajectory.Trajectory.poses`."""
+    module = module_of(trajectory, model, "poses")
+    names = module.u_names
+    u = trajectory.to_numpy(*names) if names else None
+    return module.poses(trajectory.q, t=trajectory.t, u=u)
+
+
+def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Array:
+    """See :meth:`.trajectory.Trajectory.position`."""
+    module = module_of(trajectory, model, "position")
+    data = load_show("data", "position").read_picture(module.metadata, module.p)
+    every = poses(trajectory, module)
+    if name in data.markers:
+        frame = data.markers[name]
+        if frame.body < 0:
+            return np.repeat(frame.position[:, None], len(trajectory.t), axis=1)
+        pose = every[frame.body]
+        found: Array = np.einsum("ijk,j->ik", pose[:3, :3], frame.position) + pose[:3, 3]
+        return found
+    if name not in module.body_names:
+        raise unknown("marker or body", name, (*data.markers, *module.body_names))
+    return every[module.body_names.index(name), :3, 3]
+
+
+def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
+    """See :meth:`.trajectory.Trajectory.animate`."""
+    module = module_of(trajectory, model, "an animation")
+    slopes = getattr(trajectory.columns, "slopes", None) if not trajectory.has_dense_output else None
+    return load_show("animate", "an animation").animate(trajectory, module, file, slopes=slopes, **options)

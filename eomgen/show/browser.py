@@ -1,0 +1,125 @@
+"""Stage show, browser: a Scene over time -> a k3d plot with a time slider, or a page that needs no network."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from ..limits.pictures import ROUNDED
+from .colors import color_of, style_of
+from .data import Array
+from .motion import Motion
+from .optional import k3d
+from .scene import Item, Scene
+
+STILL = ROUNDED  #: poses that differ by less are one
+
+
+def _number(color: str) -> int:
+    """``#RRGGBB`` as a number."""
+    named = {"white": "#FFFFFF"}
+    return int(named.get(color, color).lstrip("#"), 16)
+
+
+def scene_plot(scene: Scene, motion: Motion | None = None, height: int = 600) -> Any:
+    """A k3d plot of a scene; with a motion it moves, and displays itself in a notebook."""
+    viewer = k3d("a picture in a browser")
+    span = scene.high - scene.low
+    plot = viewer.plot(
+        height=height,
+        name=escape(scene.name),
+        camera_auto_fit=False,
+        camera_mode="trackball" if scene.view is None else "orbit",
+        grid_visible=scene.view is None,
+        menu_visibility=True,
+        axes_helper=0.8,
+        camera_fov=35.0,
+        axes=["x", "y", "z"],
+    )
+    times = [0.0] if motion is None else [float(t - motion.t[0]) / motion.speed for t in motion.t]
+    for item in scene.items:
+        plot += _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
+    for label in scene.labels:
+        places = [
+            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
+            for k in range(len(times))
+        ]
+        plot += viewer.text(
+            escape(label.text),
+            is_html=True,  # else underscores would be read as TeX
+            position=_over_time(times, places),
+            color=_number("#444444" if label.role == "joint" else color_of(label)),
+            size=0.7,
+            label_box=False,
+            name=f"name {label.text}",
+        )
+    middle = 0.5 * (scene.low + scene.high)
+    if scene.view is not None:
+        middle, toward, up = middle @ scene.view, scene.view[2], scene.view[1]
+        reach = float(max(span[1], 0.55 * span[0])) * 1.75
+    else:
+        up = scene.up
+        side = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+        other = np.cross(up, side)
+        toward = 0.75 * side + 0.45 * other + 0.4 * up
+        toward = toward / np.linalg.norm(toward)
+        reach = float(np.linalg.norm(span)) * 1.55
+    plot.camera = [*(middle + reach * toward), *middle, *up]
+    if motion is not None:
+        plot.fps = motion.fps
+    return plot
+
+
+def _over_time(times: list[float], values: list[Array]) -> Any:
+    """Values by time where they change, else the first."""
+    first = np.asarray(values[0], dtype=np.float32)
+    if all(np.array_equal(np.asarray(value, dtype=np.float32), first, equal_nan=True) for value in values[1:]):
+        return first
+    return {f"{t:.6f}": np.asarray(value, dtype=np.float32) for t, value in zip(times, values, strict=True)}
+
+
+def _solid(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
+    style, color = style_of(item.role), color_of(item)
+    look = {
+        "color": _number(style.face or color),
+        "opacity": style.alpha if item.role in ("wheel", "shape") else 1.0,
+        "side": "double",
+        "flat_shading": item.role != "joint",
+        "name": f"{item.role} {item.name}",
+    }
+    faces = item.faces.astype(np.uint32) if item.faces is not None else None
+    if item.follow is not None:
+        points = [item.follow(scene.frames[k]) for k in range(len(times))]
+        return viewer.mesh(_over_time(times, points), faces, **look)
+    return _carried(viewer.mesh(item.points.astype(np.float32), faces, **look), scene, item, times)
+
+
+def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
+    width = (0.12 if item.role in ("trace", "hatch") else 0.2) * scene.symbol
+    look = {"color": _number(color_of(item)), "shader": "mesh", "width": width, "name": f"{item.role} {item.name}"}
+    there = np.asarray(np.isfinite(item.points).all(axis=1))
+    places = np.cumsum(there) - 1
+    pairs = [(places[k], places[k + 1]) for k in range(len(item.points) - 1) if there[k] and there[k + 1]]
+    look |= {"indices": np.array(pairs, dtype=np.uint32), "indices_type": "segment"}
+    if item.follow is not None:
+        points = [item.follow(scene.frames[k])[there] for k in range(len(times))]
+        return viewer.lines(_over_time(times, points), **look)
+    return _carried(viewer.lines(item.points[there].astype(np.float32), **look), scene, item, times)
+
+
+def _carried(shape: Any, scene: Scene, item: Item, times: list[float]) -> Any:
+    """A shape that its body carries along."""
+    shape.model_matrix = _over_time(times, [scene.frames[k, item.body] for k in range(len(times))])
+    return shape
+
+
+def page(scene: Scene, motion: Motion | None) -> str:
+    """One HTML page that holds all it needs; it asks nothing of a network."""
+    plot = scene_plot(scene, motion)
+    plot.snapshot_type = "full"
+    play = "" if motion is None else "K3DInstance.startAutoPlay();"
+    text: str = plot.get_snapshot(9, additional_js_code=play)
+    return re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(scene.name)}</title>", text, count=1)

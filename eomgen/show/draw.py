@@ -1,0 +1,109 @@
+"""Stage show, draw: a module at a state -> a picture with matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import UsageError
+from ..texts import shown
+from .build import build_scene
+from .data import Array
+from .optional import matplotlib
+from .scene import Scene
+
+
+def position(module: Any, x: Any, t: float) -> Array:
+    """Coordinates (n_q,) of a state, a position or values by name; the declared initial ones without any."""
+    if x is None or isinstance(x, Mapping):
+        found: Array = module.x0(x, t=t)[: module.n_q]
+        return found
+    try:
+        given = np.asarray(x, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"x must be a state, a position or values by name, not {shown(x)}") from None
+    if given.shape not in ((module.n_x,), (module.n_q,)):
+        raise UsageError(
+            f"x has shape {given.shape}; give a state ({module.n_x},), a position ({module.n_q},) or values by name"
+        )
+    if not np.isfinite(given).all():
+        raise UsageError("x has values that are not finite")
+    return given[: module.n_q]
+
+
+def draw(
+    module: Any, x: Any = None, ax: Any = None, *, t: float = 0.0, names: bool | None = None, axes: bool = False
+) -> Any:
+    """See :func:`eomgen.runtime.drawing.draw`."""
+    scene = build_scene(module, position(module, x, t)[:, None], t, names=names, axes=axes)
+    return draw_scene(scene, ax)
+
+
+def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
+    """Draw the first frame of a scene; returns the axes."""
+    pyplot = matplotlib("pyplot", "draw")
+    artist = new_artist(scene, pyplot, ax)
+    artist.show(0)
+    artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
+    return artist.ax
+
+
+def figure_of(scene: Scene) -> Any:
+    """A figure without a window, with empty axes for a scene."""
+    figure = matplotlib("figure", "draw").Figure
+    if scene.view is None:
+        made = figure(figsize=(7.0, 6.4), layout="constrained")
+        made.add_subplot(projection="3d")
+        return made
+    from .flat import figure_size
+
+    made = figure(figsize=figure_size(scene), layout="constrained")
+    made.add_subplot()
+    return made
+
+
+def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
+    """Flat or Space, on the given axes or a new figure.
+
+    Raises
+    ------
+    UsageError
+        The axes are not of the kind that the mechanism needs.
+    """
+    flat = scene.view is not None
+    if ax is not None and hasattr(ax, "get_zlim") == flat:
+        needed = "plain axes" if flat else 'axes in space: plt.figure().add_subplot(projection="3d")'
+        raise UsageError(f"the mechanism is {'planar' if flat else 'spatial'}; ax must be {needed}")
+    if flat:
+        from .flat import Flat, figure_size
+
+        if ax is None:
+            ax = pyplot.figure(figsize=figure_size(scene), layout="constrained").add_subplot()
+        return Flat(scene, ax)
+    from .space import Space
+
+    if ax is None:
+        ax = pyplot.figure(figsize=(7.0, 6.4), layout="constrained").add_subplot(projection="3d")
+    return Space(scene, ax)
+
+
+def draw_branches(
+    module: Any, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+) -> Any:
+    """See :func:`eomgen.runtime.drawing.draw_branches`."""
+    pyplot = matplotlib("pyplot", "draw_branches")
+    found: Sequence[Array] = module.branches(values or {}, t=t)
+    scenes = [build_scene(module, q[:, None], t, names=names) for q in found]
+    columns = min(3, len(scenes))
+    rows = -(-len(scenes) // columns)
+    figure = pyplot.figure(figsize=(4.2 * columns, 4.0 * rows), layout="constrained")
+    panels = []
+    low, high = np.min([s.low for s in scenes], axis=0), np.max([s.high for s in scenes], axis=0)
+    for k, scene in enumerate(scenes):
+        spatial = {} if scene.view is not None else {"projection": "3d"}
+        ax = figure.add_subplot(rows, columns, k + 1, **spatial)
+        title = f"branch {k + 1}" + (" (the declared one)" if k == 0 and not values else "")
+        panels.append(draw_scene(scene._replace(low=low, high=high), ax, title))
+    return np.array(panels, dtype=object)

@@ -1,0 +1,126 @@
+"""Stage show, flat: a Scene of a planar mechanism -> matplotlib axes, true to scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..limits.pictures import SAME
+from .colors import color_of, style_of
+from .data import Array
+from .scene import ROLES, Item, Scene
+
+SPACE = 7.0  #: largest edge of a figure of its own (inch)
+LEAST = 2.8
+
+
+def figure_size(scene: Scene) -> tuple[float, float]:
+    """Width and height of a figure with the proportions of the mechanism (inch)."""
+    width, height = scene.high[:2] - scene.low[:2]
+    scale = SPACE / max(width, height)
+    return max(LEAST, scale * width) + 0.6, max(LEAST, scale * height) + 0.6
+
+
+class Flat:
+    """Artists of a scene on axes, which :meth:`show` moves to a frame.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a view.
+    ax : matplotlib Axes
+    """
+
+    def __init__(self, scene: Scene, ax: Any) -> None:
+        from matplotlib.patches import Polygon
+
+        assert scene.view is not None
+        self.scene, self.ax = scene, ax
+        self.artists: list[tuple[Item, Any]] = []
+        for item in sorted(scene.items, key=lambda item: ROLES.index(item.role)):
+            style, depth = style_of(item.role), 2 + ROLES.index(item.role)
+            color = color_of(item)
+            if item.faces is None:
+                line = ax.plot([], [], color=color, linewidth=style.width, zorder=depth, solid_capstyle="round")[0]
+                self.artists.append((item, line))
+            else:
+                patch = Polygon(np.zeros((3, 2)), closed=True, zorder=depth, linewidth=style.width)
+                patch.set(facecolor=style.face or color, edgecolor=style.edge or color, alpha=style.alpha)
+                ax.add_patch(patch)
+                self.artists.append((item, patch))
+        self.labels = [
+            ax.annotate(
+                label.text,
+                (0, 0),
+                xytext=(6, 6) if label.role == "joint" else (0, -11),
+                textcoords="offset points",
+                fontsize=8,
+                color="0.25" if label.role == "joint" else color_of(label),
+                zorder=20,
+                parse_math=False,
+                annotation_clip=True,
+            )
+            for label in scene.labels
+        ]
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_xlim(scene.low[0], scene.high[0])
+        ax.set_ylim(scene.low[1], scene.high[1])
+        right, up = (_axis_name(scene.view[k]) for k in (0, 1))
+        ax.set_xlabel(f"{right} (m)")
+        ax.set_ylabel(f"{up} (m)")
+        ax.tick_params(labelsize=8)
+        ax.set_axisbelow(True)
+        ax.grid(alpha=0.25)
+
+    def page(self, points: Array) -> Array:
+        """Points (n, 2) on the page."""
+        assert self.scene.view is not None
+        flat: Array = points @ self.scene.view[:2].T
+        return flat
+
+    def show(self, frame: int) -> None:
+        """Move everything to a frame."""
+        poses = self.scene.frames[frame]
+        for item, artist in self.artists:
+            points = self.page(item.at(poses))
+            if item.faces is not None:
+                artist.set_xy(outline(points))
+            elif item.role == "trace":
+                artist.set_data(points[: frame + 1, 0], points[: frame + 1, 1])
+                if len(self.scene.frames) > 1 and frame == 0:
+                    artist.set_data(points[:, 0], points[:, 1])
+            else:
+                artist.set_data(points[:, 0], points[:, 1])
+        for label, text in zip(self.scene.labels, self.labels, strict=True):
+            pose = poses[label.body]
+            text.xy = tuple(self.page((pose[:3, :3] @ label.point + pose[:3, 3])[None])[0])
+
+
+def _axis_name(direction: Array) -> str:
+    """x, y, z, with a sign where it runs backwards; a page that lies askew has no names."""
+    k = int(np.argmax(np.abs(direction)))
+    if abs(direction[k]) < 1.0 - SAME:
+        return "right" if k == 0 else "up"
+    return ("" if direction[k] > 0.0 else "-") + "xyz"[k]
+
+
+def outline(points: Array) -> Array:
+    """Corners (m, 2) of the convex hull of points (n, 2), in order (Andrew's monotone chain)."""
+    order = np.unique(points.round(12), axis=0)
+    if len(order) < 3:
+        return order
+
+    def chain(several: Array) -> list[Array]:
+        found: list[Array] = []
+        for p in several:
+            while len(found) > 1 and _turn(found[-2], found[-1], p) <= 0.0:
+                found.pop()
+            found.append(p)
+        return found[:-1]
+
+    return np.array(chain(order) + chain(order[::-1]))
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

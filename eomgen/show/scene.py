@@ -1,0 +1,303 @@
+"""Stage show, scene: data of a picture and poses over frames -> solids and lines, each fixed to a body or following it.
+
+Nothing here knows how it is drawn: the backends ask every :class:`Item` where its points are at a frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..limits.pictures import SAME
+from .data import GROUND, Array, Frame, JointData, PictureData
+from .solids import Mesh, Triangles, box, rounded, solid, sphere, turned
+
+SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
+OF_LINK = 0.16  #: and of the middle link's length, at most
+BAR = 0.55  #: radius of a bar in sizes of a symbol
+OFF = 0.3  #: of a link's length: a centre of mass so far beside it belongs to its outline
+NEAR = SAME  #: of the extent: points that are one
+
+#: Order in which roles lie over each other.
+ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace")
+
+
+class Item(NamedTuple):
+    """A solid (with ``faces``) or a line of the picture.
+
+    Attributes
+    ----------
+    role : str
+        One of ROLES.
+    name : str
+        Of the body, joint or element.
+    body : int
+        Index of the body it is fixed to and whose colour it has; GROUND.
+    points : (n, 3) array
+        In body axes (m); where ``follow`` is given, in ground axes at the first frame.
+    faces : (m, 3) array or None
+        Triangles; None for a line through the points, broken at NaN.
+    follow : callable or None
+        Poses (n_bodies + 1, 4, 4) -> points (n, 3) in ground axes, of what is fixed to no body.
+    """
+
+    role: str
+    name: str
+    body: int
+    points: Array
+    faces: Triangles | None = None
+    follow: Callable[[Array], Array] | None = None
+
+    def at(self, poses: Array) -> Array:
+        """Points in ground axes (n, 3) at poses (n_bodies + 1, 4, 4), the last of which is ground's."""
+        if self.follow is not None:
+            return self.follow(poses)
+        return move(poses[self.body], self.points)
+
+
+class Label(NamedTuple):
+    """A name at a point of a body (body axes, m)."""
+
+    text: str
+    body: int
+    point: Array
+    role: str
+
+
+class Scene(NamedTuple):
+    """All that is to be drawn.
+
+    Attributes
+    ----------
+    items, labels : list
+    view : (3, 3) array or None
+        Rows right, up, towards the reader in ground axes, of a planar mechanism.
+    up : (3,) array
+        Upwards in ground axes.
+    symbol : float
+        Size of a symbol (m).
+    frames : (k, n_bodies + 1, 4, 4) array
+        Poses; the last body is ground.
+    low, high : (3,) arrays
+        Corners of the box that holds it all over the frames; of a planar one in axes of the page.
+    """
+
+    name: str
+    items: list[Item]
+    labels: list[Label]
+    view: Array | None
+    up: Array
+    symbol: float
+    frames: Array
+    low: Array
+    high: Array
+
+
+def move(pose: Array, points: Array) -> Array:
+    """Points (n, 3) of a body in ground axes."""
+    moved: Array = points @ pose[:3, :3].T + pose[:3, 3]
+    return moved
+
+
+def placed(poses: Array, frame: Frame) -> tuple[Array, Array]:
+    """Rotation and position of a frame in ground axes."""
+    pose = poses[frame.body]
+    return pose[:3, :3] @ frame.rotation, pose[:3, :3] @ frame.position + pose[:3, 3]
+
+
+def attachments(data: PictureData) -> list[Array]:
+    """Points at which something is attached to each body, and its markers, body axes; the last list is ground's."""
+    found: list[list[Array]] = [[] for _ in range(len(data.bodies) + 1)]
+    for joint in data.joints:
+        if joint.type == "free":
+            continue
+        for frame in (joint.P, joint.S):
+            found[frame.body].append(frame.position)
+    for element in data.elements:
+        for stop, _, _ in element.get("stops", ()):
+            found[stop.body].append(stop.position)
+    for frame in data.markers.values():
+        found[frame.body].append(frame.position)
+    return [np.array(points).reshape(-1, 3) for points in found]
+
+
+def distinct(points: Array, near: float) -> Array:
+    """The points without those that repeat an earlier one."""
+    kept: list[Array] = []
+    for point in points:
+        if all(np.abs(point - other).max() > near for other in kept):
+            kept.append(point)
+    return np.array(kept).reshape(-1, 3)
+
+
+def symbol_size(data: PictureData, points: list[Array], poses: Array) -> tuple[float, float]:
+    """Size of a symbol and extent of the mechanism (m) at a pose."""
+    every = [move(poses[k], p) for k, p in enumerate(points[:-1])]
+    every += [move(poses[k], data.com[k : k + 1]) for k in range(len(data.bodies)) if data.mass[k] > 0.0]
+    every.append(points[-1])
+    for shape in data.shapes:
+        every.append(placed(poses, shape["frame"])[1][None])
+    cloud = np.vstack(every)
+    extent = float(np.ptp(cloud, axis=0).max(initial=0.0))
+    for element in data.elements:
+        if "radius" in element:
+            extent = max(extent, 2.0 * abs(float(element["radius"])))
+    for shape in data.shapes:
+        if shape["kind"] != "mesh":
+            extent = max(extent, float(np.abs(shape["sizes"]).max()))
+    if extent == 0.0:
+        extent = _own_size(data) or 1.0
+    lengths = sorted(length for k, p in enumerate(points[:-1]) if (length := _length(data, k, p)) > NEAR * extent)
+    middle = lengths[len(lengths) // 2] if lengths else extent
+    return min(SYMBOL * extent, OF_LINK * middle), extent
+
+
+def _length(data: PictureData, k: int, points: Array) -> float:
+    every = np.vstack([points, data.com[k : k + 1]])
+    return float(np.linalg.norm(np.ptp(every, axis=0)))
+
+
+def _own_size(data: PictureData) -> float:
+    """The largest edge of the boxes with the bodies' inertia (m)."""
+    return max((float(equivalent_box(data, k).max()) for k in range(len(data.bodies))), default=0.0)
+
+
+def equivalent_solid(data: PictureData, k: int, least: float) -> tuple[Mesh, float]:
+    """The uniform disc or box with the mass and moments of a body, no edge shorter than ``least``; and its size (m).
+
+    Of two equal moments and a greater third, a disc or cylinder: I = m r^2 / 2 about its axis.
+    """
+    moments, edges = data.inertia[k], equivalent_box(data, k)
+    order = np.argsort(moments)
+    small, other, great = moments[order]
+    if other - small < SAME * great < 0.5 * (great - other):
+        radius = float(np.sqrt(2.0 * great / data.mass[k]))
+        length = float(np.sqrt(max(12.0 * small / data.mass[k] - 3.0 * radius**2, 0.0)))
+        mesh = disc(radius, max(length, least))
+        return (mesh[0] @ TO_AXIS["xyz"[order[2]]].T, mesh[1]), 2.0 * radius
+    return box(np.maximum(edges, least).tolist()), float(edges.max())
+
+
+def equivalent_box(data: PictureData, k: int) -> Array:
+    """Edges of the uniform box with the mass and moments of a body (m): a^2 = 6 (I_y + I_z - I_x) / m."""
+    if not data.mass[k] > 0.0:
+        return np.zeros(3)
+    moments = data.inertia[k]
+    squares = 6.0 * (moments.sum() - 2.0 * moments) / data.mass[k]
+    edges: Array = np.sqrt(np.maximum(squares, 0.0))
+    return edges
+
+
+def attached(frame: Frame, mesh: Mesh) -> Mesh:
+    """A mesh of a frame in axes of its body."""
+    return mesh[0] @ frame.rotation.T + frame.position, mesh[1]
+
+
+#: Rotations that bring z to an axis.
+TO_AXIS = {
+    "x": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    "z": np.eye(3),
+}
+
+
+def symbol_mesh(shape: str, sizes: list[float], axis: str, symbol: float) -> Mesh:
+    """A piece of a joint's symbol, in axes of its marker."""
+    scaled = [symbol * x for x in sizes]
+    mesh = solid(shape, scaled, BAR * symbol)
+    assert mesh is not None
+    return mesh[0] @ TO_AXIS[axis].T, mesh[1]
+
+
+def link_items(data: PictureData, points: list[Array], symbol: float, extent: float) -> list[Item]:
+    """Bodies: the shapes that they were given, else bars and plates between what is attached to them."""
+    items: list[Item] = []
+    shaped = set()
+    for shape in data.shapes:
+        mesh = solid(shape["kind"], shape["sizes"], BAR * symbol)
+        body = shape["body"]
+        if mesh is not None:
+            shaped.add(body)
+            name = "ground" if body == GROUND else data.bodies[body]
+            items.append(Item("shape", name, body, *attached(shape["frame"], mesh)))
+    hidden = data.hidden
+    blocks = {joint.S.body for joint in data.joints if joint.pieces and joint.slides and _is_block(data, joint, symbol)}
+    wheels = {element["marker"].body for element in data.elements if element["kind"] in ("wheel", "contour")}
+    rods = {frame.body for joint in data.joints if joint.slides and joint.pieces for frame in (joint.P, joint.S)}
+    for k, name in enumerate(data.bodies):
+        if k in shaped or k in hidden:
+            continue
+        own = distinct(points[k], NEAR * extent)
+        com = data.com[k]
+        if k in rods - blocks and len(own) == 1 and _telescopes(data, k, symbol):
+            continue  # a barrel or a rod, which its joint draws
+        if data.mass[k] > 0.0 and len(own) == 1 and np.linalg.norm(com - own[0]) > 0.5 * symbol:
+            own = np.vstack([own, com])
+            items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))  # the mass at the end of a rod
+        if len(own) >= 2 and data.mass[k] > 0.0 and _off(com, own) > OFF * np.linalg.norm(np.ptp(own, axis=0)):
+            own = np.vstack([own, com])  # most of the body is there
+        if len(own) >= 2:
+            bar = rounded(own, BAR * symbol)
+            if bar is not None:
+                items.append(Item("link", name, k, *bar))
+        elif k not in blocks and k not in wheels and data.mass[k] > 0.0:
+            mesh, size = equivalent_solid(data, k, symbol)
+            if 4.0 * symbol < size <= 2.0 * extent:
+                items.append(Item("shape", name, k, *_moved(mesh, com)))
+            else:
+                items.append(Item("link", name, k, *_moved(sphere(1.6 * symbol), com)))
+        if data.mass[k] > 0.0 and len(points[k]) >= 2 and len(own) >= 2:
+            items.append(Item("com", name, k, *_moved(sphere(0.3 * symbol), com)))
+    return items
+
+
+def _off(point: Array, others: Array) -> float:
+    """Distance of a point from the line through the first and the last of others, or from their middle."""
+    along = others[-1] - others[0]
+    length = float(np.linalg.norm(along))
+    reach = point - others[0]
+    if length == 0.0:
+        return float(np.linalg.norm(reach))
+    part = float(np.clip(reach @ along / length**2, 0.0, 1.0))
+    return float(np.linalg.norm(reach - part * along))
+
+
+def _moved(mesh: Mesh, by: Array) -> Mesh:
+    return mesh[0] + by, mesh[1]
+
+
+def _is_block(data: PictureData, joint: JointData, symbol: float) -> bool:
+    """Whether what slides is a block on a rail; else it is a rod in a cylinder, which reaches along the axis."""
+    if joint.P.body == GROUND or joint.S.body == GROUND:
+        return True
+    k, axis = joint.S.body, joint.S.rotation[:, 2]
+    places = [data.com[k]] if data.mass[k] > 0.0 else []
+    for other in data.joints:
+        places += [f.position for f in (other.P, other.S) if f.body == k]
+    return all(abs(float(axis @ (place - joint.S.position))) < 2.0 * symbol for place in places)
+
+
+def _telescopes(data: PictureData, k: int, symbol: float) -> bool:
+    """Whether a body is a barrel or a rod."""
+    return any(
+        joint.slides and k in (joint.P.body, joint.S.body) and not _is_block(data, joint, symbol)
+        for joint in data.joints
+    )
+
+
+def frame_items(data: PictureData, symbol: float) -> list[Item]:
+    """Axes of all bodies and of ground; names end in the axis."""
+    items = []
+    for k in range(-1, len(data.bodies)):
+        for axis in range(3):
+            tip = np.zeros((2, 3))
+            tip[1, axis] = 4.0 * symbol
+            items.append(Item("frame", "xyz"[axis], k, tip))
+    return items
+
+
+def disc(radius: float, thick: float) -> Mesh:
+    """A wheel about z."""
+    return turned((radius, radius), (-thick / 2, thick / 2), 48)

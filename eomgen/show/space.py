@@ -1,0 +1,82 @@
+"""Stage show, space: a Scene of a spatial mechanism -> matplotlib axes in three dimensions, all of one scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..limits.pictures import NOTHING
+from .colors import color_of, style_of
+from .scene import Item, Scene
+from .solids import Triangles
+
+ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
+COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
+
+
+class Space:
+    """Artists of a scene on axes in space, which :meth:`show` moves to a frame.
+
+    Parameters
+    ----------
+    scene : Scene
+    ax : matplotlib Axes3D
+    """
+
+    def __init__(self, scene: Scene, ax: Any) -> None:
+        from matplotlib.colors import to_rgb
+        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+        self.scene, self.ax = scene, ax
+        self.artists: list[tuple[Item, Any, Triangles | None]] = []
+        light = np.array([0.4, -0.5, 0.77])
+        for item in scene.items:
+            style, color = style_of(item.role), color_of(item)
+            if item.faces is None:
+                line = ax.plot([], [], [], color=color, linewidth=style.width)[0]
+                self.artists.append((item, line, None))
+                continue
+            corners = item.at(scene.frames[0])[item.faces]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), NOTHING)
+            bright = 0.62 + 0.38 * np.clip(normals @ light, -0.4, 1.0)
+            base = np.array(to_rgb(style.face or color))
+            faces = np.clip(base * bright[:, None], 0.0, 1.0)
+            alpha = style.alpha if item.role in ("shape", "wheel") else 1.0
+            collection = Poly3DCollection(corners, facecolors=np.column_stack([faces, np.full(len(faces), alpha)]))
+            collection.set_edgecolor("none")
+            ax.add_collection3d(collection)
+            self.artists.append((item, collection, item.faces))
+        self.labels = [
+            ax.text(0, 0, 0, f" {label.text}", fontsize=8, color=color_of(label), parse_math=False, zorder=50)
+            for label in scene.labels
+        ]
+        vertical = int(np.argmax(np.abs(scene.up)))
+        limits = [(scene.low[k], scene.high[k]) for k in range(3)]
+        if scene.up[vertical] < 0.0:  # two axes are turned round, so that right hands stay right
+            for k in (vertical, (vertical + 1) % 3):
+                limits[k] = limits[k][::-1]
+        ax.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
+        ax.set_box_aspect(scene.high - scene.low)
+        ax.set_xlabel("x (m)", fontsize=8)
+        ax.set_ylabel("y (m)", fontsize=8)
+        ax.set_zlabel("z (m)", fontsize=8)
+        ax.tick_params(labelsize=7)
+        ax.view_init(ELEVATION, AZIMUTH, vertical_axis="xyz"[vertical])
+        ax.locator_params(nbins=5)
+
+    def show(self, frame: int) -> None:
+        """Move everything to a frame."""
+        poses = self.scene.frames[frame]
+        for item, artist, faces in self.artists:
+            points = item.at(poses)
+            if faces is not None:
+                artist.set_verts(points[faces])
+            elif item.role == "trace" and frame:
+                artist.set_data_3d(*points[: frame + 1].T)
+            else:
+                artist.set_data_3d(*points.T)
+        for label, text in zip(self.scene.labels, self.labels, strict=True):
+            pose = poses[label.body]
+            text.set_position_3d(pose[:3, :3] @ label.point + pose[:3, 3])

@@ -1,0 +1,171 @@
+"""Pictures: what is drawn lies where the poses say, true to scale, of the right kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import matplotlib.pyplot as pyplot
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import MissingDependencyError, UsageError
+from eomgen.show import optional
+from eomgen.show.build import build_scene
+from eomgen.show.flat import outline
+from eomgen.show.scene import Scene
+
+matplotlib.use("agg")
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SLIDER_CRANK = EXAMPLES / "slider_crank.yaml"
+
+
+@pytest.fixture(autouse=True)
+def close_figures() -> Iterator[None]:
+    yield
+    pyplot.close("all")
+
+
+def compiled(name: str) -> Any:
+    return eg.load(EXAMPLES / name).compile(target="numpy")
+
+
+def scene_of(module: Any, **values: float) -> Scene:
+    return build_scene(module, module.x0(values or None)[: module.n_q, None])
+
+
+def middles(scene: Scene, role: str, name: str) -> np.ndarray:
+    """Middle of each item of a role and a name, in ground axes at the first frame."""
+    found = [item.at(scene.frames[0]) for item in scene.items if (item.role, item.name) == (role, name)]
+    return np.array([(p.min(axis=0) + p.max(axis=0)) / 2 for p in found])
+
+
+@pytest.fixture(scope="module")
+def module() -> Any:
+    return compiled("slider_crank.yaml")
+
+
+def test_joint_symbols_lie_at_the_joints(module: Any) -> None:
+    """Crank pin and slider by the closed form of a slider-crank."""
+    for r in (0.1, 0.13):
+        bound, theta, l = module.bind(p={"r": r}), 0.7, 0.35
+        scene = scene_of(bound, theta=theta)
+        pin = r * np.array([np.cos(theta), np.sin(theta), 0.0])
+        slider = np.array([pin[0] + np.sqrt(l**2 - pin[1] ** 2), 0.0, 0.0])
+        assert middles(scene, "joint", "A")[0] == pytest.approx([0, 0, 0], abs=1e-12)
+        assert middles(scene, "joint", "B")[0] == pytest.approx(pin, abs=1e-12)
+        assert middles(scene, "joint", "C")[0] == pytest.approx(slider, abs=1e-12)
+        assert middles(scene, "block", "D")[0] == pytest.approx(slider, abs=1e-12)
+
+
+def test_a_coil_goes_from_marker_to_marker(module: Any) -> None:
+    scene = scene_of(module)
+    (coil,) = [item.at(scene.frames[0]) for item in scene.items if item.name == "k1" and item.role == "force"]
+    slider = module.poses(module.x0()[: module.n_q])[module.body_names.index("slider"), :3, 3]
+    assert coil[0] == pytest.approx([0.5, 0, 0], abs=1e-12)
+    assert coil[-1] == pytest.approx(slider, abs=1e-12)
+
+
+def test_a_planar_mechanism_is_true_to_scale_and_a_spatial_one_in_space(module: Any) -> None:
+    ax = module.draw()
+    assert ax.get_aspect() == 1.0
+    assert not hasattr(ax, "get_zlim")
+    space = compiled("stewart_platform.yaml").draw()
+    size = np.array([np.ptp(limits) for limits in (space.get_xlim(), space.get_ylim(), space.get_zlim())])
+    box = np.asarray(space._box_aspect)
+    assert size / size[0] == pytest.approx(box / box[0], rel=1e-9)
+
+
+def test_down_is_down() -> None:
+    """Gravity along x: x points down the page; against z (z down): the vertical axis is turned round."""
+    m = eg.Model("hanging", gravity=(9.81, 0, 0))
+    rod = m.body("rod", mass=1, com=(0.5, 0, 0), inertia={"zz": 0.1})
+    m.revolute("hinge", m.ground, rod, coordinate="theta")
+    scene = scene_of(m.compile(target="numpy"))
+    assert scene.view is not None
+    assert scene.view[1] == pytest.approx([-1, 0, 0])
+    assert np.linalg.det(scene.view) == pytest.approx(1.0)
+    ax = compiled("bicycle.yaml").draw()
+    low, high = ax.get_zlim()
+    assert low > high
+
+
+@pytest.mark.parametrize("name", sorted(file.name for file in EXAMPLES.glob("*.yaml")))
+def test_every_example_draws_all_bodies_in_the_page(name: str) -> None:
+    module = compiled(name)
+    scene = scene_of(module)
+    seen = {item.body for item in scene.items if item.role not in ("frame", "hatch")}
+    massive = {k for k, b in enumerate(module.metadata["picture"]["bodies"]) if b["mass"] != 0.0}
+    assert massive <= seen
+    for item in scene.items:
+        points = item.at(scene.frames[0])
+        points = points[np.isfinite(points).all(axis=1)]
+        points = points if scene.view is None else points @ scene.view.T
+        assert (points >= scene.low).all()
+        assert (points <= scene.high).all()
+    module.draw().figure.canvas.draw()
+
+
+def test_branches_are_drawn_side_by_side() -> None:
+    module = compiled("four_bar.yaml")
+    panels = module.draw_branches()
+    assert len(panels) == len(module.branches({})) == 2
+    assert panels[0].get_xlim() == panels[1].get_xlim()
+
+
+def test_a_model_is_drawn_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    ax = eg.load(SLIDER_CRANK).draw({"theta": 1.0})
+    assert ax.get_title() == "slider_crank"
+
+
+def test_an_outline_is_the_convex_hull() -> None:
+    points = np.random.default_rng(1).uniform(-1, 1, (200, 2))
+    from scipy.spatial import ConvexHull
+
+    x, y = outline(points).T
+    area = 0.5 * abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1)))
+    assert area == pytest.approx(ConvexHull(points).volume, rel=1e-9)
+
+
+def test_pitch_circles_touch() -> None:
+    """30, 30 and 90 teeth on a carrier of 60 mm: radii 30, 30 and 90 mm."""
+    scene = scene_of(compiled("planetary_gear.yaml"))
+    wheels = [item for item in scene.items if item.role == "wheel" and item.faces is not None]
+    radii = sorted(float(np.ptp(item.points[:, 0]) / 2) for item in wheels)
+    assert radii == pytest.approx([0.03, 0.03, 0.03, 0.09], rel=1e-6)
+
+
+def test_bad_input_is_refused_by_name(module: Any) -> None:
+    with pytest.raises(UsageError, match=r"shape \(5,\); give a state"):
+        module.draw(np.zeros(5))
+    with pytest.raises(UsageError, match="theta_1"):
+        module.draw({"theta_1": 0.2})
+    with pytest.raises(UsageError, match="not finite"):
+        module.draw(np.full(module.n_q, np.nan))
+    with pytest.raises(UsageError, match="plain axes"):
+        module.draw(ax=matplotlib.figure.Figure().add_subplot(projection="3d"))
+
+
+def test_equations_without_bodies_have_no_picture() -> None:
+    import sympy
+
+    q = sympy.Function("q")(sympy.Symbol("t"))
+    t = sympy.Symbol("t")
+    m = eg.Model.from_lagrangian("oscillator", q.diff(t) ** 2 / 2 - q**2 / 2, [q])
+    with pytest.raises(UsageError, match="nothing to draw of model 'oscillator'"):
+        m.compile(target="numpy").draw()
+
+
+def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch, module: Any) -> None:
+    def lacking(name: str) -> Any:
+        raise ImportError(f"No module named {name!r}", name=name)
+
+    monkeypatch.setattr(optional, "import_module", lacking)
+    with pytest.raises(MissingDependencyError, match="draw needs matplotlib: pip install"):
+        module.draw()
+    with pytest.raises(MissingDependencyError, match="k3d>=3.2"):
+        optional.k3d("a page")
