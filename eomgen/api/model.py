@@ -58,7 +58,7 @@ class Model(Builder):
         return pipeline.check(self)
 
     def draw(self, x: Any = None, ax: Any = None, **options: Any) -> Any:
-        """Draw the mechanism at a configuration, without compiling C; see :meth:`.module.Module.draw`, with its arguments.
+        """Draw the mechanism at a configuration, without a compiler; arguments as for :meth:`.module.Module.draw`.
 
         Examples
         --------

@@ -79,7 +79,7 @@ def draw_position(described: Model) -> Any:
     """A figure of a model at its initial position."""
     from matplotlib.figure import Figure
 
-    from ..show.build import build_scene
+    from ..show.build_scene import build_scene
     from ..show.draw import draw_scene, figure_of
 
     module = described.compile(target="numpy")

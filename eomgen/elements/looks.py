@@ -16,7 +16,7 @@ from ..graph.core import Expr
 Points = tuple[tuple[float, ...], ...]
 
 
-class Piece(NamedTuple):
+class SymbolPart(NamedTuple):
     """A solid of a joint's symbol, in sizes of a symbol.
 
     Attributes
@@ -41,14 +41,14 @@ class JointLook(NamedTuple):
 
     Attributes
     ----------
-    pieces : tuple of Piece
+    pieces : tuple of SymbolPart
     slides : bool
         Whether S slides along z of P: a rail is drawn, or a cylinder with its rod.
     bar : bool
         Whether a rod without mass joins the two origins.
     """
 
-    pieces: tuple[Piece, ...] = ()
+    pieces: tuple[SymbolPart, ...] = ()
     slides: bool = False
     bar: bool = False
 

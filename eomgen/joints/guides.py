@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.field import MOTION, Field, Fields
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.differentiate import jvp
@@ -42,7 +42,7 @@ class Guide(Joint):
 
     role: ClassVar[str] = "tree"
     has_axis: ClassVar[bool] = False
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (1.0,)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
 
     @property
     @abstractmethod

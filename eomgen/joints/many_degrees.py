@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2
 from ..graph.vectors import Mat3, Vec3
@@ -20,7 +20,7 @@ class Cylindrical(Joint):
     """Slides along and turns about the common z axis.  Allows 2, removes 4."""
 
     type_name: ClassVar[str] = "cylindrical"
-    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (1.0, 3.2)),), slides=True)
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (1.0, 3.2)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("_z", "length"), Coordinate("_3", "angle"))
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -44,7 +44,7 @@ class Planar(Joint):
     """Moves in the x-y plane of P and turns about z.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "planar"
-    look: ClassVar[JointLook] = JointLook((Piece("box", (3.0, 3.0, 0.8)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (3.0, 3.0, 0.8)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (
         Coordinate("_x", "length"),
         Coordinate("_y", "length"),
@@ -74,7 +74,7 @@ class Weld(Joint):
     """No motion.  Allows 0, removes 6."""
 
     type_name: ClassVar[str] = "weld"
-    look: ClassVar[JointLook] = JointLook((Piece("box", (0.9, 0.9, 0.9)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (0.9, 0.9, 0.9)),))
     has_axis: ClassVar[bool] = False
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.field import Field, Fields
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, cos, sin
 from ..graph.vectors import Mat3, Vec3
@@ -22,7 +22,7 @@ class Revolute(Joint):
     """Turns about the common z axis; the origins coincide.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "revolute"
-    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (0.75, 2.2)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("cylinder", (0.75, 2.2)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "angle"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -53,7 +53,7 @@ class Prismatic(Joint):
     """Slides along the common z axis without turning.  Allows 1, removes 5."""
 
     type_name: ClassVar[str] = "prismatic"
-    look: ClassVar[JointLook] = JointLook((Piece("box", (2.2, 2.2, 4.0)),), slides=True)
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (2.2, 2.2, 4.0)),), slides=True)
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("", "length"),)
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -80,7 +80,9 @@ class Screw(Joint):
     """
 
     type_name: ClassVar[str] = "screw"
-    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (1.2, 0.6)), Piece("cylinder", (0.8, 2.4))), slides=True)
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("cylinder", (1.2, 0.6)), SymbolPart("cylinder", (0.8, 2.4))), slides=True
+    )
     options: ClassVar[Fields] = {
         "pitch": Field(
             "expression",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.field import Fields
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -49,7 +49,9 @@ class Distance(RodJoint):
     """A massless rod with a ball at each end: the origins stay ``length`` apart.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "distance"
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (0.7,), on="P"), Piece("sphere", (0.7,))), bar=True)
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("sphere", (0.7,), on="P"), SymbolPart("sphere", (0.7,))), bar=True
+    )
     has_axis: ClassVar[bool] = False
     options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 1
@@ -64,7 +66,9 @@ class RevoluteSpherical(RodJoint):
     """A massless rod that turns about z of P, with a ball at S: across z, ``length`` long.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "revolute_spherical"
-    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (0.75, 2.2), on="P"), Piece("sphere", (0.8,))), bar=True)
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("cylinder", (0.75, 2.2), on="P"), SymbolPart("sphere", (0.8,))), bar=True
+    )
     options: ClassVar[Fields] = {"length": LENGTH}
     removes: ClassVar[int] = 2
     length: Expr
@@ -78,7 +82,7 @@ class Inline(RodJoint):
     """The origin of S stays on the z axis of P.  Allows 4, removes 2."""
 
     type_name: ClassVar[str] = "inline"
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (0.8,)),), slides=True)
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),), slides=True)
     removes: ClassVar[int] = 2
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
@@ -90,7 +94,7 @@ class Inplane(RodJoint):
     """The origin of S stays in the x-y plane of P.  Allows 5, removes 1."""
 
     type_name: ClassVar[str] = "inplane"
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (0.8,)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (0.8,)),))
     removes: ClassVar[int] = 1
 
     def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..elements.field import Field, Fields
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph
 from ..graph.vectors import Mat3, Vec3
@@ -74,7 +74,7 @@ class Spherical(RotatingJoint):
     """Turns about a point.  Allows 3, removes 3."""
 
     type_name: ClassVar[str] = "spherical"
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (1.0,)),))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)),))
     coordinates: ClassVar[tuple[Coordinate, ...]] = ANGLES
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:

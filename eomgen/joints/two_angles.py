@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ..elements.looks import JointLook, Piece
+from ..elements.looks import JointLook, SymbolPart
 from ..graph import vectors as vec
 from ..graph.core import Expr, Graph, atan2, sqrt
 from ..graph.vectors import Mat3, Vec3
@@ -25,7 +25,9 @@ class Universal(Joint):
     """
 
     type_name: ClassVar[str] = "universal"
-    look: ClassVar[JointLook] = JointLook((Piece("cylinder", (0.4, 2.6), "x", "P"), Piece("cylinder", (0.4, 2.6), "y")))
+    look: ClassVar[JointLook] = JointLook(
+        (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
+    )
     coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
@@ -52,7 +54,7 @@ class ConstantVelocity(Joint):
     """
 
     type_name: ClassVar[str] = "constant_velocity"
-    look: ClassVar[JointLook] = JointLook((Piece("sphere", (1.0,)), Piece("cylinder", (0.4, 3.0), "x")))
+    look: ClassVar[JointLook] = JointLook((SymbolPart("sphere", (1.0,)), SymbolPart("cylinder", (0.4, 3.0), "x")))
     coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
 
     def _angles(self, q: Sequence[Expr]) -> tuple[Expr, Expr, Expr]:

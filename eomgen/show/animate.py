@@ -17,9 +17,9 @@ from ..files.writing import whole_file
 from ..limits.pictures import ROUNDED
 from .draw import new_artist
 from .flat import figure_size
-from .motion import Motion, moving_scene, sample
 from .optional import matplotlib
 from .scene import Scene
+from .shown_motion import ShownMotion, moving_scene, sample
 
 DPI = 80  #: of the frames
 COLORS = 64  #: of a GIF
@@ -88,7 +88,7 @@ def require_kind(path: Path) -> None:
 class Frames:
     """Pictures of a scene over time, one after the other on one figure."""
 
-    def __init__(self, scene: Scene, motion: Motion, trajectory: Any, columns: dict[str, Any], dpi: float) -> None:
+    def __init__(self, scene: Scene, motion: ShownMotion, trajectory: Any, columns: dict[str, Any], dpi: float) -> None:
         figures = matplotlib("figure", "an animation")
         agg = matplotlib("backends.backend_agg", "an animation")
         self.scene, self.motion = scene, motion

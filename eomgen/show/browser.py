@@ -11,9 +11,9 @@ import numpy as np
 from ..limits.pictures import ROUNDED
 from .colors import color_of, style_of
 from .data import Array
-from .motion import Motion
 from .optional import k3d
 from .scene import Item, Scene
+from .shown_motion import ShownMotion
 
 STILL = ROUNDED  #: poses that differ by less are one
 
@@ -24,7 +24,7 @@ def _number(color: str) -> int:
     return int(named.get(color, color).lstrip("#"), 16)
 
 
-def scene_plot(scene: Scene, motion: Motion | None = None, height: int = 600) -> Any:
+def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 600) -> Any:
     """A k3d plot of a scene; with a motion it moves, and displays itself in a notebook."""
     viewer = k3d("a picture in a browser")
     span = scene.high - scene.low
@@ -116,7 +116,7 @@ def _carried(shape: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     return shape
 
 
-def page(scene: Scene, motion: Motion | None) -> str:
+def page(scene: Scene, motion: ShownMotion | None) -> str:
     """One HTML page that holds all it needs; it asks nothing of a network."""
     plot = scene_plot(scene, motion)
     plot.snapshot_type = "full"

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 GROUND = -1
 
 
-class Frame(NamedTuple):
+class PlacedFrame(NamedTuple):
     """Placement in a body (an index, or GROUND): rotation (3, 3) takes its axes to body axes, position (m)."""
 
     body: int
@@ -30,8 +30,8 @@ class JointData(NamedTuple):
 
     name: str
     type: str
-    P: Frame
-    S: Frame
+    P: PlacedFrame
+    S: PlacedFrame
     pieces: list[tuple[str, list[float], str, str]]
     slides: bool
     bar: bool
@@ -50,7 +50,7 @@ class PictureData(NamedTuple):
     inertia: Array  #: (n, 3), diagonal (kg m^2)
     gravity: Array
     shapes: list[dict[str, Any]]  #: body, kind, sizes, frame, file
-    markers: dict[str, Frame]
+    markers: dict[str, PlacedFrame]
     joints: list[JointData]
     elements: list[dict[str, Any]]
     hidden: frozenset[int]  #: bodies that the model does not name
@@ -89,8 +89,8 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
             return values[x["at"]] if x.keys() == {"at"} else {key: plain(one) for key, one in x.items()}
         return [plain(one) for one in x] if isinstance(x, list) else x
 
-    def frame(given: Mapping[str, Any]) -> Frame:
-        return Frame(given["body"], np.array(plain(given["rotation"])), np.array(plain(given["position"])))
+    def frame(given: Mapping[str, Any]) -> PlacedFrame:
+        return PlacedFrame(given["body"], np.array(plain(given["rotation"])), np.array(plain(given["position"])))
 
     def along(point: Sequence[Any]) -> Callable[..., Array]:
         """Points (n, 3) at values of what runs."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..texts import shown
-from .build import build_scene
+from .build_scene import build_scene
 from .data import Array
 from .optional import matplotlib
 from .scene import Scene
@@ -65,7 +65,7 @@ def figure_of(scene: Scene) -> Any:
 
 
 def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
-    """Flat or Space, on the given axes or a new figure.
+    """Flat or Axes3DPicture, on the given axes or a new figure.
 
     Raises
     ------
@@ -82,11 +82,11 @@ def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:
         if ax is None:
             ax = pyplot.figure(figsize=figure_size(scene), layout="constrained").add_subplot()
         return Flat(scene, ax)
-    from .space import Space
+    from .axes_3d import Axes3DPicture
 
     if ax is None:
         ax = pyplot.figure(figsize=(7.0, 6.4), layout="constrained").add_subplot(projection="3d")
-    return Space(scene, ax)
+    return Axes3DPicture(scene, ax)
 
 
 def draw_branches(

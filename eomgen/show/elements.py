@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..limits.pictures import NOTHING, ROUNDED
-from .data import GROUND, Array, Frame, PictureData
+from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
 
@@ -41,7 +41,7 @@ def element_items(data: PictureData, view: Array | None, symbol: float, poses: A
     return items
 
 
-def _frames(data: PictureData, element: dict[str, Any]) -> list[Frame]:
+def _frames(data: PictureData, element: dict[str, Any]) -> list[PlacedFrame]:
     """Where lines begin and end: markers, or those of the joint whose coordinate is meant."""
     stops = [stop for stop, _, _ in element.get("stops", ())]
     if stops or element.get("joint") is None:
@@ -124,7 +124,7 @@ def _broken(lines: Sequence[Array]) -> Array:
     return np.vstack(parts[:-1])
 
 
-def _rope(stops: Sequence[tuple[Frame, float | None, int | None]]) -> Callable[[Array], Array]:
+def _rope(stops: Sequence[tuple[PlacedFrame, float | None, int | None]]) -> Callable[[Array], Array]:
     """A line over markers and round cylinders; 25 points a cylinder, wound where it is touched."""
 
     def points(poses: Array) -> Array:
@@ -141,7 +141,7 @@ def _rope(stops: Sequence[tuple[Frame, float | None, int | None]]) -> Callable[[
     return points
 
 
-def _wound(poses: Array, frame: Frame, r: float, sense: int, a: Array, b: Array) -> Array:
+def _wound(poses: Array, frame: PlacedFrame, r: float, sense: int, a: Array, b: Array) -> Array:
     """Points where a taut string from a to b lies on a cylinder; on the straight line if it does not touch."""
     turn, center = placed(poses, frame)
     p, q = turn.T @ (a - center), turn.T @ (b - center)
@@ -167,7 +167,7 @@ def _wound(poses: Array, frame: Frame, r: float, sense: int, a: Array, b: Array)
     return wound
 
 
-def _wheel(name: str, marker: Frame, radius: float, symbol: float) -> list[Item]:
+def _wheel(name: str, marker: PlacedFrame, radius: float, symbol: float) -> list[Item]:
     """A wheel with two spokes, so that its turning is seen."""
     radius = abs(radius)
     items = [Item("wheel", name, marker.body, *attached(marker, disc(radius, min(symbol, 0.3 * radius))))]
@@ -202,7 +202,7 @@ def _circles(data: PictureData, element: dict[str, Any], symbol: float, poses: A
     return items
 
 
-def _belt(first: Frame, second: Frame, r_a: float, r_b: float, opened: bool) -> Callable[[Array], Array]:
+def _belt(first: PlacedFrame, second: PlacedFrame, r_a: float, r_b: float, opened: bool) -> Callable[[Array], Array]:
     """The two straight spans of a belt, which cross where the pulleys turn opposite ways."""
 
     def points(poses: Array) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..limits.pictures import SAME
-from .data import GROUND, Array, Frame, JointData, PictureData
+from .data import GROUND, Array, JointData, PictureData, PlacedFrame
 from .scene import BAR, Item, _is_block, attached, placed, symbol_mesh
 from .solids import Mesh, cone, turned
 
@@ -81,7 +81,7 @@ def _hatching(name: str, start: Array, end: Array, down: Array, symbol: float) -
     return Item("hatch", name, GROUND, np.vstack(lines))
 
 
-def _support(name: str, frame: Frame, view: Array | None, up: Array, symbol: float) -> list[Item]:
+def _support(name: str, frame: PlacedFrame, view: Array | None, up: Array, symbol: float) -> list[Item]:
     """A bearing on ground: a triangle over hatching; in space a cone."""
     origin = frame.position
     if view is None:
@@ -161,7 +161,7 @@ def between(
     return points
 
 
-def _origin(frame: Frame) -> Callable[[Array], Array]:
+def _origin(frame: PlacedFrame) -> Callable[[Array], Array]:
     return lambda poses: placed(poses, frame)[1]
 
 
@@ -201,7 +201,7 @@ def _guide(joint: JointData, symbol: float, q: dict[str, Array]) -> list[Item]:
     return [Item("rail", joint.name, joint.P.body, points)]
 
 
-def move_frame(frame: Frame, points: Array) -> Array:
+def move_frame(frame: PlacedFrame, points: Array) -> Array:
     """Points of a frame in axes of its body."""
     moved: Array = points @ frame.rotation.T + frame.position
     return moved

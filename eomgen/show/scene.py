@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.pictures import SAME
-from .data import GROUND, Array, Frame, JointData, PictureData
+from .data import GROUND, Array, JointData, PictureData, PlacedFrame
 from .solids import Mesh, Triangles, box, rounded, solid, sphere, turned
 
 SYMBOL = 0.02  #: of the extent of a mechanism: the size of a symbol
@@ -101,7 +101,7 @@ def move(pose: Array, points: Array) -> Array:
     return moved
 
 
-def placed(poses: Array, frame: Frame) -> tuple[Array, Array]:
+def placed(poses: Array, frame: PlacedFrame) -> tuple[Array, Array]:
     """Rotation and position of a frame in ground axes."""
     pose = poses[frame.body]
     return pose[:3, :3] @ frame.rotation, pose[:3, :3] @ frame.position + pose[:3, 3]
@@ -190,7 +190,7 @@ def equivalent_box(data: PictureData, k: int) -> Array:
     return edges
 
 
-def attached(frame: Frame, mesh: Mesh) -> Mesh:
+def attached(frame: PlacedFrame, mesh: Mesh) -> Mesh:
     """A mesh of a frame in axes of its body."""
     return mesh[0] @ frame.rotation.T + frame.position, mesh[1]
 

@@ -110,11 +110,14 @@ def test_a_page_shows_the_mechanism_without_a_network(run: Any, tmp_path: Path) 
         f"--user-data-dir={tmp_path / 'profile'}",
     ]
     words += ["--host-resolver-rules=MAP * ~NOTFOUND", f"--screenshot={shot}", page.as_uri()]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
-    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "Uncaught" in line]
-    assert console == []
-    assert "ERR_NAME_NOT_RESOLVED" not in done.stderr
-    with Image.open(shot) as image:
-        pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
-    colours = {tuple(c) for c in (pixels // 32)}
+    for _ in range(4):  # a loaded machine may take the picture before WebGL has drawn
+        done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+        console = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "Uncaught" in line]
+        assert console == []
+        assert "ERR_NAME_NOT_RESOLVED" not in done.stderr
+        with Image.open(shot) as image:
+            pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
+        colours = {tuple(c) for c in (pixels // 32)}
+        if len(colours) > 8:
+            break
     assert len(colours) > 8  # links of several colours, not an empty canvas

@@ -14,7 +14,7 @@ import pytest
 import eomgen as eg
 from eomgen.errors import MissingDependencyError, UsageError
 from eomgen.show import optional
-from eomgen.show.build import build_scene
+from eomgen.show.build_scene import build_scene
 from eomgen.show.flat import outline
 from eomgen.show.scene import Scene
 

@@ -15,7 +15,7 @@ ELEVATION, AZIMUTH = 22.0, -58.0  #: of the eye (degrees)
 COARSE = 4000  #: triangles of one item more than which are thinned out, as matplotlib draws them one by one
 
 
-class Space:
+class Axes3DPicture:
     """Artists of a scene on axes in space, which :meth:`show` moves to a frame.
 
     Parameters

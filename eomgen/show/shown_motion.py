@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
-from .build import build_scene
+from .build_scene import build_scene
 from .data import Array
 from .scene import Scene
 
@@ -17,7 +17,7 @@ SHORTEST = 3.0
 FRAMES = 1500  #: at most
 
 
-class Motion(NamedTuple):
+class ShownMotion(NamedTuple):
     """Times (k,) of the run at the frames (s), states (n_x, k), inputs (n_u, k) or None, and how fast time goes."""
 
     t: Array
@@ -27,7 +27,7 @@ class Motion(NamedTuple):
     fps: float
 
 
-def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed: float | None) -> Motion:
+def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed: float | None) -> ShownMotion:
     """Frames of a trajectory at even times.
 
     Between the steps of the run the dense output serves where it was kept, else a cubic through states and slopes,
@@ -45,7 +45,7 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
     if len(t) < 2:
         raise UsageError("the run has one point only; draw its state with module.draw(x)")
     if t[0] == t[-1]:  # a range of coordinates at one time
-        return Motion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST))
+        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST))
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:
@@ -57,7 +57,7 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
             "more, a lower fps, or a shorter run"
         )
     times = np.linspace(start, end, max(count, 2))
-    return Motion(times, *_states(trajectory, module, slopes, times), speed, fps)
+    return ShownMotion(times, *_states(trajectory, module, slopes, times), speed, fps)
 
 
 def _states(trajectory: Any, module: Any, slopes: Array | None, times: Array) -> tuple[Array, Array | None]:
@@ -82,6 +82,6 @@ def _states(trajectory: Any, module: Any, slopes: Array | None, times: Array) ->
     return states, u
 
 
-def moving_scene(module: Any, motion: Motion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
+def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
     """The scene over all frames."""
     return build_scene(module, motion.x[: module.n_q], motion.t, motion.u, names, axes, trace)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import ROUNDED, SAME
-from .data import GROUND, Array, Frame, PictureData, read_picture
+from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
 from .plane import find_view
@@ -79,12 +79,12 @@ def build_scene(
     return Scene(data.name, items, labels, view, up, symbol, frames, low, high)
 
 
-def _tracked(data: PictureData, name: str) -> Frame:
+def _tracked(data: PictureData, name: str) -> PlacedFrame:
     """The frame of a marker or a body."""
     if name in data.markers:
         return data.markers[name]
     if name in data.bodies:
-        return Frame(data.bodies.index(name), np.eye(3), np.zeros(3))
+        return PlacedFrame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
     near = get_close_matches(str(name), known, 1)
     hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
