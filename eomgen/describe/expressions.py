@@ -11,12 +11,16 @@ from __future__ import annotations
 import ast
 import math
 import re
+import threading
 from collections.abc import Callable
 
 from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
 from .names import QUANTITIES, function_words, nearest
+
+#: CPython counts the depth of its parser for all threads at once, and raises SystemError where two are in it.
+PARSER = threading.Lock()
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -112,7 +116,8 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     start = len(line) - len(line.lstrip())
     try:
         # as one interactive statement: for a module, Python would look for a file to quote the faulty line from
-        tree = ast.parse(line[start:].rstrip() + "\n", mode="single")
+        with PARSER:
+            tree = ast.parse(line[start:].rstrip() + "\n", mode="single")
     except SyntaxError as error:
         column = (error.offset or 1) + start
         raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None

@@ -26,6 +26,7 @@ LEFT_OUT = {
     "runtime/minimal": "minimal",
     "runtime/tree_motion": "kinematics",
     "runtime/pickling": "pickling",
+    "runtime/moving": "animate",
     "runtime/plotting": "plot",
     "runtime/storage": "save and pickles",
     "simulation/checkpoint": "checkpoint=",

@@ -48,8 +48,18 @@ class _Numbers:
         return [self.number(x) for x in several]
 
     def known(self, several: Sequence[Expr]) -> bool:
-        """Whether they depend on nothing but parameters (and on what runs along a curve)."""
+        """Whether they depend on nothing but parameters."""
         return symbols_of(several) <= self.places.keys()
+
+    def runs(self, point: Sequence[Expr]) -> bool:
+        """Whether a tape can follow a curve: it depends on parameters and on what runs, and calls no table."""
+        if not self.known(point):
+            return False
+        try:
+            record_tape(list(point), self.places.__getitem__)
+        except UsageError:
+            return False
+        return True
 
     def frame(self, frame: Frame) -> dict[str, Any]:
         """A placement: rotation (3, 3) by rows, and position."""
@@ -113,7 +123,7 @@ def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
     if shape is not None:
         running = {s: n.graph.symbol(name) for s, name in zip(shape.parameters, RUNNING, strict=False)}
         point = substitute(list(shape.point), running)
-        if n.known(point):
+        if n.runs(point):
             found["guide"] = {"point": n.numbers(point), "running": len(shape.parameters)}
     return found
 
@@ -134,7 +144,7 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
         return {"kind": "circles", **joints, "ratio": n.number(seen.ratio), "belt": seen.belt}
     assert isinstance(seen, Contour)
     point = substitute(list(seen.point), {seen.parameter: n.graph.symbol(RUNNING[0])})
-    if not n.known(point):
+    if not n.runs(point):
         return None
     span = {"low": seen.low, "high": seen.high}
     return {"kind": "contour", "marker": n.marker(seen.marker), "point": n.numbers(point), **span}

@@ -35,6 +35,7 @@ def load_show(part: str, purpose: str) -> ModuleType:
 
 def draw(
     model: BoundModel,
+    /,
     x: Any = None,
     ax: Any = None,
     *,
@@ -79,7 +80,7 @@ def draw(
 
 
 def draw_branches(
-    model: BoundModel, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
+    model: BoundModel, /, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
 ) -> Any:
     """Draw every way in which the loops close with the given values, side by side in one scale.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..limits.pictures import NOTHING, SAME
+from ..numeric import algebra
 from .data import Array
 
 TRIALS = 6  #: positions that are looked at
@@ -46,7 +47,7 @@ def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravi
     strength = float(np.linalg.norm(gravity))
     if strength:  # a page on which things fall is better than one on which they do not
         candidates.sort(key=lambda n: abs(float(n @ gravity)) > ROUNDING * strength)
-    _, _, axes = np.linalg.svd(stacked, full_matrices=True)
+    axes = algebra.svd(stacked, full_matrices=True)[2]
     candidates.append(axes[2])
     for n in candidates:
         if float(np.abs(stacked @ n).max(initial=0.0)) <= 1e3 * ROUNDING:
