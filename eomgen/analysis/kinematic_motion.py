@@ -13,7 +13,8 @@ from ..limits.motions import SLACK
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
-from ..runtime.trajectory import Residuals, Trajectory
+from ..runtime.run_parts import Residuals
+from ..runtime.trajectory import Trajectory
 from .driven_coordinates import DrivenCoordinates
 from .singular import Singular
 

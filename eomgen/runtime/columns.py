@@ -12,8 +12,8 @@ from ..errors import UnavailableError, UsageError
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .layout import Layout
+from .run_parts import Residuals
 from .signals import Forcing
-from .trajectory import Residuals
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,45 +16,13 @@ from ..numeric.scales import Array
 from .arrays import BROKEN, read_arrays
 from .near_names import find_lacking, require, unknown
 from .room import read_numbers
+from .run_parts import Named, Residuals
 
 if TYPE_CHECKING:
     import pandas
 
     from .bound_model import BoundModel
     from .change_points import ChangePoint
-
-
-class Named(list[Array]):
-    """What belongs to each event, by its place or its name."""
-
-    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
-        super().__init__(values)
-        self.names = tuple(names)
-
-    @overload
-    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
-    @overload
-    def __getitem__(self, key: slice) -> list[Array]: ...
-    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
-        if isinstance(key, str):
-            if key not in self.names:
-                raise unknown("event", key, self.names)
-            key = self.names.index(key)
-        return super().__getitem__(key)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Named, (list(self), self.names)
-
-
-class Residuals(NamedTuple):
-    """Largest violation of the constraints over a run, all rows, redundant ones included."""
-
-    raw_position: float = 0.0  #: of the integrator's states (m, rad)
-    raw_velocity: float = 0.0  #: (m/s, rad/s)
-    position: float = 0.0  #: of the stored, projected states
-    velocity: float = 0.0
-    correction_position: float = 0.0  #: largest change of a coordinate by the projection
-    correction_velocity: float = 0.0  #: largest change of a velocity
 
 
 class Source(Protocol):

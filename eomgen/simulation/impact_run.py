@@ -16,8 +16,9 @@ from ..limits.runs import INSTANT
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
+from ..runtime.run_parts import Residuals
 from ..runtime.signals import Forcing
-from ..runtime.trajectory import Residuals, Trajectory
+from ..runtime.trajectory import Trajectory
 from .impact_trajectory import ImpactRun
 from .impact_watch import Watch, first_missed
 from .run_arguments import find_span, find_state

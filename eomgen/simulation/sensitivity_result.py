@@ -12,8 +12,8 @@ from ..errors import UsageError
 from ..files.writing import whole_file
 from ..numeric.scales import Array
 from ..runtime.near_names import unknown
+from ..runtime.run_parts import Named
 from ..runtime.storage import table_path
-from ..runtime.trajectory import Named
 
 if TYPE_CHECKING:
     from ..runtime.trajectory import Trajectory

@@ -22,7 +22,7 @@ from eomgen.generation import generate
 
 ROOT = Path(eg.__file__).parent
 #: Lines of Python, blank ones, comments and stubs included, setup.py and the numpy target's own equations apart.
-MOST = {"cython": 5400, "numpy": 6980}
+MOST = {"cython": 5420, "numpy": 7000}
 
 
 def bouncing() -> eg.Model:

@@ -1,0 +1,42 @@
+"""Stage runtime: what a run's result consists of, besides its states: residuals, events by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, SupportsIndex, overload
+
+from ..numeric.scales import Array
+from .near_names import unknown
+
+
+class Named(list[Array]):
+    """What belongs to each event, by its place or its name."""
+
+    def __init__(self, values: Sequence[Array], names: Sequence[str]) -> None:
+        super().__init__(values)
+        self.names = tuple(names)
+
+    @overload
+    def __getitem__(self, key: str | SupportsIndex) -> Array: ...
+    @overload
+    def __getitem__(self, key: slice) -> list[Array]: ...
+    def __getitem__(self, key: str | SupportsIndex | slice) -> Array | list[Array]:
+        if isinstance(key, str):
+            if key not in self.names:
+                raise unknown("event", key, self.names)
+            key = self.names.index(key)
+        return super().__getitem__(key)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Named, (list(self), self.names)
+
+
+class Residuals(NamedTuple):
+    """Largest violation of the constraints over a run, all rows, redundant ones included."""
+
+    raw_position: float = 0.0  #: of the integrator's states (m, rad)
+    raw_velocity: float = 0.0  #: (m/s, rad/s)
+    position: float = 0.0  #: of the stored, projected states
+    velocity: float = 0.0
+    correction_position: float = 0.0  #: largest change of a coordinate by the projection
+    correction_velocity: float = 0.0  #: largest change of a velocity
