@@ -84,8 +84,8 @@ def initial_values(kinematics: Kinematics, values: Mapping[str, float], which: s
     return {name: float(x) for name, x in zip(given, numbers, strict=True)}
 
 
-def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
-    """Assemble the mechanism at its declared initial values and judge its mobility.
+def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
+    """Assemble the mechanism at its declared initial values and find its mobility.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
     functions = ConstraintFunctions(kinematics, numbers)
     if missing:
-        return replace(_judge_assumed(functions, wanted), assumed=True)
+        return replace(_find_mobility_assumed(functions, wanted), assumed=True)
     given = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
@@ -148,7 +148,7 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
         raise ModelError(problems)
 
 
-def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
+def _find_mobility_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
     """Without parameter values: made-up ones, assembled if that works, else judged off the manifold."""
     zero = functions.neutral
     if not functions.m:

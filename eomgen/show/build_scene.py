@@ -58,8 +58,8 @@ def build_scene(
         raise UsageError("the poses of the bodies are not finite at this position; give coordinates that are")
     frames = _with_ground(poses)
     start = np.array(q[:, 0])
-    balls = [i for i, _ in layout.quaternion_slots]
-    view = find_view(lambda trial: np.asarray(module.poses(trial)), start, balls, data.gravity)
+    quaternions = [i for i, _ in layout.quaternion_slots]
+    view = find_view(lambda trial: np.asarray(module.poses(trial)), start, quaternions, data.gravity)
     up = _up(data.gravity) if view is None else view[1]
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
