@@ -27,6 +27,7 @@ from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
+from .dotted_names import undotted
 from .element_entry import Surroundings
 from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
@@ -58,6 +59,7 @@ def build(description: Description) -> Mechanism:
     ModelError
         The description has faults; all of them are listed.
     """
+    description = undotted(description)
     faults = Faults(description)
     names = Namespace(faults)
     graph = Graph()
@@ -68,6 +70,9 @@ def build(description: Description) -> Mechanism:
     fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
     if fault:
         faults.add("name", *fault)
+    if values.get("attachments"):
+        remedy = "add this model to another as a component, which gives markers in their place"
+        faults.add("attachments", "stand for markers of another model", remedy)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
     numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}

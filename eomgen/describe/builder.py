@@ -13,6 +13,7 @@ from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings
 from .model_bodies import BodyMethods
+from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
 from .model_totals import TotalMethods
 from .sympy_face import symbol
@@ -26,7 +27,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods):
+class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, ComponentMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(

@@ -64,6 +64,10 @@ KINDS = {
     "rates": "a mapping of names to expressions",
     "times": "true, false or a whole number greater than 0",
     "sign": "1, -1 or 0",
+    "prefix": "the beginning of names",
+    "loops": "a mapping of variables to lists, counts or {from, to, step}",
+    "attached": "a marker, or a mapping of attachments to markers",
+    "values": "a mapping of names to numbers or expressions",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -252,6 +256,9 @@ MODEL: Fields = {
     "constraints": Field("table", "equations between coordinates or markers"),
     "outputs": Field("table", "named results"),
     "events": Field("table", "zeros of expressions to find during a run, and what happens there"),
+    "components": Field("table", "parts of mechanisms to be added, each as often as one likes"),
+    "add": Field("table", "instances of components"),
+    "attachments": Field("names", "names that stand for markers of the model that takes this one in as a component"),
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
     "equations": Field("table", "equations of motion M v' = f as they are, instead of bodies and joints"),
     "independent": Field("names", "coordinates to integrate, when loops leave a choice", default=()),
@@ -259,6 +266,26 @@ MODEL: Fields = {
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
     "simulation": Field("table", "defaults of a simulation"),
     "check_inertia": Field("check", "what becomes of masses and inertias that no body can have", default=True),
+}
+
+#: Keys of a model file that hold parts of mechanisms and their use; what they bring stands in the sections then.
+PARTS = ("components", "add")
+COMPONENT: Fields = {
+    "doc": _DOC,
+    "file": Field("file", "model file that describes it, its path from the folder of this one, instead of all else"),
+    "attachments": MODEL["attachments"],
+    **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
+    **{key: MODEL[key] for key in ("constraints", "outputs", "events", "initial", "guess", "add")},
+}
+ADDED: Fields = {
+    "component": Field("name", "name of a component", required=True),
+    "prefix": Field("prefix", "put before each name of the component (the entry's name and _ unless given)"),
+    "for": Field("loops", "variables and their values, side by side; an instance for each, numbered 1, 2, ..."),
+    "at": Field("attached", "a marker for each attachment by name, or one for the only attachment or for its ground"),
+    "parameters": Field("values", "values of its parameters: numbers, or expressions that take their place"),
+    "inputs": Field("values", "values of its inputs: numbers, or expressions that take their place"),
+    "initial": Field("values", "initial values by its own names of coordinates and velocities"),
+    "guess": Field("values", "rough coordinates by its own names"),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.

@@ -11,8 +11,10 @@ from ..forces import FORCES
 from ..joints import JOINTS
 from ..numeric.rigid_inertia import CHECKS
 from .fields import (
+    ADDED,
     AXES,
     BODY,
+    COMPONENT,
     CYLINDER,
     DISPLAY,
     EQUATIONS,
@@ -38,6 +40,7 @@ from .fields import (
     joint_fields,
     solid_fields,
 )
+from .loops import ROUNDS
 from .names import LONGEST
 
 Schema = dict[str, Any]
@@ -51,6 +54,11 @@ _MARKER_NAME: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.
 
 def _ref(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
+
+
+def _object(properties: Schema, required: list[str] | None = None) -> Schema:
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {**schema, "required": required} if required else schema
 
 
 def _definitions() -> Schema:
@@ -84,6 +92,10 @@ def _definitions() -> Schema:
         "display": {"type": "array", "items": _table(DISPLAY)},
     }
 
+
+_NUMBERS: Schema = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 1, "maxItems": ROUNDS}
+_COUNT: Schema = {"type": "integer", "minimum": 1, "maximum": ROUNDS}
+_RANGE = {key: {"type": "number"} for key in ("from", "to", "step")}
 
 #: kind of field -> its schema; kinds not listed are handled by :func:`_field`.
 _KINDS: dict[str, Schema] = {
@@ -134,6 +146,22 @@ _KINDS: dict[str, Schema] = {
         ]
     },
     "matrix": {"type": "array", "items": {"type": "array", "items": _ref("expression")}},
+    "prefix": {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"},
+    "values": {"type": "object", "additionalProperties": _ref("expression")},
+    "loops": {
+        "type": "object",
+        "propertyNames": _ref("name"),
+        "additionalProperties": {
+            "anyOf": [_NUMBERS, _COUNT, _object(_RANGE, ["to"])],
+        },
+        "minProperties": 1,
+    },
+    "attached": {
+        "anyOf": [
+            _ref("marker"),
+            {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("marker")},
+        ]
+    },
     "rates": {"type": "object", "additionalProperties": _ref("expression")},
     "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {
@@ -157,11 +185,6 @@ def _each(field: Field) -> Schema:
     """A number for the coordinate, or a list of one for each of several coordinates."""
     number = {"type": ["number", "string", "null"]}
     return {"anyOf": [number, {"type": "array", "items": number}], "description": field.doc}
-
-
-def _object(properties: Schema, required: list[str] | None = None) -> Schema:
-    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
-    return {**schema, "required": required} if required else schema
 
 
 def _table(fields: Fields, without: tuple[str, ...] = ()) -> Schema:
@@ -241,6 +264,9 @@ def model_schema() -> dict[str, Any]:
         "guess": {**values, "description": MODEL["guess"].doc},
     }
     sections["bodies"]["properties"] = {"ground": _table(GROUND)}
+    sections["add"] = _section(_table(ADDED), MODEL["add"].doc)
+    own = {key: sections[key] if field.kind == "table" else _field(field) for key, field in COMPONENT.items()}
+    sections["components"] = _section(_object(own), MODEL["components"].doc)
     properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

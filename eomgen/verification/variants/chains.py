@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
+from ...describe.rewritten_texts import scaled
+from ...describe.visit import bodies_of, copied
 from .pieces import frame_on, frames_of
-from .rewritten_texts import scaled
 from .variant import NotApplicable, References, Variant, coordinates_of
-from .visit import bodies_of, copied
 
 _SLIDES = tuple(("prismatic", axis) for axis in "xyz")
 

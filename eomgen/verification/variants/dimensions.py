@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ...describe.visit import Slot
 from .variant import NotApplicable, UnitScales
-from .visit import Slot
 
 
 class Dimension(NamedTuple):

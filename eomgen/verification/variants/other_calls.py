@@ -13,6 +13,7 @@ import numpy as np
 
 from ... import pipeline
 from ...describe.builder import Builder
+from ...describe.visit import copied
 from ...emit import emit_package
 from ...emit.write import write_package
 from ...equations import METHODS
@@ -27,7 +28,6 @@ from .geometry import parameters_of_geometry
 from .inputs import input_findings
 from .probe_states import Original, compiled, compiled_model
 from .variant import Variant
-from .visit import copied
 
 Call = Callable[[str, Builder, Original, Any], Finding]
 

@@ -11,9 +11,8 @@ from typing import Any
 
 from ...describe.builder import Builder
 from ...describe.description import GROUND_NAME, DescribedEntry, Description
-from ...describe.write_yaml import yaml_text
-from ...describe.yaml_file import describe_yaml
-from .visit import Visitor, visit
+from ...describe.plain_form import plain_description
+from ...describe.visit import Visitor, visit
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
@@ -29,10 +28,7 @@ def plain(model: Builder | Description) -> Description:
         It has values that no model file can hold, such as functions of Python.
     """
     given = model.description if isinstance(model, Builder) else model
-    result = describe_yaml(yaml_text(given))
-    folders = {entry.name: entry for entry in given.sections["functions"]}
-    for entry in result.sections["functions"]:
-        entry.trusted, entry.folder = folders[entry.name].trusted, folders[entry.name].folder
+    result = plain_description(given)
     for section, keys in _DATA.items():
         for entry in result.sections[section]:
             for key in keys:
@@ -45,9 +41,7 @@ def plain(model: Builder | Description) -> Description:
         side = _ON_GROUND.get(entry.values["type"])
         if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
             entry.values[side] = GROUND_NAME
-    result = visit(result, _Placed())
-    result.lines.clear()
-    return result
+    return visit(result, _Placed())
 
 
 def _write_placements(entry: DescribedEntry) -> None:

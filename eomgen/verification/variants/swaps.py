@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
-from .rewritten_texts import negative, rewritten
+from ...describe.rewritten_texts import negative, rewritten
+from ...describe.visit import Slot, Visitor, copied, visit
 from .variant import NotApplicable, Variant, coordinates_of
-from .visit import Slot, Visitor, copied, visit
 
 #: Joints whose inverse is of the same type with all coordinates of the other sign.
 TYPES = (
