@@ -61,6 +61,8 @@ def build(description: Description) -> Mechanism:
     """
     description = undotted(description)
     faults = Faults(description)
+    if description.incomplete:
+        raise ModelError(faults.sorted())
     names = Namespace(faults)
     graph = Graph()
     reader = Reader(graph, names, faults, description)

@@ -34,7 +34,10 @@ class OwnNames:
         self.symbols = named("parameters", "inputs", "functions", "outputs", "events")
         for entry in sections["joints"]:
             kind = entry.values.get("type")
-            if not isinstance(entry.name, str) or not isinstance(kind, str) or kind not in JOINTS:
+            if not isinstance(entry.name, str):
+                continue
+            if not isinstance(kind, str) or kind not in JOINTS:  # told when the model is checked
+                self.symbols |= {entry.name, str(entry.values.get("coordinate", entry.name))}
                 continue
             joint = sketch(kind, entry.values)
             self.symbols |= {str(name) for name in coordinate_names(kind, entry.name, entry.values, joint)[0]}

@@ -9,11 +9,11 @@ from ..errors import UsageError
 from .checks import unknown_key
 from .description import GROUND_NAME, Description, Faults
 from .fields import ADDED, COMPONENT, KINDS
-from .instance import Component, Instance, add_instance
+from .instance import Component, Instance, add_instance, size_of
 from .loops import Fault, put_in, rounds_of
 from .names import fault_of_name, nearest
 
-ENTRIES = 20_000  #: most entries of a model that its components make
+ENTRIES = 20_000  #: most entries and instances of a model that its components make
 
 #: Reads the sections of a mapping into a description: mapping, path before its keys, the description.
 Fill = Callable[[Mapping[str, Any], str, Description], None]
@@ -154,8 +154,8 @@ class Components:
             return
         if component is None or rounds is None:
             return
-        if sum(map(len, target.sections.values())) + component.size * len(rounds) > ENTRIES:
-            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries")
+        if size_of(target) + component.size * len(rounds) > ENTRIES:
+            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances")
             return
         for k, variables in enumerate(rounds):
             number = str(k + 1) if "for" in keys else ""
@@ -180,7 +180,8 @@ class Components:
         named = named_attachments(component, at, f"{path}.at", self.fault)
         if named is None:
             return None
-        return Instance(name, prefix, named, values, tables["initial"], tables["guess"])
+        places = {one: f"{key}.{one}" for key in ("parameters", "inputs") for one in tables[key]}
+        return Instance(name, prefix, named, values, places, tables["initial"], tables["guess"])
 
 
 def named_attachments(component: Component, at: Any, path: str, fault: Fault) -> Mapping[str, Any] | None:

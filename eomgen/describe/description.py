@@ -74,6 +74,8 @@ class Description:
         Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
     origins : dict of str to Origin
         Path of an entry that an instance brought -> where it comes from.
+    incomplete : bool
+        Whether components or instances have faults, so that names are missing.
     """
 
     values: Values = field(default_factory=dict)
@@ -85,6 +87,7 @@ class Description:
     renamed: dict[str, dict[str, str]] = field(default_factory=dict)
     instances: dict[str, str] = field(default_factory=dict)
     origins: dict[str, Origin] = field(default_factory=dict)
+    incomplete: bool = False
 
     def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
         """Append an entry to a section."""

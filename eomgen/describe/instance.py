@@ -42,18 +42,27 @@ class Component:
 
     def __post_init__(self) -> None:
         self.names = OwnNames(self.description)
-        self.size = sum(map(len, self.description.sections.values()))
+        self.size = size_of(self.description) + 1
         self.given = {e.name: e for s in ("parameters", "inputs") for e in self.description.sections[s]}
+
+
+def size_of(description: Description) -> int:
+    """Number of entries and instances."""
+    return sum(map(len, description.sections.values())) + len(description.instances)
 
 
 @dataclass
 class Instance:
-    """One use of a component: its name, prefix, attachments by name, and values of parameters and inputs."""
+    """One use of a component: its name, prefix, attachments by name, and values of parameters and inputs.
+
+    ``places`` tells where in the instance's entry each value stands.
+    """
 
     name: str
     prefix: str
     at: Mapping[str, Any] = field(default_factory=dict)
     values: Mapping[str, Any] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
     initial: Mapping[str, Any] = field(default_factory=dict)
     guess: Mapping[str, Any] = field(default_factory=dict)
 
@@ -156,7 +165,8 @@ def _values(
     for name in instance.values:
         if name not in component.given:
             remedy = nearest(str(name), component.given, "parameters and inputs")
-            fault(f"{path}.{name}", f"{component.name} has no parameter or input {name!r}", remedy)
+            place = instance.places.get(name, name)
+            fault(f"{path}.{place}", f"{component.name} has no parameter or input {name!r}", remedy)
             sound = False
     numbers, texts = dict[str, Any](), dict[str, str]()
     for name, entry in component.given.items():

@@ -34,7 +34,8 @@ def rounds_of(given: Any, path: str, fault: Fault) -> list[Round] | None:
             fault(place, f"{values!r} is nothing to go through", _REMEDY)
             return None
         if not 1 <= len(listed) <= ROUNDS:
-            fault(place, f"has {len(listed)} values", f"1 to {ROUNDS}")
+            wrong_count = f"has more than {ROUNDS} values" if listed else "has no values"
+            fault(place, wrong_count, f"1 to {ROUNDS}")
             return None
         columns[name] = listed
     counts = {name: len(values) for name, values in columns.items()}

@@ -49,7 +49,8 @@ _NAME: Schema = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLen
 _EXPRESSION: Schema = {"type": ["number", "string"]}
 _VECTOR: Schema = {"type": "array", "items": {"$ref": "#/$defs/expression"}, "minItems": 3, "maxItems": 3}
 _SIX: Schema = {"type": "array", "minItems": 6, "maxItems": 6}
-_MARKER_NAME: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"}
+#: A name, with those of instances and of bodies before it: ``leg1.foot.tip``.
+_REFERENCE: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
 
 
 def _ref(name: str) -> Schema:
@@ -65,6 +66,7 @@ def _definitions() -> Schema:
     expression = _ref("expression")
     return {
         "name": _NAME,
+        "reference": _REFERENCE,
         "expression": _EXPRESSION,
         "vector": _VECTOR,
         "inertia": {
@@ -76,7 +78,7 @@ def _definitions() -> Schema:
         },
         "placement": {"anyOf": [_ref("vector"), _table(MARKER)]},
         "markers": {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("placement")},
-        "marker": {"anyOf": [_MARKER_NAME, _table(PLACED)]},
+        "marker": {"anyOf": [_ref("reference"), _table(PLACED)]},
         "stop": {"anyOf": [_ref("marker"), _table(CYLINDER)]},
         "pair": {"type": "array", "items": _ref("marker"), "minItems": 2, "maxItems": 2},
         "axis": {
@@ -85,7 +87,6 @@ def _definitions() -> Schema:
                 {"type": "array", "items": _ref("expression"), "minItems": 3, "maxItems": 3},
             ]
         },
-        "names": {"type": "array", "items": _ref("name")},
         "solids": {"type": "array", "items": {"oneOf": [_solid(name) for name in SOLID]}},
         "points": {"type": "array", "items": _table(POINT)},
         "limits": _object({key: _each(field) for key, field in LIMITS.items()}),
@@ -101,9 +102,9 @@ _RANGE = {key: {"type": "number"} for key in ("from", "to", "step")}
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
     "name": _ref("name"),
-    "body": _ref("name"),
-    "joint": _ref("name"),
-    "names": _ref("names"),
+    "body": _ref("reference"),
+    "joint": _ref("reference"),
+    "names": {"type": "array", "items": _ref("name")},
     "number": {"type": ["number", "string"]},
     "numbers": {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2},
     "grid": {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}, "minItems": 2},
@@ -122,7 +123,7 @@ _KINDS: dict[str, Schema] = {
     "times": {"anyOf": [{"type": "boolean"}, {"type": "integer", "minimum": 1}]},
     "sign": {"enum": [1, -1, 0]},
     "file": {"type": "string"},
-    "about": {"anyOf": [_MARKER_NAME, _ref("vector")]},
+    "about": {"anyOf": [_ref("reference"), _ref("vector")]},
     "solids": _ref("solids"),
     "points": _ref("points"),
     "limits": _ref("limits"),
@@ -130,7 +131,7 @@ _KINDS: dict[str, Schema] = {
     "pair": _ref("pair"),
     "axis": _ref("axis"),
     "shape": _ref("vector"),
-    "joints": {"type": "array", "items": _ref("name"), "minItems": 2, "maxItems": 2},
+    "joints": {"type": "array", "items": _ref("reference"), "minItems": 2, "maxItems": 2},
     "two": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "factors": {"type": "object", "additionalProperties": _ref("expression"), "minProperties": 1},
     "wheels": {
@@ -242,7 +243,7 @@ def model_schema() -> dict[str, Any]:
     dict
         Plain data, ready for ``json.dumps``.  It describes the layout; names and expressions are judged by the check.
     """
-    values = _section(_ref("expression"), "")
+    values = {**_section(_ref("expression"), ""), "propertyNames": _ref("reference")}
     sections: Schema = {
         "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
         "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
@@ -268,6 +269,7 @@ def model_schema() -> dict[str, Any]:
     own = {key: sections[key] if field.kind == "table" else _field(field) for key, field in COMPONENT.items()}
     sections["components"] = _section(_object(own), MODEL["components"].doc)
     properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
+    properties["independent"]["items"] = _ref("reference")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "eomgen model file",

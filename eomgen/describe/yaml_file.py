@@ -100,10 +100,12 @@ def _describe(text: str, file: str, origin: _Origin) -> Description:
             description.values[key] = value
     fill(tree, "", description)
     if tree.get("components") is not None or tree.get("add") is not None:
+        before = len(faults)
         components = Components(tree.get("components"), document.lines, fill, open_file, faults)
         components.add(tree.get("add"), "", description)
         components.read_all()
         description = undotted(description)
+        description.incomplete = len(faults) > before
     description.problems = faults.problems
     return description
 
