@@ -8,10 +8,11 @@ from typing import Any
 from ..errors import UsageError
 from .checks import unknown_key
 from .description import GROUND_NAME, Description, Faults
+from .dotted_names import undotted
 from .fields import ADDED, COMPONENT, KINDS
 from .instance import Component, Instance, add_instance, size_of
-from .loops import Fault, put_in, rounds_of
 from .names import fault_of_name, nearest
+from .repetition import Fault, put_in, rounds_of
 
 ENTRIES = 20_000  #: most entries and instances of a model that its components make
 
@@ -85,6 +86,7 @@ class Components:
         description = Description(lines=lines)
         self.fill(given, start, description)
         self.add(given.get("add"), start, description)
+        description = undotted(description)
         return self._checked(Component(name, start, description, self._attachments(given, start), closed=False))
 
     def _read_file(self, name: str, file: Any, path: str) -> Component | None:

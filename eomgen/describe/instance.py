@@ -10,9 +10,9 @@ from ..errors import Problem
 from .component_names import Attached, OwnNames, Renaming
 from .description import GROUND_NAME, SECTIONS, DescribedEntry, Description, Faults, Origin
 from .dotted_names import Undotted
-from .loops import Fault
 from .names import nearest
 from .placed_on import is_constant
+from .repetition import Fault
 from .visit import Slot, visit_entry
 
 

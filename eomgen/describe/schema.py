@@ -40,8 +40,8 @@ from .fields import (
     joint_fields,
     solid_fields,
 )
-from .loops import ROUNDS
 from .names import LONGEST
+from .repetition import ROUNDS
 
 Schema = dict[str, Any]
 

@@ -46,6 +46,7 @@ components:
     add:
       upper: {component: link, at: root, parameters: {l: L}}
       lower: {component: link, at: upper.rod.end, parameters: {l: L/2, m: 0.7}, inputs: {tau: k*u}}
+    outputs: {bend: upper.hinge - lower_hinge, foot: y(lower.rod.end)}
 add:
   left: {component: limb, at: cart.top, parameters: {L: s}, initial: {upper.hinge: 0.4}}
   right: {component: limb, at: {body: cart, at: [-0.1, 0.2, 0]}, parameters: {L: 2}}
@@ -86,10 +87,14 @@ forces:
 outputs:
   gap: x(left_lower_rod.end) - x(right_lower_rod.end)
   angle_sum: left_upper_hinge + left_lower_hinge
+  left_bend: left_upper_hinge - left_lower_hinge
+  left_foot: y(left_lower_rod.end)
   left_upper_end_x: x(left_upper_rod.end)
   left_upper_base_x: x(cart.top)
   left_lower_end_x: x(left_lower_rod.end)
   left_lower_base_x: x(left_upper_rod.end)
+  right_bend: right_upper_hinge - right_lower_hinge
+  right_foot: y(right_lower_rod.end)
   right_upper_end_x: x(right_upper_rod.end)
   right_upper_base_x: x(cart.right_root)
   right_lower_end_x: x(right_lower_rod.end)
@@ -281,24 +286,24 @@ def test_names_with_dots_at_run_time(folder: Path) -> None:
             "arm.yaml:14: components.limb.add.upper.component: no component 'lnik'; did you mean",
         ),
         ("{l: L}", "{q: L}", "arm.yaml:14: components.limb.add.upper.parameters.q: link has no parameter or input 'q'"),
-        ("at: cart.top,", "", "arm.yaml:17: add.left.at.root: the attachment 'root' of limb is missing"),
-        ("at: cart.top,", "at: {top: cart},", "arm.yaml:17: add.left.at.top: limb has no attachment 'top'"),
-        ("at: cart.top,", "at: cart.tip,", "arm.yaml:17: add.left.at.root: 'cart.tip' is not a marker"),
+        ("at: cart.top,", "", "arm.yaml:18: add.left.at.root: the attachment 'root' of limb is missing"),
+        ("at: cart.top,", "at: {top: cart},", "arm.yaml:18: add.left.at.top: limb has no attachment 'top'"),
+        ("at: cart.top,", "at: cart.tip,", "arm.yaml:18: add.left.at.root: 'cart.tip' is not a marker"),
         ("parts/link.yaml", "../link.yaml", "arm.yaml:9: components.link.file: ../link.yaml lies outside the folder"),
         ("parts/link.yaml", "parts/lnik.yaml", "arm.yaml:9: components.link.file: there is no file parts/lnik.yaml"),
-        ("  right:", "  left:", "arm.yaml:18: add.left: is given twice"),
+        ("  right:", "  left:", "arm.yaml:19: add.left: is given twice"),
         (
             "component: limb, at: cart.top",
             "component: limb, for: {k: [1, 2], j: [1]}, at: cart.top",
-            "arm.yaml:17: add.left.for: lists of different lengths",
+            "arm.yaml:18: add.left.for: lists of different lengths",
         ),
         (
             "component: limb, at: cart.top",
             "component: limb, for: {k: 2000}, at: cart.top",
-            "arm.yaml:17: add.left.for.k: has more than 1000 values",
+            "arm.yaml:18: add.left.for.k: has more than 1000 values",
         ),
         ("  limb:\n", "  limb:\n    gravity: [0, 0, 0]\n", "arm.yaml:11: components.limb.gravity: unknown key"),
-        ("  left:", "  cart:", "arm.yaml:17: add.cart: 'cart' is a body too"),
+        ("  left:", "  cart:", "arm.yaml:18: add.cart: 'cart' is a body too"),
     ],
 )
 def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from decimal import Decimal
 from typing import Any
 
 from .description import items
@@ -57,8 +58,10 @@ def _listed(values: Any) -> list[Any] | None:
         first, last, step = (values.get(key, default) for key, default in (("from", 1), ("to", None), ("step", 1)))
         if not {*values} <= {"from", "to", "step"} or not all(map(_is_number, (first, last, step))) or step == 0:
             return None
-        count = math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1  # the end counts, rounding aside
-        return [first + k * step for k in range(max(0, min(count, ROUNDS + 1)))]
+        begin, end, by = (Decimal(repr(x)) for x in (first, last, step))  # as written, so that the end counts
+        count = math.floor((end - begin) / by) + 1
+        whole = all(isinstance(x, int) for x in (first, step))
+        return [(int if whole else float)(begin + k * by) for k in range(max(0, min(count, ROUNDS + 1)))]
     listed = items(values)
     if listed is None or not all(isinstance(x, str) or _is_number(x) for x in listed):
         return None
