@@ -29,7 +29,7 @@ from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
 from .dotted_names import undotted
 from .element_entry import Surroundings
-from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import BODY, INPUT, MODEL, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
@@ -140,6 +140,7 @@ def build(description: Description) -> Mechanism:
         lines=dict(description.lines),
         doc=doc,
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        limits_told=_limits_told(reader, values.get("limits")),
         negative=negative,
         named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
         body_shapes=tuple(
@@ -150,6 +151,10 @@ def build(description: Description) -> Mechanism:
         added_bodies=tuple(range(described, len(bodies))),
         notes=inertia_notes,
     )
+
+
+def _limits_told(reader: Reader, given: Any) -> bool:
+    return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 
 def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[str, str]:

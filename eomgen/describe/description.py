@@ -218,6 +218,9 @@ def label_of(reference: Mapping[str, Any]) -> str:
     turn = items(reference.get("rpy"))
     if turn is not None and not is_zero(turn):
         text = f"{text[:-1]}, rpy={text_of(turn)})"
+    for key in ("axes", "matrix"):
+        if key in reference:
+            text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label
         raise UsageError(
             f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"

@@ -36,7 +36,8 @@ class ElementMethods(Described):
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type cylindrical: slides along and turns about the common z axis."""
     def universal(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        axes: Sequence[Any] | None = None, coordinates: Sequence[Any] | None = None,
+        limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type universal: a cross that turns about x of P and y of S, which stay perpendicular."""
     def constant_velocity(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
@@ -49,6 +50,9 @@ class ElementMethods(Described):
     def planar(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type planar: moves in the x-y plane of P and turns about z."""
+    def translational(self, name: str, predecessor: Any, successor: Any, coordinates: Sequence[Any] | None = None,
+        limits: Mapping[str, float] | None = None) -> JointHandle:
+        """Add a joint of type translational: slides along x, y and z of P without turning."""
     def curve_slider(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value], coordinate: Any = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None) -> JointHandle:

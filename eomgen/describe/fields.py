@@ -37,6 +37,8 @@ KINDS = {
     "pair": "a list of two markers, each a body, body.marker, ground or {body, at, rpy}",
     "joint": "the name of a joint, or of one coordinate of a joint",
     "axis": "x, y, z, -x, -y, -z or three numbers",
+    "frame_axes": "a mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers",
+    "axes": "two directions at right angles, each x, y, z, -x, -y, -z or three numbers",
     "choice": "one of the listed words",
     "flag": "true or false",
     "check": "true or false, error, note or off",
@@ -133,6 +135,8 @@ FUNCTION: dict[str, Fields] = {
 MARKER: Fields = {
     "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
     "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0)),
+    "axes": Field("frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy"),
+    "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy"),
 }
 CYLINDER: Fields = {
     "around": Field("marker", "its z axis is the axis of the cylinder", required=True),
@@ -205,11 +209,12 @@ JOINT: Fields = {
     ),
 }
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
+AXIS_PAIR = Field("axes", "axes of the cross in the markers: the first stays with P, the second with S")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
 COORDINATES = Field("names", "names of the coordinates, in order")
 #: Data of a joint that has coordinates; the last only where it has one.
 JOINT_DATA: Fields = {
-    "limits": Field("limits", "limits of the coordinate; data only"),
+    "limits": Field("limits", "limits of the coordinate; nothing stops there, but a run that passes one says so"),
     "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
     "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
 }
@@ -265,6 +270,9 @@ MODEL: Fields = {
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
     "simulation": Field("table", "defaults of a simulation"),
+    "limits": Field(
+        "choice", "whether a run that passes a limit of a joint says so", default="note", choices=("note", "off")
+    ),
     "check_inertia": Field("check", "what becomes of masses and inertias that no body can have", default=True),
 }
 
@@ -306,6 +314,8 @@ def joint_fields(type_name: str) -> Fields:
     fields = JOINT | {key: field for key, field in joint.options.items() if field.required}
     if joint.has_axis:
         fields["axis"] = AXIS
+    if joint.has_axes:
+        fields["axes"] = AXIS_PAIR
     if len(joint.coordinates) == 1:
         fields["coordinate"] = COORDINATE
     fields |= {key: field for key, field in joint.options.items() if key != "rotation"}

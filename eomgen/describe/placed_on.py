@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ..errors import UsageError
 from ..numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
 from .description import items
 from .names import function_words
+from .placement import TURNS, Numbers, axis_columns, complete_axes
 from .rewritten_texts import names_of, number_of, total
 
 Placed = Mapping[str, Any]
@@ -17,6 +20,35 @@ Placed = Mapping[str, Any]
 def is_constant(value: Any) -> bool:
     """Whether a value is a number, or a text of numbers alone such as ``-pi/6``."""
     return not isinstance(value, str) or names_of(value) <= {"pi", *function_words()}
+
+
+def with_rpy(placed: Placed, parameters: Mapping[str, float]) -> dict[str, Any]:
+    """A place whose turn, if it is given by axes or by a matrix, is given by roll, pitch and yaw.
+
+    Raises
+    ------
+    KeyError
+        A matrix depends on a parameter that has no value.
+    """
+    made = {key: value for key, value in placed.items() if key not in ("axes", "matrix")}
+    if "matrix" in placed:
+        rows = [[number_of(x, parameters) for x in items(row) or ()] for row in items(placed["matrix"]) or ()]
+        made["rpy"] = [float(x) for x in roll_pitch_yaw(np.array(rows))]
+    elif "axes" in placed:
+        (first, a), (second, b) = ((key, _direction(axis)) for key, axis in placed["axes"].items())
+        columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
+        made["rpy"] = [float(x) for x in roll_pitch_yaw(np.array(columns).T)]
+    return made
+
+
+def _direction(axis: Any) -> Numbers:
+    if isinstance(axis, str):
+        return TURNS[axis][2]
+    x, y, z = (number_of(part, {}) for part in axis)
+    columns = axis_columns((x, y, z))
+    if columns is None:
+        raise UsageError("has an axis without length")
+    return columns[2]
 
 
 def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
@@ -39,7 +71,10 @@ def placed_on(outer: Placed, inner: Placed) -> dict[str, Any]:
     UsageError
         The frame is turned by angles that depend on parameters, or a value is no list of three.
     """
-    (a, turn), (b, own) = _read(outer), _read(inner)
+    try:
+        (a, turn), (b, own) = (_read(with_rpy(placed, {})) for placed in (outer, inner))
+    except KeyError:
+        raise UsageError("places something on a frame whose matrix depends on parameters") from None
     if turn is None:
         at = [total((1.0, 1.0), pair) for pair in zip(a, b, strict=True)]
         return {"at": at} if own is None else {"at": at, "rpy": own}

@@ -64,7 +64,7 @@ class Visitor:
 
     def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
         """``at`` and ``rpy`` in a body."""
-        return {key: self.vector(value, slot.named(key)) for key, value in placed.items()}
+        return {key: value if key == "axes" else self.vector(value, slot.named(key)) for key, value in placed.items()}
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         """A reference to a marker: a text, or a mapping of body, at, rpy."""

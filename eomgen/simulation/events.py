@@ -275,6 +275,11 @@ def told_by_the_caller() -> Iterator[None]:
         _SILENT.reset(token)
 
 
+def is_told_by_the_caller() -> bool:
+    """Whether a run is part of another call, which warns itself."""
+    return _SILENT.get()
+
+
 def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
     """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
     if names and not _SILENT.get():

@@ -22,10 +22,10 @@ from ...limits.verification import REGULAR
 from ...numeric import algebra
 from ...runtime.minimal import Minimal
 from ..finding import Finding
-from .body_frames import values_of
 from .compare import Worst, compare_module, refused, states_of
 from .geometry import parameters_of_geometry
 from .inputs import input_findings
+from .plain import values_of
 from .probe_states import Original, compiled, compiled_model
 from .variant import Variant
 

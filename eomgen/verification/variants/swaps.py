@@ -11,7 +11,7 @@ from .variant import NotApplicable, Variant, coordinates_of
 
 #: Joints whose inverse is of the same type with all coordinates of the other sign.
 TYPES = (
-    *("revolute", "continuous", "prismatic", "screw", "cylindrical", "spherical", "weld"),
+    *("revolute", "continuous", "prismatic", "translational", "screw", "cylindrical", "spherical", "weld"),
     *("distance", "parallel", "perpendicular", "orientation"),
 )
 #: Elements on a joint's coordinate -> the key that changes its sign, "" if none does.
