@@ -37,7 +37,8 @@ TURNED = [(name, ANGLES) for name in ("panda", "bolt", "solo12", "anymal", "bori
 
 def load(name: str, base: str, **options: Any) -> Any:
     rotation = ANGLES if base == FIXED else base
-    return eg.load(ROBOTS[name][0], floating=base != FIXED, rotation=rotation, actuate=True, mimic="independent", **options)
+    options = {"mimic": "independent", **options}  # as in Pinocchio
+    return eg.load(ROBOTS[name][0], floating=base != FIXED, rotation=rotation, actuate=True, **options)
 
 
 def test_there_are_enough_robots() -> None:
