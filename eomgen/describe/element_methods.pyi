@@ -117,6 +117,10 @@ class ElementMethods(Described):
         """Add a linear spring on an angle: of a joint, or of the second marker about the z axis of the first."""
     def torsional_damper(self, name: str, *between: Any, joint: Any = None, damping: Value = None) -> None:
         """Add a viscous damper on an angle: of a joint, or of the second marker about the z axis of the first."""
+    def joint_spring(self, name: str, joint: Any, stiffness: Value, rest: Value = 0) -> None:
+        """Add a linear spring on any coordinate of a joint, an angle or a length."""
+    def joint_damper(self, name: str, joint: Any, damping: Value) -> None:
+        """Add a viscous damper on any coordinate of a joint, an angle or a length."""
     def element(self, name: str, *between: Any, joint: Any = None, law: Value = None, potential: Value = None,
         via: Sequence[Any] | None = None) -> None:
         """Add a force of any law along a joint's coordinate, the line between two markers, or a path."""

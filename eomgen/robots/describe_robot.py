@@ -244,9 +244,8 @@ class _Writer:
             rest = {"angle": joint.rest} if joint.rest else {}
             self._force("torsional_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
             return
-        q = self.joints[joint.name]
-        stretch = f"({q} - {joint.rest!r})" if joint.rest else q
-        self._force("actuator", joint, "spring", {"value": f"-{joint.stiffness!r}*{stretch}"})
+        rest = {"rest": joint.rest} if joint.rest else {}
+        self._force("joint_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
 
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:

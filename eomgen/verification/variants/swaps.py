@@ -20,6 +20,8 @@ _ELEMENTS = {
     "actuator": "value",
     "spring": "length",
     "torsional_spring": "angle",
+    "joint_spring": "rest",
+    "joint_damper": "",
     "damper": "",
     "torsional_damper": "",
     "friction": "",
