@@ -12,6 +12,7 @@ from .build_mechanism import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings
+from .keywords import check_keywords, keywords_of
 from .model_bodies import BodyMethods
 from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
@@ -74,6 +75,16 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, Compon
         return cls.from_description(
             describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
         )
+
+    @classmethod
+    def from_equations(
+        cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
+    ) -> Self:
+        """A model from M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
+        from .given_equations import describe_equations
+
+        check_keywords("from_equations", further, keywords_of(describe_equations))
+        return cls.from_description(describe_equations(name, coordinates, mass_matrix, forcing, **further))
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:
