@@ -83,7 +83,7 @@ def read_grid(
     if len(led) > layout.n_dof:
         left = f"at most {layout.n_dof}" if layout.n_dof else "none is left, the drivers move all: vary t"
         raise UsageError(f"{', '.join(led)} cannot all be varied: {layout.n_dof} degrees of freedom, {left}")
-    axes = tuple(_axis(name, given) for name, given in over.items())
+    axes = tuple(read_axis(f"over {name}", given) for name, given in over.items())
     size = int(np.prod([len(axis) for axis in axes], dtype=object))
     if size > points:
         shape = " x ".join(str(len(axis)) for axis in axes)
@@ -103,11 +103,11 @@ def _kind(layout: Layout, name: str) -> str:
     return kinds.get(name, "time")
 
 
-def _axis(name: str, given: Any) -> Array:
+def read_axis(label: str, given: Any) -> Array:
     """Values of one axis from (low, high, count) or from the values themselves."""
-    what = f"over {name}: give (low, high, count) or two or more rising or falling values"
+    what = f"{label}: give (low, high, count) or two or more rising or falling values"
     if isinstance(given, tuple) and len(given) == 3 and as_count(given[2]) is not None:
-        count = read_count(f"over {name}: the third of (low, high, count)", given[2], 2, 10_000_000)
+        count = read_count(f"{label}: the third of (low, high, count)", given[2], 2, 10_000_000)
         given = np.linspace(read_number(what, given[0]), read_number(what, given[1]), count)
     values = as_real(given)
     if values is None:

@@ -18,6 +18,7 @@ from ..runtime.room import require_room
 from .analysis import Prepared, analysis_options
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .shared_options import require_folder
+from .workspace_request import read_axes
 
 if TYPE_CHECKING:
     from ..ensembles.ensemble import Ensemble
@@ -35,6 +36,9 @@ MOST_WORKERS = 4096  #: processes of a local cluster
     help="CSV with a column for each name (parameter, input, coordinate, rate), a row for each run.",
 )
 @click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
+@click.option(
+    "--grid", multiple=True, metavar="NAME=LOW:HIGH:COUNT", help="Take so many values evenly, in all combinations."
+)
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the numbers drawn.")
 @click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
@@ -52,12 +56,13 @@ MOST_WORKERS = 4096  #: processes of a local cluster
 @click.option("--plot", nargs=2, metavar="NAME FILE", help="Draw a column to a picture.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write results to FILE.npz or FILE.csv.")
 def ensemble(
-    work: Prepared, cases: Path | None, vary: tuple[str, ...], count: int | None, seed: int, end: float | None,
+    work: Prepared, cases: Path | None, vary: tuple[str, ...], grid: tuple[str, ...], count: int | None,
+    seed: int, end: float | None,
     samples: int | None, statistics: bool, solver: str | None, step: float | None, rtol: float | None,
     atol: float | None, threads: int | None, cluster: str | None, store: Path | None,
     plot: tuple[str, str] | None, out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
-    """Run a model many times: from a table of cases, or with values drawn at random."""
+    """Run a model many times: from a table of cases, with values drawn at random, or over a grid."""
     if out is not None and out.suffix not in (".npz", ".csv"):
         raise UsageError(f"--out {out}: ensembles are written as .npz or .csv")
     for word, path in (("--out", out), ("--plot", None if plot is None else Path(plot[1]))):
@@ -71,10 +76,13 @@ def ensemble(
     require_room(f"--samples {samples}", float(samples or 0) * (1 + module.n_x), "keep fewer times")
     if cluster is not None and cluster.isdigit() and not 1 <= int(cluster) <= MOST_WORKERS:
         raise UsageError(f"--cluster {cluster}: give 1 to {MOST_WORKERS} workers, or the address of a scheduler")
+    if grid and (cases is not None or vary or count is not None):
+        raise UsageError("--grid makes all runs itself; leave out --cases, --vary and --count")
+    axes = read_axes("--grid", grid)
     values = _read(cases) if cases is not None else {}
     values |= _draw(vary, count or len(next(iter(values.values()), ())) or 100, seed)
-    if not values:
-        raise UsageError("nothing differs between the runs: give --cases FILE or --vary NAME=LOW:HIGH")
+    if not values and not axes:
+        raise UsageError("nothing differs between the runs: give --cases FILE, --vary NAME=LOW:HIGH or --grid")
     sorted_values: dict[str, dict[str, Any]] = {"initial": dict(work.initial), "parameters": {}, "inputs": {}}
     for name, column in values.items():
         kind = "parameters" if name in module.p_names else "inputs" if name in module.u_names else "initial"
@@ -84,8 +92,8 @@ def ensemble(
     with stage("integrate"):
         found = module.simulate_many(
             end, *(group or None for group in sorted_values.values()), method=solver, step=step, t_eval=times,
-            threads=threads, reduce="statistics" if statistics else None, cluster=_cluster(cluster), store=store,
-            rtol=rtol, atol=atol,
+            grid=axes or None, threads=threads, reduce="statistics" if statistics else None,
+            cluster=_cluster(cluster), store=store, rtol=rtol, atol=atol,
         )  # fmt: skip
     if out is not None:
         if out.suffix == ".csv":
@@ -95,7 +103,7 @@ def ensemble(
     if plot is not None:
         save_figure(found.plot(plot[0]).figure, plot[1], dpi=150)
     files = [str(path) for path in (out, plot and plot[1]) if path]
-    _tell(work, found, sorted(values), files, as_json)
+    _tell(work, found, sorted({**values, **axes}), files, as_json)
 
 
 def _tell(work: Prepared, found: Ensemble, varied: list[str], files: list[str], as_json: bool) -> None:

@@ -31,19 +31,29 @@ def read_grid(over: tuple[str, ...], of: tuple[str, ...], within: bool, ranges: 
         raise UsageError("--over needs --of NAME: the outputs or coordinates whose workspace it is")
     if ranges:
         raise UsageError("--over and --range do not go together: one is a grid, the other a path")
+    return read_axes("--over", over)
+
+
+def read_axes(option: str, over: tuple[str, ...]) -> dict[str, Any]:
+    """``NAME=LOW:HIGH:COUNT`` of an option -> (low, high, count) by name.
+
+    Raises
+    ------
+    UsageError
+    """
     grid: dict[str, Any] = {}
     for words in over:
         name, equals, text = words.partition("=")
         parts = text.split(":")
         if not equals or not name.strip() or len(parts) != 3:
-            raise UsageError(f"--over {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
+            raise UsageError(f"{option} {words}: write NAME=LOW:HIGH:COUNT, for example theta=0:2*pi:73")
         try:
             ends = parse_settings((f"LOW={parts[0]}", f"HIGH={parts[1]}"))
             count = int(parts[2])
         except ValueError as error:  # a UsageError too
-            raise UsageError(f"--over {words}: {error}") from None
+            raise UsageError(f"{option} {words}: {error}") from None
         if name.strip() in grid:
-            raise UsageError(f"--over {words}: each name once")
+            raise UsageError(f"{option} {words}: each name once")
         grid[name.strip()] = (ends["LOW"], ends["HIGH"], count)
     return grid
 

@@ -85,10 +85,10 @@ def describe_equations(
     description = Description(values={"name": name, "equations": given})
     values = {name_of(symbol): value for symbol, value in (parameters or {}).items()}
     driven = {name_of(symbol): value for symbol, value in (inputs or {}).items()}
-    known = (
-        {part + rate for part in (*names, *speeds) for rate in RATES} | set(driven) | {*given.get("intermediates", ())}
-    )
-    found = sorted({part for key in given if key not in ("coordinates", "velocities") for part in _names(given[key])})
+    known = {part + rate for part in (*names, *speeds) for rate in RATES}
+    known |= {*driven, *given.get("intermediates", ()), *given.get("multipliers", ())}
+    declared = ("coordinates", "velocities", "multipliers")
+    found = sorted({part for key in given if key not in declared for part in _names(given[key])})
     for parameter in [*values, *(part for part in found if part not in values)]:
         if parameter not in known and parameter != "t":
             value = values.get(parameter)

@@ -22,6 +22,7 @@ from ..simulation.progress import Progress, wanted
 from ..simulation.run_arguments import check_method, declare, find_span, ordered_times, own_step
 from ..simulation.tolerances import check_tolerances
 from .block import LOST, Plan, find_events
+from .case_grid import spread_grid
 from .ensemble import Ensemble
 from .given_cases import Cases, collect_cases
 from .reductions import GRAIN, Reduction, choose_reduction
@@ -45,6 +46,7 @@ def simulate_many(
     parameters: Mapping[str, Any] | ArrayLike | None = None,
     inputs: Mapping[str, Any] | ArrayLike | None = None,
     *,
+    grid: Mapping[str, Any] | None = None,
     count: int | None = None,
     method: str | None = None,
     t_eval: ArrayLike | None = None,
@@ -74,6 +76,8 @@ def simulate_many(
     parameters, inputs : mapping of str to float or (k,) array, or (n,) or (n, k) array, optional
         An input may also vary over time, the same for all runs: a table (times, values), a Signal, or an expression as
         text; (k,) inputs are constant.
+    grid : mapping of str to list or (low, high, count), optional
+        Values of parameters, inputs, coordinates and rates: a run for every combination, the last name fastest.
     count : int, optional
         Number of runs, where no array tells it.
     method : str, optional
@@ -119,6 +123,8 @@ def simulate_many(
         dask.distributed is not installed.
     """
     check_names("option of simulate_many", options, OPTIONS)
+    if grid is not None:
+        initial, parameters, inputs = spread_grid(module, grid, (initial, parameters, inputs))
     tables, constants = _separate(module.layout, inputs)
     cases = collect_cases(module, initial, parameters, constants, count)
     reduction = choose_reduction(reduce)

@@ -73,3 +73,14 @@ def test_wrong_tables(call: Call, tmp_path: Path) -> None:
         result = call("ensemble", CRANK, "--cases", tmp_path / "cases.csv")
         assert result.code == 2
         assert message in result.err
+
+
+def test_a_grid(call: Call) -> None:
+    words = ("ensemble", PENDULUM, "--end", "0.1", "--grid", "theta1=-1:1:3", "--grid", "m2=0.5:2:5")
+    result = call(*words, "--json")
+    assert result.code == 0, result.err
+    assert (result.json["count"], result.json["varied"]) == (15, ["m2", "theta1"])
+    refused = call(*words, "--vary", "m1=1:2")
+    assert refused.code == 2
+    assert "leave out --cases, --vary and --count" in refused.err
+    assert "write NAME=LOW:HIGH:COUNT" in call("ensemble", PENDULUM, "--grid", "theta1=1").err

@@ -1,0 +1,57 @@
+"""A grid of values of many runs -> initial values, parameters and inputs, a column for each run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.workspace_grid import read_axis
+from ..errors import UsageError
+from ..runtime.near_names import check_names, require_mapping, without_dots
+from ..runtime.room import require_room
+
+if TYPE_CHECKING:
+    from ..runtime.bound_model import BoundModel
+
+Groups = tuple[Any, Any, Any]
+
+
+def spread_grid(module: BoundModel, grid: Any, groups: Groups) -> Groups:
+    """Initial values, parameters and inputs with the columns of a grid: every combination, the last name fastest.
+
+    Parameters
+    ----------
+    module : BoundModel
+    grid : mapping
+        Values by the name of a parameter, an input, a coordinate or a rate: a list, or (low, high, count).
+    groups : tuple
+        Initial values, parameters and inputs beside the grid, by name.
+
+    Raises
+    ------
+    UsageError
+        A name that is not there, or given twice; a group that is an array.
+    """
+    require_mapping("grid", grid)
+    grid = without_dots(grid)
+    if not grid:
+        raise UsageError("grid has no names; give values by name, such as {'theta': (0, 1, 11)}")
+    states = (*module.x_names, *module.loop_names, *module.layout.loop_rates)
+    check_names("parameter, input, coordinate or rate", grid, (*module.p_names, *module.u_names, *states))
+    for what, given in zip(("initial", "parameters", "inputs"), groups, strict=True):
+        if given is not None and not isinstance(given, Mapping):
+            raise UsageError(f"{what} must be given by name beside a grid")
+        if twice := sorted({*grid} & {*without_dots(given or {})}):
+            raise UsageError(f"grid: {', '.join(twice)} stands in {what} too")
+    axes = [read_axis(f"grid {name}", values) for name, values in grid.items()]
+    count = math.prod(map(len, axes))
+    require_room(f"a grid of {count} runs", float(count) * len(axes), "give fewer values")
+    columns = [column.ravel() for column in np.meshgrid(*axes, indexing="ij")]
+    initial, parameters, inputs = (dict(given or {}) for given in groups)
+    for name, column in zip(grid, columns, strict=True):
+        home = parameters if name in module.p_names else inputs if name in module.u_names else initial
+        home[name] = column
+    return initial, parameters, inputs
