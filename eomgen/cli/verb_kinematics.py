@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .failures import reports_failures
+from .plot import Picture, find_paths, picture_options, plot_run, require_plotting
 from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
 from .shared_options import (
     blaming_option,
@@ -60,6 +61,7 @@ SHOWN = 9  #: of them on the screen
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw them, e.g. to FILE.png.")
+@picture_options
 @json_option
 @reports_failures
 def kinematics(
@@ -76,6 +78,7 @@ def kinematics(
     settings: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    picture: Picture,
     as_json: bool,
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
@@ -89,8 +92,6 @@ def kinematics(
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
     if plot is not None:
-        from .plot import require_plotting
-
         require_plotting(plot)
     require_folder("--out", out)
     require_folder("--plot", plot)
@@ -115,10 +116,7 @@ def kinematics(
         motion.save(out)
         files.append(str(out))
     if motion is not None and plot is not None:
-        from .plot import find_paths
-        from .plot_motion import plot_motion
-
-        plot_motion(motion, find_paths(equations.kinematics.mechanism), plot)
+        plot_run(motion, find_paths(equations.kinematics.mechanism), motion.name, plot, picture)
         files.append(str(plot))
     if space is not None:
         files += write_workspace(space, out, plot)

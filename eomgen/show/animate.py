@@ -19,7 +19,7 @@ from .draw import new_artist
 from .flat import figure_size
 from .optional import matplotlib
 from .scene import Scene
-from .shown_motion import ShownMotion, moving_scene, sample
+from .shown_motion import ShownMotion, States, moving_scene, sample
 
 DPI = 80  #: of the frames
 COLORS = 64  #: of a GIF
@@ -30,7 +30,7 @@ def animate(
     module: Any,
     file: Path | str | None = None,
     *,
-    slopes: Any = None,
+    states: States,
     fps: float = 25.0,
     speed: float | None = None,
     trace: Sequence[str] | str = (),
@@ -49,7 +49,7 @@ def animate(
     columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
     if columns and kind not in WRITERS:
         raise UsageError(f"plot= stands in animations of matplotlib: {', '.join(WRITERS)}; leave it out")
-    motion = sample(trajectory, module, slopes, fps, speed)
+    motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)
     if path is None or kind == ".html":
         from .browser import page, scene_plot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,9 @@ LONGEST = 12.0  #: seconds that an animation lasts, unless a speed is given
 SHORTEST = 3.0
 FRAMES = 1500  #: at most
 
+#: Times (k,) -> states (n_x, k) and inputs (n_u, k) or None.
+States = Callable[[Array], tuple[Array, Array | None]]
+
 
 class ShownMotion(NamedTuple):
     """Times (k,) of the run at the frames (s), states (n_x, k), inputs (n_u, k) or None, and how fast time goes."""
@@ -27,11 +30,8 @@ class ShownMotion(NamedTuple):
     fps: float
 
 
-def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed: float | None) -> ShownMotion:
-    """Frames of a trajectory at even times.
-
-    Between the steps of the run the dense output serves where it was kept, else a cubic through states and slopes,
-    projected onto the constraints.
+def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> ShownMotion:
+    """Frames of a trajectory at even times, of the states that the runtime gives there.
 
     Raises
     ------
@@ -57,29 +57,7 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
             "more, a lower fps, or a shorter run"
         )
     times = np.linspace(start, end, max(count, 2))
-    return ShownMotion(times, *_states(trajectory, module, slopes, times), speed, fps)
-
-
-def _states(trajectory: Any, module: Any, slopes: Array | None, times: Array) -> tuple[Array, Array | None]:
-    names = module.layout.u
-    if trajectory.has_dense_output:
-        dense = trajectory.at(times)
-        return dense.x, dense.to_numpy(*names) if names else None
-    forward = trajectory.t[-1] > trajectory.t[0]
-    order = slice(None) if forward else slice(None, None, -1)
-    t, x = trajectory.t[order], trajectory.x[:, order]
-    keep = np.concatenate([[True], np.diff(t) > 0.0])
-    given = trajectory.to_numpy(*names)[:, order] if names else None
-    u = None if given is None else np.array([np.interp(times, t, row) for row in given])
-    if slopes is not None:
-        from scipy.interpolate import CubicHermiteSpline
-
-        states = CubicHermiteSpline(t[keep], x[:, keep], slopes[:, order][:, keep], axis=1)(times)
-    else:
-        states = np.array([np.interp(times, t[keep], row[keep]) for row in x])
-    if module.n_rows or module.layout.space:
-        states = module.project(states, t=times, u=u)
-    return states, u
+    return ShownMotion(times, *states(times), speed, fps)
 
 
 def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
