@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import UnavailableError, UsageError
 from ..numeric.scales import Array
 from .near_names import find_lacking, require, unknown
 from .room import read_numbers
@@ -144,6 +144,13 @@ class Trajectory:
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, " if len(self.t) else ""
         return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
+
+    def _repr_html_(self) -> str | None:
+        try:
+            from .notebook import trajectory_html
+        except UnavailableError:  # a slim package has none
+            return None
+        return trajectory_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
