@@ -115,7 +115,7 @@ def run(
     if plot is not None:
         require_plotting(plot)
     if animate is not None:
-        from ..show.animate import require_kind
+        from ..show.writers import require_kind
 
         require_kind(animate)
     require_folder("--out", out)

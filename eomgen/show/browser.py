@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..limits.pictures import ROUNDED
 from .colors import color_of, style_of
 from .data import Array
 from .optional import k3d
+from .player import player_html, player_script
 from .scene import Item, Scene
 from .shown_motion import ShownMotion
 
@@ -39,7 +41,7 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
         camera_fov=35.0,
         axes=["x", "y", "z"],
     )
-    times = [0.0] if motion is None else [float(t - motion.t[0]) / motion.speed for t in motion.t]
+    times = [0.0] if motion is None else motion.clock.tolist()
     for item in scene.items:
         plot += _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
     for label in scene.labels:
@@ -104,8 +106,8 @@ def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     places = np.cumsum(there) - 1
     pairs = [(places[k], places[k + 1]) for k in range(len(item.points) - 1) if there[k] and there[k + 1]]
     look |= {"indices": np.array(pairs, dtype=np.uint32), "indices_type": "segment"}
-    if item.follow is not None:
-        points = [item.follow(scene.frames[k])[there] for k in range(len(times))]
+    if item.follow is not None or item.path is not None:
+        points = [item.at(scene.frames[k], k)[there] for k in range(len(times))]
         return viewer.lines(_over_time(times, points), **look)
     return _carried(viewer.lines(item.points[there].astype(np.float32), **look), scene, item, times)
 
@@ -116,10 +118,11 @@ def _carried(shape: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     return shape
 
 
-def page(scene: Scene, motion: ShownMotion | None) -> str:
+def page(scene: Scene, motion: ShownMotion, curves: Sequence[Any] = ()) -> str:
     """One HTML page that holds all it needs; it asks nothing of a network."""
     plot = scene_plot(scene, motion)
-    plot.snapshot_type = "full"
-    play = "" if motion is None else "K3DInstance.startAutoPlay();"
-    text: str = plot.get_snapshot(9, additional_js_code=play)
+    plot.snapshot_type, plot.menu_visibility = "full", False
+    text: str = plot.get_snapshot(9, additional_js_code=player_script(motion))
+    title = f"{scene.name}   {scene.note}" if scene.note else scene.name
+    text = text.replace("<body>", f"<body>{player_html(motion, curves, title)}", 1)
     return re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(scene.name)}</title>", text, count=1)

@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import EvaluationError
-from .animate import Frames, gif_bytes, write
-from .data import Array, read_picture
+from ..files.path_names import as_path
+from .animate import write
 from .build_scene import build_scene
+from .data import Array, read_picture
+from .frames import DPI, Frames
 from .optional import matplotlib
 from .scene import Scene, attachments
 from .shown_motion import ShownMotion
+from .writers import gif_bytes, require_kind
 
 PERIOD = 2.0  #: seconds in which a mode is shown
 FPS = 12.0  #: of the pictures in a notebook
@@ -61,12 +64,13 @@ def amplitude(module: Any, q: Array, direction: Array) -> float:
     return min(limits, default=1.0 / top)
 
 
-def mode_scene(module: Any, x: Array, direction: Array, count: int, **look: Any) -> tuple[Scene, ShownMotion]:
-    """The scene of a mode over one period."""
+def mode_scene(module: Any, x: Array, shape: tuple[Array, str], count: int, **look: Any) -> tuple[Scene, ShownMotion]:
+    """The scene of a mode, a direction and what is written above it, over one period."""
+    direction, title = shape
     states = swing(module, x, direction, count)
     t = PERIOD * np.arange(count) / count
     scene = build_scene(module, states[: module.n_q], 0.0, **look)
-    return scene, ShownMotion(t, states, None, 1.0, count / PERIOD)
+    return scene, ShownMotion(t, states, None, 1.0, count / PERIOD, [title] * count, t)
 
 
 def animate_mode(
@@ -79,26 +83,27 @@ def animate_mode(
     names: bool | None = None,
     axes: bool = False,
     trace: Sequence[str] | str = (),
-    dpi: float | None = None,
+    dpi: float = DPI,
 ) -> Any:
     """See :meth:`eomgen.analysis.modes.Modes.animate`."""
-    direction, title = shape
+    if file is not None:
+        require_kind(as_path("file", file))
     look = {"names": names, "axes": axes, "trace": (trace,) if isinstance(trace, str) else tuple(trace)}
-    scene, motion = mode_scene(module, x, direction, max(2, round(fps * PERIOD)), **look)
-    return write(file, scene, motion, title=title, dpi=dpi)
+    scene, motion = mode_scene(module, x, shape, max(2, round(fps * PERIOD)), **look)
+    return write(file, scene, motion, dpi=dpi)
 
 
 def swinging_gif(module: Any, x: Array, shapes: Sequence[tuple[Array, str]]) -> bytes:
     """Several modes side by side, as a GIF."""
     figures = matplotlib("figure", "a picture")
     count = round(FPS * PERIOD)
-    made = [mode_scene(module, x, direction, count, names=False) for direction, _ in shapes]
+    made = [mode_scene(module, x, shape, count, names=False) for shape in shapes]
     figure = figures.Figure(figsize=(CELL * len(made), CELL + 0.3), dpi=72, layout="constrained")
     frames = Frames(figure, made[0][1])
-    for k, (scene, (_, title)) in enumerate(zip((scene for scene, _ in made), shapes, strict=True)):
+    for k, ((scene, _), (_, title)) in enumerate(zip(made, shapes, strict=True)):
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(1, len(made), k + 1, **spatial)
-        frames.add_scene(scene, ax, lambda frame, title=title: title)
+        frames.add_scene(scene, ax, title)
         ax.set(xlabel="", ylabel="")
         ax.tick_params(labelbottom=False, labelleft=False)
     frames.settle()
