@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EomgenError, UsageError
 from ..files.inline_pictures import image_html
+from ..limits.descriptions import SHOWN_COMPLEX
 from ..limits.statics import SYMMETRIC
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
@@ -110,7 +111,8 @@ class Modes:
                 what = "rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s"
             lines.append((f"mode {k + 1}", f"{what}: {shape}"))
         for mode in self.damped:
-            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {mode.ratio:.4g}"))
+            shown = mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0
+            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {shown:.4g}"))
         return lines
 
     def __repr__(self) -> str:

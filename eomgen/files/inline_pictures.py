@@ -14,7 +14,7 @@ DPI = 110  #: dots of a picture in an inch of its figure
 SHOWN = 72  #: dots in which this inch is shown: sharp on fine screens, and small
 
 
-def image_html(data: bytes, kind: str, width: int | None = None) -> str:
+def image_html(data: bytes, kind: str, width: int | None = None, words: str = "picture") -> str:
     """An image that needs no file.
 
     Parameters
@@ -23,8 +23,11 @@ def image_html(data: bytes, kind: str, width: int | None = None) -> str:
     kind : {'png', 'gif'}
     width : int, optional
         In dots of the page.
+    words : str
+        What is to be seen, for those who do not see it.
     """
     size = f" width='{width}'" if width else ""
+    size += f" alt='{html_text(words)}'"
     return f"<img{size} style='max-width:100%;height:auto' src='data:image/{kind};base64,{b64encode(data).decode()}'>"
 
 
@@ -48,5 +51,5 @@ def picture_html(make: Callable[[], Any]) -> str:
 
 def side_by_side(*parts: str) -> str:
     """Pieces of HTML beside each other; a narrow window shows them one below the other."""
-    cells = "".join(f"<div>{part}</div>" for part in parts if part)
+    cells = "".join(f"<div style='max-width:46em'>{part}</div>" for part in parts if part)
     return f"<div style='display:flex;flex-wrap:wrap;gap:1.5em;align-items:flex-start'>{cells}</div>"

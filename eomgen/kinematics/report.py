@@ -154,7 +154,7 @@ class MechanismReport:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        text = f"<pre>{html_text(str(self))}</pre>"
+        text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
         return side_by_side(picture_html(lambda: new_figure(self)), text) if self.bodies else text
 
 

@@ -295,7 +295,8 @@ class Trajectory:
         ----------
         file : str or Path, optional
             ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
-            turned and zoomed and needs no network (k3d).  Without a file a widget for notebooks comes back.
+            turned and zoomed and needs no network (k3d); a name without an ending is a folder for PNG frames.
+            Without a file a page comes back that a notebook shows.
         model : Module, optional
             Of a trajectory that was read from a file: the module it was made with.
         fps : float
@@ -305,7 +306,9 @@ class Trajectory:
         trace : str or sequence of str
             Markers (``"rod.tip"``) or bodies whose ways are drawn.
         plot : str or sequence of str
-            Columns to draw over time under the mechanism (.gif, .mp4).
+            Columns to draw over time under the mechanism, with a line where it is.
+        forces : bool, str or sequence of str
+            Arrows of the forces that all joints, or those named, exert on their successors.
         names, axes : bool
             As for ``module.draw``.
         dpi : float
@@ -313,7 +316,7 @@ class Trajectory:
 
         Returns
         -------
-        Path of the file, or a k3d plot
+        Path of the file, or the page, whose text ``str`` gives
 
         Raises
         ------

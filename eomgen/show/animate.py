@@ -66,11 +66,9 @@ def write(
     path = None if file is None else as_path("file", file)
     kind = "" if path is None else kind_of(path)
     if path is None or kind == ".html":
-        from .browser import page, scene_plot
+        from .browser import page
         from .player import InlinePage
 
-        if path is None and not curves:
-            return scene_plot(scene, motion)
         text = page(scene, motion, curves)
         if path is None:
             return InlinePage(text)
