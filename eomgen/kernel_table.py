@@ -22,14 +22,14 @@ class Sizes(NamedTuple):
     n_h: int  #: holonomic rows, the first of n_c
     n_dof: int
     n_bodies: int
-    n_k: int
-    n_a: int
+    n_loop_coordinates: int
+    n_alignments: int
     n_com: int = 0  #: coordinates of the centre of mass: 3, or 0 for a system without mass
-    n_e: int = 0
-    n_g: int = 0  #: holonomic rows where q' is given, else 0
-    n_s: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
-    n_w: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
-    n_m: int = 0  #: momenta: n_v by method hamilton, else 0
+    n_finite_forces: int = 0
+    n_coordinate_slopes: int = 0  #: holonomic rows where q' is given, else 0
+    n_wrenches: int = 0  #: numbers of the wrenches that joints exert, 0 without bodies
+    n_wrench_geometry: int = 0  #: numbers of the geometry of joint reactions, 0 without bodies
+    n_momenta: int = 0  #: momenta: n_v by method hamilton, else 0
     n_events: int = 0
     n_resets: int = 0  #: states that events give new values
     n_strike: int = 0  #: rows of what velocities obey where an event changes them, 0 where they just change
@@ -87,7 +87,12 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel("centroidal", ("q", "v"), lambda s: (s.n_com * (s.n_v + 6),), CENTROIDAL, late=True),
     Kernel("constraints", ("q",), lambda s: (s.n_h,), "residuals C of the holonomic rows (m, rad)"),
     Kernel("constraint_jacobian", ("q",), lambda s: (s.n_c, s.n_v), "C_q, all rows, row-major"),
-    Kernel("coordinate_slopes", ("q",), lambda s: (s.n_g, s.n_q), "dC/dq of the holonomic rows, where q' is given"),
+    Kernel(
+        "coordinate_slopes",
+        ("q",),
+        lambda s: (s.n_coordinate_slopes, s.n_q),
+        "dC/dq of holonomic rows where q' is given",
+    ),
     Kernel("velocity_constraints", ("q", "v"), lambda s: (s.n_c,), "C_q v + C_t, all rows, nonholonomic ones last"),
     Kernel("project", ("q", "v"), lambda s: (s.n_x,), "the nearest state on the constraints"),
     Kernel("poses", ("q",), lambda s: (s.n_bodies, 4, 4), "body frames to ground, homogeneous, row-major"),
@@ -114,11 +119,13 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel(
         "kinematics", ("q_i", "v_i", "a_i", "q_guess"), lambda s: (s.n_q + 2 * s.n_v,), "[q; v; a] of the whole tree"
     ),
-    Kernel("loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_k), "coordinates of cut joints, y y' y''"),
-    Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_k, s.n_v), "dy/dq, row-major"),
-    Kernel("alignment", ("q",), lambda s: (s.n_a,), "positive unless an axis of a cut joint is flipped"),
+    Kernel(
+        "loop_coordinates", ("q", "v", "a"), lambda s: (3, s.n_loop_coordinates), "coordinates of cut joints, y y' y''"
+    ),
+    Kernel("loop_coordinate_jacobian", ("q",), lambda s: (s.n_loop_coordinates, s.n_v), "dy/dq, row-major"),
+    Kernel("alignment", ("q",), lambda s: (s.n_alignments,), "positive unless an axis of a cut joint is flipped"),
     Kernel("motion_outputs", ("q", "v", "a"), lambda s: (s.n_y,), "the outputs at any accelerations", late=True),
-    Kernel("finite_forces", ("q", "v"), lambda s: (s.n_e,), "1 where a force element's loads are finite, else 0"),
+    Kernel("finite_forces", ("q", "v"), lambda s: (s.n_finite_forces,), "1 where a force element's loads are finite"),
     Kernel("input_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_u), "dx'/du of the complete rhs, row-major", late=True),
     Kernel(
         "parameter_jacobian", ("q", "v"), lambda s: (s.n_x, s.n_p), "dx'/dp of the complete rhs, row-major", late=True
@@ -126,7 +133,7 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel(
         "assembly_jacobian",
         ("q", "v"),
-        lambda s: (s.n_h + s.n_c + 2 * s.n_k, s.n_x + s.n_u + s.n_p),
+        lambda s: (s.n_h + s.n_c + 2 * s.n_loop_coordinates, s.n_x + s.n_u + s.n_p),
         "[C, C_q v + C_t, loop coordinates, their rates] by [q, v, u, p]",
         late=True,
     ),
@@ -140,18 +147,18 @@ KERNELS: tuple[Kernel, ...] = (
     Kernel(
         "needed_wrenches",
         ("q", "v", "a"),
-        lambda s: (s.n_s,),
+        lambda s: (s.n_wrenches,),
         "wrench that joints and constraints exert on each body (6, about its origin), loads of cut joints (6)",
         late=True,
     ),
     Kernel(
         "wrench_geometry",
         ("q",),
-        lambda s: (s.n_w,),
+        lambda s: (s.n_wrench_geometry,),
         "constraint rows by displacements of bodies (n_c, n_bodies, 6), joints' points (3), their free directions (6)",
         late=True,
     ),
-    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_m), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
+    Kernel("canonical", ("q", "v"), lambda s: (2, s.n_momenta), "momenta dT/dv, and their rates -dH/dq + Q", late=True),
     Kernel("dae_residual", DAE, lambda s: (s.n_dae,), "F(t, y, y') of y = [q; v; multipliers; corrections]", late=True),
     Kernel("dae_jacobian", (*DAE, "cj"), lambda s: (s.n_dae, s.n_dae), "dF/dy + cj dF/dy', row-major", late=True),
     Kernel("scales", (), lambda s: (s.n_v + s.n_c,), "typical sizes of the coordinates, then of the constraint rows"),

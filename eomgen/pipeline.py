@@ -22,7 +22,7 @@ from .equations.positive import require_inertia
 from .errors import AssemblyError, ToolchainError, UsageError
 from .kinematics import Kinematics, analyse
 from .kinematics.loads import drives_cut_joint
-from .kinematics.mobility import Mobility, judge
+from .kinematics.mobility import Mobility, find_mobility
 from .kinematics.report import MechanismReport, report
 from .targets import TARGETS, find_target
 
@@ -109,7 +109,7 @@ def derive(
     chosen = choose_method(mechanism, method)
     with _without_collection(), _timed(seconds, "kinematics"):
         kinematics = analyse(mechanism, independent or ())
-        mobility = _judge(kinematics, independent or ())
+        mobility = _mobility(kinematics, independent or ())
     if baumgarte is not None:
         kinematics = _stabilised(kinematics, chosen, baumgarte)
     with _without_collection(), _timed(seconds, "equations"):
@@ -142,10 +142,10 @@ def _stabilised(kinematics: Kinematics, method: str, baumgarte: Sequence[float])
     return stabilise(kinematics, alpha, beta)
 
 
-def _judge(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
+def _mobility(kinematics: Kinematics, independent: Sequence[str]) -> Mobility:
     """The mobility; a loop that does not close is reported at its joint's place in the description."""
     try:
-        return judge(kinematics, independent)
+        return find_mobility(kinematics, independent)
     except AssemblyError as error:
         mechanism = kinematics.mechanism
         names = [row.partition(".")[0] for row in error.rows]

@@ -17,11 +17,11 @@ def give_away(path: Path, monkeypatch: pytest.MonkeyPatch, owner: int = STRANGER
     if os.geteuid() == 0:
         os.lchown(path, owner, -1)
         return
-    found, judge = os.lstat(path), ownership._judge
+    found, judge = os.lstat(path), ownership._require_own
 
     def judged(place: str, status: os.stat_result, *, above: bool) -> None:
         if (status.st_dev, status.st_ino) == (found.st_dev, found.st_ino):
             status = os.stat_result((*status[:4], owner, *status[5:]))
         judge(place, status, above=above)
 
-    monkeypatch.setattr(ownership, "_judge", judged)
+    monkeypatch.setattr(ownership, "_require_own", judged)

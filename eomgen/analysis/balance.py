@@ -48,7 +48,7 @@ class Balance(NamedTuple):
         return self.x[len(self.x) - len(self.a) :]
 
 
-def weigh(
+def balance_forces(
     module: BoundModel, t: float, q: Array, held: Array | None = None, preferred: Indices | None = None
 ) -> Balance:
     """The forces at a position on the constraints.
@@ -95,7 +95,7 @@ def _displacements(J: Array, velocities: Indices) -> Partition:
 
 
 def unit_rows(rows: Array) -> Array:
-    """Rows of length 1, so that all weigh alike."""
+    """Rows of length 1, so that all balance_forces alike."""
     return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), TINY))
 
 
@@ -170,7 +170,7 @@ def force_slopes(
     t : float
     here : Balance
     gradients : callable
-        q -> gradients of the held coordinates, as for :func:`weigh`.
+        q -> gradients of the held coordinates, as for :func:`balance_forces`.
     step : float
         Scaled displacement.
     """
@@ -181,7 +181,7 @@ def force_slopes(
         for sign in (1.0, -1.0):
             q = scales.move(here.x[: layout.n_q], sign * h * column / scales.q)
             q = module.project(np.concatenate([q, np.zeros(layout.n_v)]), t=t)[: layout.n_q]
-            sides.append(weigh(module, t, q, gradients(q), here.velocities))
+            sides.append(balance_forces(module, t, q, gradients(q), here.velocities))
         forces.append((sides[0].forces - sides[1].forces) / (2.0 * h))
         rates.append((sides[0].v - sides[1].v) / (2.0 * h))
     width = len(here.positions)

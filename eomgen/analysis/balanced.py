@@ -12,8 +12,8 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
-from .balance import Balance, force_slopes, weigh
-from .eigenvalue_rounding import judge
+from .balance import Balance, balance_forces, force_slopes
+from .eigenvalue_rounding import stability_of_matrix
 from .linear import linearize
 from .linearization import Linearization
 from .stability import SecondOrder, stiffness_errors, verdict
@@ -90,7 +90,7 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
     """The result at a balanced position."""
     t, layout = search.t, module.layout
     held = search.gradients(module, q) if search.supported else None
-    here = weigh(module, t, q, held)
+    here = balance_forces(module, t, q, held)
     found: dict[str, Any] = {
         "coordinates": read_coordinates(module, q, t),
         "unknowns": dict(zip(search.names, unknowns.tolist(), strict=True)),
@@ -103,12 +103,15 @@ def describe(search: Search, module: BoundModel, q: Array, unknowns: Array, step
         linear = linearize(module, here.x, t)
         found |= {"linear": linear, "eigenvalues": linear.eigenvalues, "stability": linear.stability}
     else:
-        free = weigh(module, t, q)
+        free = balance_forces(module, t, q)
         pull = algebra.lstsq((held @ free.B).T, free.forces, rcond=STATE)
         rows = search.held_rows(module, q)
         found["supports"] = {row.label: -float(f) / row.scale for row, f in zip(rows, pull, strict=True)}
         A, second = _held_motion(search, module, here, t)
-        stability = judge(A, error=DIFFERENCES) if second is None else verdict(second, A, error=DIFFERENCES)
+        if second is None:
+            stability = stability_of_matrix(A, error=DIFFERENCES)
+        else:
+            stability = verdict(second, A, error=DIFFERENCES)
         found |= {"eigenvalues": np.sort_complex(algebra.eigvals(A)), "stability": stability}
     return Equilibrium(module, t, here.x, found)
 
@@ -135,7 +138,7 @@ def _held_motion(search: Search, module: BoundModel, here: Balance, t: float) ->
 def read_coordinates(module: BoundModel, q: Array, t: float) -> dict[str, float]:
     """All coordinates by name, those of cut joints included."""
     values = dict(zip(module.q_names, q.tolist(), strict=True))
-    if module.layout.n_k:
+    if module.layout.n_loop_coordinates:
         y = Initial(module.kernels, t).loops(q)[0]
         values |= dict(zip(module.layout.loops, y.tolist(), strict=True))
     return values

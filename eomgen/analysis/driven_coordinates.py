@@ -56,8 +56,8 @@ class DrivenCoordinates:
         self._rate = kernels.state("velocity_constraints", nan=True)
         known = layout.rank and "kinematics" in kernels.core.names
         self._kinematics = kernels.state("kinematics", nan=True) if known else None
-        self._loops = kernels.motion("loop_coordinates") if layout.n_k else None
-        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
+        self._loops = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_loop_coordinates else None
         chosen = [layout.velocity_labels[i] for i in layout.independent]
         #: whether the compiled kernel leads the same coordinates
         self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)

@@ -28,7 +28,9 @@ WAY = (0.0, 0.25, 0.5, 0.75)  #: places between the axis and an eigenvalue that 
 SWEEPS = 12  #: of Jacobi's method, at most
 
 
-def judge(A: Array, own: Array | None = None, error: float = ROUNDING, errors: Array | None = None) -> str:
+def stability_of_matrix(
+    A: Array, own: Array | None = None, error: float = ROUNDING, errors: Array | None = None
+) -> str:
     """'asymptotically stable', 'marginal' or 'unstable', by the largest real part of the eigenvalues.
 
     Without states it is 'no freedom': what drivers and constraints hold entirely is neither.

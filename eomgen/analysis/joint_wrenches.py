@@ -26,7 +26,7 @@ class Geometry(NamedTuple):
     points: Array  #: (n_joints, 3, k) S of each joint
     free: Array  #: (n_f, 6, k) free directions (linear, angular) at S
     reach: Array  #: (n_r, 6, k) gradients of the equations of joints without coordinates, at S
-    loops: Array  #: (n_k, 6, k) gradients of the coordinates of cut joints, at S
+    loops: Array  #: (n_loop_coordinates, 6, k) gradients of the coordinates of cut joints, at S
     origins: Array  #: (n_bodies, 3, k)
 
 

@@ -38,7 +38,7 @@ def find_reactions(
     a = states.accelerations() if a is None else a
     if multipliers is None:
         multipliers = solve_multipliers(states.jacobian(), states.residual(a), module.layout.scales)
-    width = max(1, CHUNK // max(1, module.layout.n_w, (6 * len(joint_table(module)["ends"])) ** 2))
+    width = max(1, CHUNK // max(1, module.layout.n_wrench_geometry, (6 * len(joint_table(module)["ends"])) ** 2))
     parts = []
     for k in range(0, len(states.t), width):
         some = slice(k, k + width)

@@ -13,7 +13,7 @@ from ..numeric import algebra
 from ..numeric.scales import Array, Indices
 from ..runtime.initial import Initial
 from ..runtime.near_names import unknown
-from .balance import Balance, assembly_jacobian, force_slopes, slopes, weigh
+from .balance import Balance, assembly_jacobian, balance_forces, force_slopes, slopes
 from .eigenvalue_rounding import own_accelerations
 from .linear_step import RANK, LinearizedResidual
 from .tangent import displacement_names
@@ -94,7 +94,7 @@ class Search:
         elif self.held:
             q = initial.with_values(q, self.held)
         held = self.gradients(module, q) if self.supported else None
-        return SearchPoint(q, values, module, weigh(module, self.t, q, held, preferred))
+        return SearchPoint(q, values, module, balance_forces(module, self.t, q, held, preferred))
 
     def residual(self, here: Balance, like: Balance) -> Array:
         """What must vanish, at the independent velocities and surplus displacements of another place."""
@@ -152,7 +152,7 @@ class Search:
         layout = self.layout
         held = self.held_rows(module, x[: layout.n_q])
         rows = np.zeros((len(held), layout.n_p))
-        if layout.n_k and self.parameters:
+        if layout.n_loop_coordinates and self.parameters:
             every = assembly_jacobian(module, self.t, x)[layout.n_h + layout.n_c :, layout.n_x + layout.n_u :]
             for k, row in enumerate(held):
                 if row.name in layout.loops:

@@ -54,7 +54,7 @@ def element_wrenches(states: ProjectedStates, table: dict[str, Any], geometry: G
 
     Returns
     -------
-    (n_e, n_bodies, 6, k) array
+    (n_finite_forces, n_bodies, 6, k) array
     """
     rows = [i for i, joint in enumerate(table["rows"]) if joint == GROUND]
     result = np.array(geometry.rows[rows])

@@ -16,7 +16,7 @@ import numpy as np
 from ..limits.rounding import EPS
 from ..numeric import algebra
 from ..numeric.scales import Array
-from .eigenvalue_rounding import ROUNDING, graded_modes, judge
+from .eigenvalue_rounding import ROUNDING, graded_modes, stability_of_matrix
 
 MARGIN = 5.0 * ROUNDING  #: relative error of sums of forces, on the safe side
 
@@ -88,18 +88,18 @@ def verdict(
         The same equations of second order, where they have that form: displacements z, then velocities z'.
     A : (n, n) array
     own, error, errors
-        As for :func:`~.eigenvalue_rounding.judge`, which decides where the signs of K and C do not.
+        As for :func:`~.eigenvalue_rounding.stability_of_matrix`, which decides where the signs of K and C do not.
     """
     if second is None or not A.size or not _is_dissipative(second):
-        return judge(A, own, error, errors)
+        return stability_of_matrix(A, own, error, errors)
     squares, shapes = symmetric_modes(second.M, 0.5 * (second.K + second.K.T))
     bound = uncertainty(squares, shapes, second.K_error)
     if (squares < -bound).any():
         gyroscopic = np.abs(second.C - second.C.T) > second.C_error + second.C_error.T
-        return judge(A, own, error, errors) if gyroscopic.any() else "unstable"
+        return stability_of_matrix(A, own, error, errors) if gyroscopic.any() else "unstable"
     if (squares <= bound).any():
         return "marginal"
-    found = judge(A, own, error, errors)
+    found = stability_of_matrix(A, own, error, errors)
     return found if found == "asymptotically stable" else "marginal"
 
 

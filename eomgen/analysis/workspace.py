@@ -19,7 +19,7 @@ from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
-from .workspace_conditions import ConditionReader, Conditions, WorkspaceSingular, judge
+from .workspace_conditions import ConditionReader, Conditions, WorkspaceSingular, find_conditions
 from .workspace_grid import Grid, read_grid
 from .workspace_walk import OUT, REACHED, Flood, Stage, flood
 
@@ -38,7 +38,7 @@ class Workspace:
 
     Attributes
     ----------
-    over : dict of str to (n_k,) array
+    over : dict of str to (n_loop_coordinates,) array
         The coordinates of the grid and their values.
     of : tuple of str
         Outputs and coordinates.
@@ -302,4 +302,4 @@ def workspace(
         reader = ConditionReader(stage)
         reader.require_positions(stage.q, stage.t)
         filled = flood(stage)
-        return Workspace(module, grid, filled, judge(stage, reader, filled))
+        return Workspace(module, grid, filled, find_conditions(stage, reader, filled))

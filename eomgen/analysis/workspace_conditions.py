@@ -79,8 +79,8 @@ class ConditionReader:
         kernels = module.kernels
         if any(self.outputs):
             self._values, self._slopes = kernels.motion("motion_outputs"), kernels.motion("output_derivatives")
-        self._loops = kernels.motion("loop_coordinates") if layout.n_k else None
-        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
+        self._loops = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_loop_coordinates else None
         self._still = np.zeros(layout.n_v)
         #: outputs that are angles of cut joints, which come without their turns
         self.wraps = [name in layout.loops and layout.loop_kinds[layout.loops.index(name)] == "angle" for name in of]
@@ -142,7 +142,7 @@ class ConditionReader:
                 raise UsageError(f"output {name!r} depends on velocities or accelerations; a workspace has positions")
 
 
-def judge(stage: Stage, reader: ConditionReader, filled: Flood) -> Conditions:
+def find_conditions(stage: Stage, reader: ConditionReader, filled: Flood) -> Conditions:
     """Outputs, Jacobians and singular positions of all reached points."""
     grid = stage.grid
     n_y, n_x = len(grid.of), len(grid.names)

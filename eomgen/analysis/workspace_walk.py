@@ -157,7 +157,8 @@ class Stage:
         if not self.grid.limits:
             return True
         zero = np.zeros(layout.n_v)
-        loops = self.module.kernels.motion("loop_coordinates")(q, zero, zero, t=t)[0] if layout.n_k else ()
+        measured = self.module.kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        loops = () if measured is None else measured(q, zero, zero, t=t)[0]
         for name, lower, upper in self.grid.limits:
             if name in layout.q:
                 value = float(q[layout.q.index(name)])

@@ -72,7 +72,7 @@ def _ratio(e: Entry) -> Expr | None:
     key = next((key for key in ("radii", "teeth", "cones") if key in e.values), "radii")
     sizes = e.several(key, 2)
     for k, size in enumerate(sizes or ()):
-        e.judge(f"{key}[{k}]", size, lambda x: x > 0, "give a size greater than 0")
+        e.require(f"{key}[{k}]", size, lambda x: x > 0, "give a size greater than 0")
     if sizes is None or e.at_fault(key):
         return None
     a, b = (sin(x) for x in sizes) if key == "cones" else sizes

@@ -19,7 +19,7 @@ from .sympy_forms import Forms
 TRIES = 5
 
 
-def judge_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:
+def independent_rows(forms: Forms, constants: Sequence[str], functions: Sequence[str]) -> tuple[list[int], bool]:
     """Which rows of ``forms.motion`` are not derivatives of the configuration constraints nor follow from others.
 
     Returns

@@ -96,7 +96,7 @@ class ElementEntry:
         if key in self.values:
             self.fault(key, why, "leave it out")
 
-    def judge(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
+    def require(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
         number = self.reader.known(value)
         if number is not None and not right(number):
             self.fault(key, f"is {number:g}", rule)
@@ -114,7 +114,7 @@ class ElementEntry:
 
     def positive(self, key: str) -> Expr:
         value = self.law(key)
-        self.judge(key, value, lambda x: x > 0, "must be greater than 0")
+        self.require(key, value, lambda x: x > 0, "must be greater than 0")
         return value
 
     def several(self, key: str, count: int) -> tuple[Expr, ...] | None:
@@ -137,7 +137,7 @@ class ElementEntry:
                 self.fault(f"{key}.{name}", "unknown key", nearest(str(name), names, "allowed"))
         found = {name: self.reader.expression(f"{path}.{name}", given[name]) for name in names if name in given}
         for name, size in found.items():
-            self.judge(f"{key}.{name}", size, lambda x: x > 0, "give a size greater than 0")
+            self.require(f"{key}.{name}", size, lambda x: x > 0, "give a size greater than 0")
         return found
 
     def vector(self, key: str) -> Vec3:

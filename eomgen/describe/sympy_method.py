@@ -170,11 +170,11 @@ def _independent_rows(
 
     Judged on the graph at a generic place, where rows depend on each other only if they do everywhere.
     """
-    from .constraint_rank import judge_rows
+    from .constraint_rank import independent_rows
 
     if not forms.motion and not forms.configuration:
         return [], [], True
-    kept, independent = judge_rows(forms, constants, functions)
+    kept, independent = independent_rows(forms, constants, functions)
     return forms.configuration, [forms.motion[k] for k in kept], independent
 
 

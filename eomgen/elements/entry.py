@@ -70,7 +70,7 @@ class Entry(Protocol):
     def refuse(self, key: str, why: str) -> None:
         """Note a key that has no meaning beside the others, if it is given."""
 
-    def judge(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
+    def require(self, key: str, value: Expr, right: Callable[[float], bool], rule: str) -> None:
         """Note an expression whose number, as far as the declared values of parameters tell, breaks a rule."""
 
     # -- values ---------------------------------------------------------------------------------------------------

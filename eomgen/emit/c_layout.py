@@ -61,7 +61,7 @@ def driver_files(program: Program) -> list[str]:
     direct = "residuals_along" if "residual_tangent" in program.block_names else "residuals_direct"
     files: dict[str, None] = {"terms": None} if program.composes_terms else {}
     if program.drivers:
-        space = ("space_balls", "space_balls_more") if program.has_loops else ("space_balls",)
+        space = ("space_quaternions", "space_quaternions_more") if program.has_loops else ("space_quaternions",)
         if program.given_rates:
             space = ("space_given", "space_given_more") if program.has_loops else ("space_given",)
         files.update(dict.fromkeys(space if program.quaternion_slots or program.given_rates else ("space_plain",)))

@@ -78,10 +78,10 @@ def describe_calls(program: Program) -> list[Call]:
     ]
     plain = s.n_h == s.n_c and all(program.coordinate_of[i] >= 0 for i in program.preferred)
     calls = [call for call in calls if plain or not call.text.startswith(("minimal", "kinematics"))]
-    calls = [call for call in calls if s.n_m or not call.text.startswith("canonical")]
+    calls = [call for call in calls if s.n_momenta or not call.text.startswith("canonical")]
     sums = ("center_of_mass", "com_jacobian", "momentum", "centroidal_inertia")
     kept = [call for call in calls if s.n_com or call.text.partition("(")[0] not in sums]
-    kept = [call for call in kept if s.n_s or not call.text.startswith("reactions")]
+    kept = [call for call in kept if s.n_wrenches or not call.text.startswith("reactions")]
     return [call for call in kept if s.n_c or not ("constraint" in call.text or call.text.startswith("multipliers"))]
 
 

@@ -8,7 +8,7 @@ inertia J are V = sum m v r^T and P = sum m v (twice each), and the wrench of m 
 
 With the field s x r + l of a column of the motion subspace, which is dr/dq_i, the derivatives of accelerations are
 d(a)/d(q_i') = 2 d/dt (s x r + l) and d(a)/d(q_i) = d2/dt2 (s x r + l).  That takes columns that move rigidly with
-their own and all earlier coordinates of their joint, :func:`can_differentiate`.  The columns of a ball in Euler
+their own and all earlier coordinates of their joint, :func:`can_differentiate`.  The columns of a slot in Euler
 parameters are fixed in the link instead, and its angular velocity is held fixed there: by angle the rates are those of
 an s fixed in the parent, by velocity there is one such rate and one of an s fixed in the link.
 
@@ -98,8 +98,8 @@ def can_differentiate(kinematics: Kinematics) -> bool:
 
 def coordinate_places(kinematics: Kinematics) -> list[int]:
     """Per velocity the coordinate whose rate it is, -1 for angular velocities of spherical joints."""
-    turning = {k for ball in kinematics.quaternion_slots for k in range(ball.velocity, ball.velocity + 3)}
-    parameters = {k for ball in kinematics.quaternion_slots for k in range(ball.coordinate, ball.coordinate + 4)}
+    turning = {k for slot in kinematics.quaternion_slots for k in range(slot.velocity, slot.velocity + 3)}
+    parameters = {k for slot in kinematics.quaternion_slots for k in range(slot.coordinate, slot.coordinate + 4)}
     plain = iter([k for k in range(len(kinematics.q)) if k not in parameters])
     return [-1 if k in turning else next(plain) for k in range(len(kinematics.v))]
 
@@ -107,7 +107,7 @@ def coordinate_places(kinematics: Kinematics) -> list[int]:
 def _last(kinematics: Kinematics, link: Link) -> int:
     """One more than the last coordinate of the link's joint."""
     end = link.first + len(link.columns)
-    return end + sum(ball.velocity < end for ball in kinematics.quaternion_slots)
+    return end + sum(slot.velocity < end for slot in kinematics.quaternion_slots)
 
 
 class ForceSlopes:
@@ -323,7 +323,7 @@ class ForceSlopes:
                         j = links[at].first + d
                         if j == i or at != k or self._places[j] >= 0:
                             slopes[j, i] = dot((other.s, other.l), wrench)
-                        else:  # columns of one ball turn with each other
+                        else:  # columns of one slot turn with each other
                             slopes[j, i] = self._inner(swept[k][c], field, self._lifted[j, k])
                         if j != i:
                             slopes[i, j] = self._inner(swept[at][d], other, own)
@@ -345,19 +345,19 @@ class ForceSlopes:
         """Derivatives by angles of spherical joints as those by Euler parameters: d(angles)/de = 4 N^T / e^2."""
         kinematics = self._kinematics
         found = {(i, self._places[j]): value for (i, j), value in slopes.items() if self._places[j] >= 0}
-        for ball in kinematics.quaternion_slots:
-            e = kinematics.q[ball.coordinate : ball.coordinate + 4]
-            rates = list(kinematics.rates[ball.coordinate : ball.coordinate + 4])
-            N = jacobian(rates, kinematics.v[ball.velocity : ball.velocity + 3])
+        for slot in kinematics.quaternion_slots:
+            e = kinematics.q[slot.coordinate : slot.coordinate + 4]
+            rates = list(kinematics.rates[slot.coordinate : slot.coordinate + 4])
+            N = jacobian(rates, kinematics.v[slot.velocity : slot.velocity + 3])
             factor = 4.0 / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3])
-            for i in sorted({i for i, j in slopes if ball.velocity <= j < ball.velocity + 3}):
-                angles = [slopes.get((i, ball.velocity + c)) for c in range(3)]
+            for i in sorted({i for i, j in slopes if slot.velocity <= j < slot.velocity + 3}):
+                angles = [slopes.get((i, slot.velocity + c)) for c in range(3)]
                 for m in range(4):
                     total = kinematics.graph.zero
                     for c, slope in enumerate(angles):
                         if slope is not None:
                             total = total + slope * (N[m, c] * factor)
-                    found[i, ball.coordinate + m] = total
+                    found[i, slot.coordinate + m] = total
         return found
 
 

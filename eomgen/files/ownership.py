@@ -44,7 +44,7 @@ def require_trusted(path: str | os.PathLike[str]) -> None:
         return
     place, links = os.sep, 0
     ahead = os.path.abspath(path).split(os.sep)[::-1]
-    _judge(place, os.lstat(place), above=True)
+    _require_own(place, os.lstat(place), above=True)
     while ahead:
         part = ahead.pop()
         if part in ("", os.curdir):
@@ -54,7 +54,7 @@ def require_trusted(path: str | os.PathLike[str]) -> None:
             continue
         here = os.path.join(place, part)
         status = os.lstat(here)
-        _judge(here, status, above=any(ahead))
+        _require_own(here, status, above=any(ahead))
         if not stat.S_ISLNK(status.st_mode):
             place = here
             continue
@@ -82,7 +82,7 @@ def read_trusted(path: str | os.PathLike[str]) -> bytes:
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "not a regular file", os.fspath(path))
         if hasattr(os, "geteuid"):
-            _judge(os.fspath(path), status, above=False)
+            _require_own(os.fspath(path), status, above=False)
         return file.readall()
 
 
@@ -99,7 +99,7 @@ def make_private(folder: str | os.PathLike[str]) -> None:
             os.mkdir(name, 0o700)
 
 
-def _judge(path: str, status: os.stat_result, *, above: bool) -> None:
+def _require_own(path: str, status: os.stat_result, *, above: bool) -> None:
     """Refuse one part of a path; `above` says that more follows below it."""
     owner, me = status.st_uid, os.geteuid()
     if owner not in (me, 0) and not (above and _unmapped(owner)):

@@ -129,7 +129,7 @@ def _bushing(e: Entry) -> Bushing | None:
         if difference.value is not None:
             e.fault(f"stiffness[{j}][{i}]", "the matrix is not symmetric", "[i][j] and [j][i] must be equal")
         else:
-            e.judge(f"stiffness[{j}][{i}]", difference, lambda x: x == 0, "less [j][i]; they must be equal")
+            e.require(f"stiffness[{j}][{i}]", difference, lambda x: x == 0, "less [j][i]; they must be equal")
     if pair is None or stiffness is None or damping is None:
         return None
     return Bushing(e.name, *pair, cast(Mat6, stiffness), cast(Mat6, damping))

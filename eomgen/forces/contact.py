@@ -132,7 +132,7 @@ def _two_spheres(e: Entry) -> SphereSphere | None:
     if pair is None or radii is None:
         return None
     for k, radius in enumerate(radii):
-        e.judge(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
+        e.require(f"radii[{k}]", radius, lambda x: x >= 0, "a radius is 0 or greater")
     return SphereSphere(e.name, *pair, law, friction, (radii[0], radii[1]))
 
 

@@ -82,7 +82,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
                 e.fault(key, f"there is no {dynamic}", f"give {dynamic}, or leave it out")
         return None
     level = e.law(dynamic)
-    e.judge(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
+    e.require(dynamic, level, lambda x: x >= 0, "must be 0 or greater")
     if "smoothing" not in e.values:
         e.fault("smoothing", "is missing", "give the velocity below which friction is smoothed")
         return None
@@ -92,7 +92,7 @@ def read_friction(e: Entry, dynamic: str, static: str, viscous: str, alone: bool
         return None
     onset = e.given(static)
     if onset is not None:
-        e.judge(static, onset, lambda x: x >= 0, "must be 0 or greater")
+        e.require(static, onset, lambda x: x >= 0, "must be 0 or greater")
     stribeck = e.positive("stribeck") if "stribeck" in e.values else None
     along = e.given(viscous)
     return Friction(level, e.positive("smoothing"), e.graph.zero if along is None else along, onset, stribeck)

@@ -96,11 +96,11 @@ _SHORTENING = 10.0
 
 def _muscle(e: Entry) -> Muscle | None:
     path, activation = read_path(e), e.law("activation")
-    e.judge("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
+    e.require("activation", activation, lambda a: 0 <= a <= 1, "an activation is 0 to 1")
     force_max, fiber_length, slack_length = (e.positive(k) for k in ("force_max", "fiber_length", "slack_length"))
     velocity_max = e.positive("velocity_max") if "velocity_max" in e.values else _SHORTENING * fiber_length
     pennation, damping = e.law("pennation"), e.law("damping")
-    e.judge("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
+    e.require("pennation", pennation, lambda x: abs(x) < 1.5707, "must be less than pi/2")
     if path is None:
         return None
     return Muscle(e.name, path, activation, force_max, fiber_length, slack_length, velocity_max, pennation, damping)

@@ -81,7 +81,7 @@ NORMAL: Fields = {
 def read_normal_law(e: Entry) -> HuntCrossley:
     """The law of the keys :data:`NORMAL`."""
     stiffness, exponent = e.positive("stiffness"), e.law("exponent")
-    e.judge("exponent", exponent, lambda n: n >= 1, "must be at least 1, and more than 1 for a slope without a jump")
+    e.require("exponent", exponent, lambda n: n >= 1, "must be at least 1, and more than 1 for a slope without a jump")
     return HuntCrossley(stiffness, exponent, _dissipation(e))
 
 
@@ -94,7 +94,7 @@ def _dissipation(e: Entry) -> Expr:
             if key in e.values:
                 e.fault(key, "the dissipation is given already", "leave out one of the two")
         value = e.law("dissipation")
-        e.judge("dissipation", value, lambda x: x >= 0, "must be 0 or greater")
+        e.require("dissipation", value, lambda x: x >= 0, "must be 0 or greater")
         return value
     if restitution is None and velocity is None:
         if "formula" in e.values:
@@ -103,6 +103,6 @@ def _dissipation(e: Entry) -> Expr:
     if restitution is None or velocity is None:
         e.fault("velocity" if velocity is None else "restitution", "is missing", "restitution and velocity go together")
         return e.stand_in
-    e.judge("restitution", restitution, lambda x: 0 < x <= 1, "must be greater than 0 and at most 1")
-    e.judge("velocity", velocity, lambda x: x > 0, "must be greater than 0")
+    e.require("restitution", restitution, lambda x: 0 < x <= 1, "must be greater than 0 and at most 1")
+    e.require("velocity", velocity, lambda x: x > 0, "must be greater than 0")
     return dissipation_of(restitution, velocity, formula)

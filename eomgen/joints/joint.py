@@ -99,7 +99,7 @@ class Joint(ABC):
     @property
     def velocities(self) -> tuple[Velocity, ...]:
         """The generalized velocities, in order: the rates of the coordinates, but for Euler parameters."""
-        turning = {ball.coordinate: ball for ball in self.quaternion_slots}
+        turning = {slot.coordinate: slot for slot in self.quaternion_slots}
         found: list[Velocity] = []
         for k, coordinate in enumerate(self.coordinates):
             if k in turning:

@@ -24,12 +24,12 @@ from .motion import MarkerMotion
 from .state import MotionSymbols, acceleration_name, lay_out
 from .topology import Topology, find_topology
 from .tree import Link, Poses, build_links, link_twists
-from .undefined_rows import find_flaws, refuse_rows_of_time
+from .undefined_rows import find_undefined, refuse_rows_of_time
 
 
 @dataclass(frozen=True)
 class LoopCoordinates:
-    """Coordinates y of cut joints as functions of the tree: values, rates, accelerations and dy'/dv (n_k rows).
+    """Coordinates y of cut joints, n_loop_coordinates, as functions of the tree: values, rates, accelerations, dy'/dv.
 
     Kinds are 'length', 'angle' (equal up to full turns), 'turn' (an angle that counts full turns) and 'parameter'.
     """
@@ -215,8 +215,8 @@ def _turning(mechanism: Mechanism, topology: Topology) -> dict[str, tuple[Marker
     """Angular velocities that cut joints in Euler parameters would have as velocities."""
     found = {}
     for spec in (mechanism.joints[k] for k in topology.cut):
-        for ball in spec.joint.quaternion_slots:
-            for axis, name in enumerate(spec.velocities[ball.velocity : ball.velocity + 3]):
+        for slot in spec.joint.quaternion_slots:
+            for axis, name in enumerate(spec.velocities[slot.velocity : slot.velocity + 3]):
                 found[name] = (spec.predecessor, spec.successor, axis)
     return found
 
@@ -272,7 +272,7 @@ def _refuse_undefined_angles(mechanism: Mechanism, motion: MarkerMotion, wrappin
     ------
     ModelError
     """
-    problems = find_flaws(mechanism, motion)
+    problems = find_undefined(mechanism, motion)
     for force in mechanism.forces:
         used = symbols_of(_expressions(force))
         path = getattr(force, "path", None)

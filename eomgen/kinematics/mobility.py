@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ..numeric import (
     rank,
 )
 from ..records import dataclass
+from ..suggestions import hint, joined
 from .candidates import rate_candidates
 from .constraint_functions import Array, ConstraintFunctions
 from .driving import close_driven, follow_drivers
@@ -84,8 +84,8 @@ def initial_values(kinematics: Kinematics, values: Mapping[str, float], which: s
     return {name: float(x) for name, x in zip(given, numbers, strict=True)}
 
 
-def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
-    """Assemble the mechanism at its declared initial values and judge its mobility.
+def find_mobility(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
+    """Assemble the mechanism at its declared initial values and find its mobility.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def judge(kinematics: Kinematics, independent: Sequence[str] = ()) -> Mobility:
     numbers = {n: float(x) if x is not None else 1.0 + 0.1 * missing.index(n) for n, x in values.items()}
     functions = ConstraintFunctions(kinematics, numbers)
     if missing:
-        return replace(_judge_assumed(functions, wanted), assumed=True)
+        return replace(_find_mobility_assumed(functions, wanted), assumed=True)
     given = initial_values(kinematics, numbers)
     guess = initial_values(kinematics, numbers, "guess")
     known = {*kinematics.names, *kinematics.loop_coordinates.names}
@@ -140,15 +140,13 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
                 kinematics.mechanism.problem("independent", message, "choose fewer coordinates of one loop")
             )
         else:
-            near = get_close_matches(name, known, 1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            what, remedy = f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"
+            what, remedy = f"no coordinate {name!r}", joined(hint(name, known), f"allowed: {', '.join(known)}", by=" ")
             problems.append(kinematics.mechanism.problem("independent", what, remedy))
     if problems:
         raise ModelError(problems)
 
 
-def _judge_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
+def _find_mobility_assumed(functions: ConstraintFunctions, wanted: Sequence[str]) -> Mobility:
     """Without parameter values: made-up ones, assembled if that works, else judged off the manifold."""
     zero = functions.neutral
     if not functions.m:

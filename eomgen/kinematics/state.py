@@ -43,9 +43,9 @@ class StateLayout:
             return self.given
         if not self.quaternion_slots:
             return tuple(v)
-        turning = {k for ball in self.quaternion_slots for k in range(ball.velocity, ball.velocity + 3)}
+        turning = {k for slot in self.quaternion_slots for k in range(slot.velocity, slot.velocity + 3)}
         plain = iter([x for k, x in enumerate(v) if k not in turning])
-        starts = {ball.coordinate: ball.velocity for ball in self.quaternion_slots}
+        starts = {slot.coordinate: slot.velocity for slot in self.quaternion_slots}
         result: list[Expr] = []
         while len(result) < len(q):
             i = len(result)

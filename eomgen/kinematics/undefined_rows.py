@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .loops import Constraints
 
 
-def find_flaws(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
+def find_undefined(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
     """Force elements whose ends never part or lie in a cylinder, and discs that lie flat, at every position."""
     problems = []
     for force in mechanism.forces:
@@ -29,7 +29,7 @@ def find_flaws(mechanism: Mechanism, motion: MarkerMotion) -> list[Problem]:
             what = "both ends are always at the same point"
             problems.append(mechanism.problem(place, what, "a line needs two points that can part; move one of them"))
         if isinstance(path, Route):
-            problems += _flaws_of_route(mechanism, motion, place, path)
+            problems += _undefined_on_route(mechanism, motion, place, path)
     for constraint in mechanism.constraints:
         if isinstance(constraint, RollingDisc) and constraint.lies_flat(motion):
             what = f"{constraint.wheel.label} always lies flat: its axle (z) is along the plane's normal"
@@ -42,7 +42,7 @@ def _meet(motion: MarkerMotion, start: Marker, end: Marker) -> bool:
     return all(x.is_zero for x in motion.relative(start, end).position)
 
 
-def _flaws_of_route(mechanism: Mechanism, motion: MarkerMotion, place: str, route: Route) -> list[Problem]:
+def _undefined_on_route(mechanism: Mechanism, motion: MarkerMotion, place: str, route: Route) -> list[Problem]:
     problems = []
     stops = [route.start, *route.via, route.end]
     for k, (one, other) in enumerate(pairwise(stops)):

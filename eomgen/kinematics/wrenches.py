@@ -211,7 +211,7 @@ class JointWrenches:
     def geometry(self) -> Row6:
         """D of the constraint rows (n_c, n_bodies, 6); S of the joints (n_j, 3); their free directions as (linear,
         angular) at S (n_f, 6); gradients of the equations of joints without coordinates (n_r, 6), and of the
-        coordinates of cut joints (n_k, 6), for displacements of S."""
+        coordinates of cut joints (n_loop_coordinates, 6), for displacements of S."""
         graph, n = self.kinematics.graph, len(self.mechanism.bodies)
         empty = (graph.zero,) * 6
         flat: list[Expr] = []

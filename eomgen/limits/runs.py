@@ -28,7 +28,7 @@ STEEP = 1e-2  #: part of 1 / step, above which a force is steep for the integrat
 # -- size of a run ---------------------------------------------------------------------------------------------------
 MOST_STEPS = 10**8  #: steps of limited size
 MOST_NUMBERS = 5 * 10**7  #: kept by one call: 0.4 GB, of which results are copied two or three times
-#: A run that has taken so many steps and needs so many more at their pace would not end.
+#: A run that has taken so many steps and needs so many more like them would not end.
 ENOUGH, ENDLESS = 3000, 10**10
 FEW, HOPELESS = 100, 10**15  #: the same, where fewer steps tell as much
 MOST_STATES = 10_000  #: random states of one verification: each takes milliseconds

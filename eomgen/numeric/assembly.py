@@ -55,7 +55,7 @@ def assemble(
     equations : WantedValues, optional
         Values of functions of q to reach exactly.
     alignment : callable, optional
-        q -> (n_a,) numbers that are positive unless a loop closes with a joint's axes flipped.
+        q -> (n_alignments,) numbers that are positive unless a loop closes with a joint's axes flipped.
     names, labels : sequences of str
         Names of the coordinates (n,) and of the constraint rows (m,), for messages.
     restarts : int

@@ -101,7 +101,7 @@ class ClosedCurve:
 
     def __init__(self, around: Around, reach: float) -> None:
         self.around, self.reach = around, reach
-        self.pace = 1.0 / around.speed if around.timed else 0.0
+        self.time_per_length = 1.0 / around.speed if around.timed else 0.0
         d = around.v / around.scales.q / around.speed
         _, J = around.close(self.time(1), around.scales.move(around.q, reach * d))
         there = around.split(J)
@@ -119,7 +119,7 @@ class ClosedCurve:
 
     def time(self, k: int) -> float:
         """Time at the point k reaches ahead."""
-        return self.around.t + k * self.reach * self.pace
+        return self.around.t + k * self.reach * self.time_per_length
 
     def find(self, k: int) -> Array:
         """The point k reaches ahead, behind if k < 0, those before it being known."""

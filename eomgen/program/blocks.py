@@ -223,7 +223,7 @@ class BlockMaker:
             "strike_derivatives": lambda: by_everything(
                 terms, strike_rows(terms, self._symbols(self.port("impulses").symbols))
             ),
-            "assembly_jacobian": lambda: assembly_jacobian(terms, self.sizes.n_k),
+            "assembly_jacobian": lambda: assembly_jacobian(terms, self.sizes.n_loop_coordinates),
             "output_derivatives": lambda: output_derivatives(terms),
             "needed_wrenches": lambda: terms.wrenches.needed if terms.wrenches else (),
             "wrench_geometry": lambda: terms.wrenches.geometry if terms.wrenches else (),

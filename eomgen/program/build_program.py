@@ -8,12 +8,12 @@ blocks (Newton iterations, factorisations of the embedded system).  Trees that d
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
 from ..kernel_table import KERNELS, Kernel, Sizes
+from ..suggestions import hint, joined
 from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
@@ -142,14 +142,14 @@ def _measure(terms: SystemTerms) -> Sizes:
         n_h=len(terms.constraints),
         n_dof=terms.n_dof,
         n_bodies=len(terms.poses) // 16,
-        n_k=terms.n_k,
-        n_a=len(terms.alignment),
+        n_loop_coordinates=terms.n_loop_coordinates,
+        n_alignments=len(terms.alignment),
         n_com=3 if terms.centroidal else 0,
-        n_e=len(terms.finite_forces),
-        n_g=len(terms.coordinate_slopes),
-        n_s=terms.wrenches.needed_size if terms.wrenches else 0,
-        n_w=terms.wrenches.size if terms.wrenches else 0,
-        n_m=len(terms.canonical) // 2,
+        n_finite_forces=len(terms.finite_forces),
+        n_coordinate_slopes=len(terms.coordinate_slopes),
+        n_wrenches=terms.wrenches.needed_size if terms.wrenches else 0,
+        n_wrench_geometry=terms.wrenches.size if terms.wrenches else 0,
+        n_momenta=len(terms.canonical) // 2,
         n_events=len(terms.events),
         n_resets=len(terms.resets),
         n_strike=_strike_rows(terms),
@@ -167,9 +167,8 @@ def _select(kernels: Sequence[str] | None) -> list[Kernel]:
     known = [k.name for k in KERNELS]
     for name in kernels or ():
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UsageError(f"no kernel is named {name!r}{hint}; there are {', '.join(known)}")
+            near = joined(hint(name, known), f"there are {', '.join(known)}")
+            raise UsageError(f"no kernel is named {name!r}; {near}")
     return [k for k in KERNELS if kernels is None or k.name in kernels]
 
 

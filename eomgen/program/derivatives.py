@@ -21,9 +21,9 @@ def by_everything(terms: SystemTerms, rows: Sequence[Expr]) -> list[Expr]:
     return derivatives(terms, rows, (*terms.q, *terms.v, terms.t, *terms.u, *terms.p))
 
 
-def assembly_jacobian(terms: SystemTerms, n_k: int) -> list[Expr]:
-    """Constraints, their rates, and the n_k coordinates of cut joints with theirs, by q, v, u and p."""
-    rows = [*terms.constraints, *terms.velocity_constraints, *terms.loop_coordinates[: 2 * n_k]]
+def assembly_jacobian(terms: SystemTerms, n_loop_coordinates: int) -> list[Expr]:
+    """Constraints, their rates, and the n_loop_coordinates coordinates of cut joints with theirs, by q, v, u and p."""
+    rows = [*terms.constraints, *terms.velocity_constraints, *terms.loop_coordinates[: 2 * n_loop_coordinates]]
     return derivatives(terms, rows, (*terms.q, *terms.v, *terms.u, *terms.p))
 
 

@@ -47,9 +47,9 @@ class SystemTerms:
 
     poses: Row  #: (16 * bodies,) homogeneous matrices body -> ground, row-major
     outputs: Row  #: (n_y,) of (q, v, a)
-    loop_coordinates: Row  #: (3 n_k,) y, y' and y'' of the coordinates of cut joints, of (q, v, a)
-    loop_coordinate_jacobian: tuple[Row, ...]  #: (n_k, n) dy/dq
-    alignment: Row  #: (n_a,) of q: positive unless an axis of a cut joint is flipped
+    loop_coordinates: Row  #: (3 n_loop_coordinates,) y, y' and y'' of the coordinates of cut joints, of (q, v, a)
+    loop_coordinate_jacobian: tuple[Row, ...]  #: (n_loop_coordinates, n) dy/dq
+    alignment: Row  #: (n_alignments,) of q: positive unless an axis of a cut joint is flipped
 
     coordinate_scales: Row  #: (n,) typical size of each coordinate, of parameters only
     constraint_scales: Row  #: (m,) typical size of each row's residual, of parameters only
@@ -67,7 +67,7 @@ class SystemTerms:
 
     centroidal: Row = ()  #: (18 + 3n,) of (q, v), all bodies, ground axes; empty for a system without mass: centre of
     #: mass, its Jacobian, linear momentum, angular momentum and inertia (9) about the centre of mass
-    finite_forces: Row = ()  #: (n_e,) of (q, v): 1 where a force element's loads are finite, else 0
+    finite_forces: Row = ()  #: (n_finite_forces,) of (q, v): 1 where a force element's loads are finite, else 0
 
     accelerations: Row | None = None  #: (n,) a of (q, v) with M a + h = 0, of a method that has it without M
     wrenches: JointWrenches | None = None  #: what joints exert, formed when it is asked for
@@ -112,7 +112,7 @@ class SystemTerms:
         )
 
     @property
-    def n_k(self) -> int:
+    def n_loop_coordinates(self) -> int:
         """Number of coordinates of cut joints."""
         return len(self.loop_coordinate_jacobian)
 
@@ -141,7 +141,7 @@ class SystemTerms:
             "constraint_rate": (len(self.constraint_rate), m),
             "velocity_constraints": (len(self.velocity_constraints), m),
             "gamma": (len(self.gamma), m),
-            "loop_coordinates": (len(self.loop_coordinates), 3 * self.n_k),
+            "loop_coordinates": (len(self.loop_coordinates), 3 * self.n_loop_coordinates),
             "centroidal": (len(self.centroidal), 18 + 3 * n if self.centroidal else 0),
             "coordinate_scales": (len(self.coordinate_scales), n),
             "constraint_scales": (len(self.constraint_scales), m),

@@ -36,7 +36,7 @@ class Canonical:
 
     def __init__(self, module: BoundModel) -> None:
         layout = module.layout
-        if layout.n_m != layout.n_v:
+        if layout.n_momenta != layout.n_v:
             raise UnavailableError(
                 f"model {layout.name!r} was derived by method {layout.metadata.get('method')!r}, which has no momenta; "
                 "derive it with method='hamilton'"

@@ -86,7 +86,7 @@ class Columns:
 
     def _loops(self) -> Array:
         layout = self.module.layout
-        if not layout.n_k:
+        if not layout.n_loop_coordinates:
             return np.empty((0, len(self.t)))
         a = np.array([self[name] for name in layout.a])
         q, v = self.x[: layout.n_q], self.x[layout.n_q :]
@@ -99,7 +99,7 @@ class Columns:
             e = y[0, four]
             turns = np.where((e[:, 1:] * e[:, :-1]).sum(axis=0) < 0.0, -1.0, 1.0)
             y[:, four] *= np.concatenate([[1.0], np.cumprod(turns)])
-        return y.reshape(3 * layout.n_k, -1)
+        return y.reshape(3 * layout.n_loop_coordinates, -1)
 
     @property
     def has_energies(self) -> bool:

@@ -66,7 +66,7 @@ def _not_finite(kernels: Evaluates, t: float, x: Array, p: Array | None, u: Arra
     bad = [name for name, value in zip(layout.u, inputs, strict=True) if not np.isfinite(value).all()]
     if bad:
         return f"the input{'s' * (len(bad) > 1)} {', '.join(bad)} given {'are' if len(bad) > 1 else 'is'} not"
-    if layout.n_e and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
+    if layout.n_finite_forces and "finite_forces" in kernels.core.names and x.size >= layout.n_x:
         finite = kernels.state("finite_forces", nan=True)(x[: layout.n_x], t=t, p=p, u=u)
         loads = " and ".join(name for name, fine in zip(layout.fragile_forces, finite, strict=True) if not fine > 0)
         if loads:

@@ -52,13 +52,13 @@ class Initial:
         self.kernels = kernels
         self.layout = layout = kernels.layout
         self.t = t
-        self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_g else None
+        self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_coordinate_slopes else None
         self._C = kernels.state("constraints", nan=True)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
         self.scales, self.place = layout.scales, layout.place_scales
-        self._loop = kernels.motion("loop_coordinates") if layout.n_k else None
-        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_k else None
-        self._alignment = kernels.state("alignment", nan=True) if layout.n_a else None
+        self._loop = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
+        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_loop_coordinates else None
+        self._alignment = kernels.state("alignment", nan=True) if layout.n_alignments else None
         self.coordinates = layout.q + layout.loops
 
     def sort(self, values: Mapping[str, float]) -> Given:
@@ -90,7 +90,7 @@ class Initial:
         return self.kernels.state("velocity_constraints")(x, t=self.t)
 
     def loops(self, q: Array) -> tuple[Array, Array]:
-        """Coordinates y (n_k,) of the cut joints and y_q (n_k, n)."""
+        """Coordinates y (n_loop_coordinates,) of the cut joints and y_q (n_loop_coordinates, n)."""
         assert self._loop is not None
         assert self._loop_q is not None
         zero = np.zeros(self.layout.n_v)

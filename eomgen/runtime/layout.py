@@ -62,22 +62,23 @@ class Layout:
         #: whether q' = N(q, t) v + b(q, t) is given, beyond q' = v
         self.given_rates = coordinate_of is not None and coordinate_of != list(range(self.n_q))
         self.energy_known: bool = data.get("energy_known", True)
-        self.n_g: int = data.get("n_g", 0)
-        self.n_s: int = data.get("n_s", 0)
-        self.n_w: int = data.get("n_w", 0)
+        self.n_coordinate_slopes: int = data.get("n_coordinate_slopes", 0)
+        self.n_wrenches: int = data.get("n_wrenches", 0)
+        self.n_wrench_geometry: int = data.get("n_wrench_geometry", 0)
         #: rates of Euler parameters, which are in q' but not in v
         self.parameter_rates = tuple(f"{name}_dot" for i, _ in self.quaternion_slots for name in self.q[i : i + 4])
         if coordinate_of is not None:
             self.parameter_rates = tuple(f"{name}_dot" for name in self.q if f"{name}_dot" not in self.v)
         self.n_dof: int = data.get("n_dof", self.n_v)
         self.n_com: int = data.get("n_com", 0)
-        self.n_m: int = data.get("n_m", 0)
+        self.n_momenta: int = data.get("n_momenta", 0)
         self.n_dae: int = data.get("n_dae", 0)
-        self.n_bodies, self.n_k, self.n_a = len(self.bodies), len(self.loops), len(self.alignment_labels)
+        self.n_bodies, self.n_loop_coordinates = len(self.bodies), len(self.loops)
+        self.n_alignments = len(self.alignment_labels)
         self.n_events: int = data.get("n_events", 0)
         self.n_resets: int = data.get("n_resets", 0)
         self.n_strike: int = data.get("n_strike", 0)
-        self.n_e = len(self.fragile_forces)
+        self.n_finite_forces = len(self.fragile_forces)
         #: what has rates among the inputs: name -> (rate, how many times it is derived), in order.  It is an input
         #: itself, or stands in the equations by its rates only.
         self.input_rates: dict[str, list[tuple[str, int]]] = {

@@ -84,7 +84,7 @@ class TrajectoryLike(Protocol):
 
 
 class Driven(Protocol):
-    """The inputs of a run, as what judges their rates sees them; see :class:`~.signals.Forcing`."""
+    """The inputs of a run, as the check of their rates sees them; see :class:`~.signals.Forcing`."""
 
     layout: Layout
     base: Array

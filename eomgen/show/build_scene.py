@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import ROUNDED, SAME
+from ..suggestions import hint
 from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
@@ -58,8 +58,8 @@ def build_scene(
         raise UsageError("the poses of the bodies are not finite at this position; give coordinates that are")
     frames = _with_ground(poses)
     start = np.array(q[:, 0])
-    balls = [i for i, _ in layout.quaternion_slots]
-    view = find_view(lambda trial: np.asarray(module.poses(trial)), start, balls, data.gravity)
+    quaternions = [i for i, _ in layout.quaternion_slots]
+    view = find_view(lambda trial: np.asarray(module.poses(trial)), start, quaternions, data.gravity)
     up = _up(data.gravity) if view is None else view[1]
     points = attachments(data)
     symbol, extent = symbol_size(data, points, frames[0])
@@ -86,9 +86,8 @@ def _tracked(data: PictureData, name: str) -> PlacedFrame:
     if name in data.bodies:
         return PlacedFrame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
-    near = get_close_matches(str(name), known, 1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-    raise UsageError(f"no marker or body {name!r} to trace; {hint}")
+    near = hint(name, known, quoted=False) or f"there are {', '.join(known)}"
+    raise UsageError(f"no marker or body {name!r} to trace; {near}")
 
 
 def _with_ground(poses: Array) -> Array:

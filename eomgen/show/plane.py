@@ -14,7 +14,7 @@ TRIALS = 6  #: positions that are looked at
 ROUNDING = SAME  #: relative size of what is rounding and not motion
 
 
-def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravity: Array) -> Array | None:
+def find_view(poses: Callable[[Array], Array], q: Array, quaternions: list[int], gravity: Array) -> Array | None:
     """Axes of a page (3, 3), rows right, up and towards the reader in ground axes; None of a spatial mechanism.
 
     Positions of the tree are drawn at random, loops open: every motion that the joints have shows.
@@ -24,13 +24,13 @@ def find_view(poses: Callable[[Array], Array], q: Array, balls: list[int], gravi
     poses : callable
         q (n_q, k) -> (n_bodies, 4, 4, k).
     q : (n_q,) array
-    balls : list of int
+    quaternions : list of int
         First of each four Euler parameters.
     gravity : (3,) array
     """
     random = np.random.default_rng(0)
     trial = q[:, None] + random.uniform(-1.0, 1.0, (len(q), TRIALS))
-    for i in balls:
+    for i in quaternions:
         trial[i : i + 4] /= np.linalg.norm(trial[i : i + 4], axis=0)
     first = poses(q[:, None])[..., 0]
     moved = poses(trial)

@@ -109,6 +109,6 @@ def hull(points: Array) -> Mesh | None:
 
 
 def rounded(points: Array, radius: float) -> Mesh | None:
-    """The hull of balls about points (n, 3): a bar between two, a plate with round corners over three."""
+    """The hull of quaternions about points (n, 3): a bar between two, a plate with round corners over three."""
     ball = sphere(radius)[0]
     return hull((points[:, None] + ball[None]).reshape(-1, 3))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.protocols import Timed
     from .progress import Progress
-    from .stalling import Pace
+    from .stalling import StallCheck
 
 
 class Run:
@@ -61,13 +61,13 @@ class Run:
 
         return told
 
-    def pace(self, start: float, end: float, x: Array, longest: float, kept: int) -> Pace | None:
+    def stall_check(self, start: float, end: float, x: Array, longest: float, kept: int) -> StallCheck | None:
         """What ends the run where its steps lead nowhere; a slim package has none."""
         try:
-            from .stalling import Pace
+            from .stalling import StallCheck
         except UnavailableError:
             return None
-        return Pace(start, end, x, self.module.n_q, longest, self.troubled, kept)
+        return StallCheck(start, end, x, self.module.n_q, longest, self.troubled, kept)
 
     def remember(self, name: str, kernel: Timed) -> None:
         """Keep a failure as the cause, unless its state came out of an earlier failure as NaN."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from .checkpoint import Checkpoint
     from .progress import Progress
-    from .stalling import Pace
+    from .stalling import StallCheck
 
 OPTIONS = ("rtol", "atol", "max_step", "first_step")
 ENDED, TERMINAL, WAITING, ZENO, STOPPED, RESET_FAILED = 1, 2, 3, -102, -101, -103  #: as in eomgen_loop.h
@@ -106,7 +106,7 @@ def integrate_compiled(
     dense: bool,
     options: dict[str, Any],
     watch: Progress | None,
-    pace: Pace | None = None,
+    stall_check: StallCheck | None = None,
     events: Events | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[Solution, tuple[int, float, Array] | None, BaseException | None]:
@@ -126,7 +126,8 @@ def integrate_compiled(
     plan = {
         "nodes": nodes[1:], "t_eval": t_eval, "dense": dense, "events": events.encode() if events else None,
         "trail": KEPT if module.layout.rank else 0,
-        "watch": None if watch is None else watch.look, "pace": None if pace is None else pace.look,
+        "watch": None if watch is None else watch.look,
+        "stall_check": None if stall_check is None else stall_check.look,
         "keep": None if checkpoint is None else (checkpoint.every, checkpoint.save),
     }  # fmt: skip
     settings = stepper_options(len(x0), abs(end - start), options, checked=True)

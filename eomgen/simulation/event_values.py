@@ -39,7 +39,7 @@ class EventValues:
             values = together.values(t, x)
             for i in places:
                 event = self.events[i]
-                g[i] = event.judge(t, float(values[event.source[1]]))  # type: ignore[index]
+                g[i] = event.seen_value(t, float(values[event.source[1]]))  # type: ignore[index]
         return g
 
     def each(self, asked: Sequence[int], times: Array, states: Array) -> list[float]:
@@ -55,5 +55,5 @@ class EventValues:
                 table = together.columns(times[part], np.ascontiguousarray(states[part].T))
                 for column, k in enumerate(part):
                     event = self.events[asked[k]]
-                    values[k] = event.judge(float(times[k]), float(table[event.source[1], column]))  # type: ignore[index]
+                    values[k] = event.seen_value(float(times[k]), float(table[event.source[1], column]))  # type: ignore[index]
         return [values[k] if k in values else self.events[i](float(times[k]), states[k]) for k, i in enumerate(asked)]

@@ -73,9 +73,9 @@ class RunEvent:
 
     def __call__(self, t: float, x: Array) -> float:
         """The value at time t and state x; right after a reset, one on the side to which it led."""
-        return self.judge(t, float(self.function(t, x)))
+        return self.seen_value(t, float(self.function(t, x)))
 
-    def judge(self, t: float, value: float) -> float:
+    def seen_value(self, t: float, value: float) -> float:
         """The same where the function's value is known."""
         if not isfinite(value):
             return nan

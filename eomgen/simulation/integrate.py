@@ -17,11 +17,11 @@ from ..numeric.scales import Array
 from ..runtime.near_names import require, unknown
 from .event_crossings import Crossings, Step
 from .events import RunEvent
-from .stalling import Pace
+from .stalling import StallCheck
 
 if TYPE_CHECKING:
     from .solver_state import Pause
-    from .stalling import Pace
+    from .stalling import StallCheck
 
 KEPT = 10**7  #: numbers at most of the steps that are kept besides what t_eval asks for
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
@@ -131,7 +131,7 @@ def integrate(
     events: Sequence[RunEvent],
     dense: bool,
     options: dict[str, Any],
-    pace: Pace | None,
+    stall_check: StallCheck | None,
     reset: Callable[[float, Array, list[int]], Array] | None = None,
     enter: Callable[[float, float], None] | None = None,
     pause: Pause | None = None,
@@ -141,13 +141,13 @@ def integrate(
     Raises
     ------
     Crawling
-        The steps lead nowhere, as `pace` judges.
+        The steps lead nowhere, as `stall_check` finds.
     ZenoError
         Resets follow each other ever faster, or lead nowhere.
     Interrupted
         Ctrl-C.
     """
-    journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, pace)
+    journey = _Journey(rhs, nodes, x0, solver, t_eval, events, dense, options, stall_check)
     try:
         journey.travel(reset, enter, pause)
     except KeyboardInterrupt as interrupt:
@@ -168,10 +168,10 @@ class _Journey:
 
     def __init__(
         self, rhs: Any, nodes: Sequence[float], x0: Array, solver: Any, t_eval: Array | None,
-        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], pace: Pace | None,
+        events: Sequence[RunEvent], dense: bool, options: dict[str, Any], stall_check: StallCheck | None,
     ) -> None:  # fmt: skip
         self.rhs, self.nodes, self.solver, self.t_eval = rhs, nodes, solver, t_eval
-        self.options, self.pace = options, pace
+        self.options, self.stall_check = options, stall_check
         self.t, self.x, self.forward = nodes[0], np.array(x0), nodes[-1] >= nodes[0]
         self.crossings = Crossings(events, rhs, nodes[0], nodes[-1]) if events else None
         self.pieces: list[tuple[float, Any]] | None = [] if dense else None
@@ -226,8 +226,8 @@ class _Journey:
                         return
                     stop = self._settle(solver)
                     if stop is None and solver.status == "running":
-                        if self.pace is not None:
-                            self.pace.look(self.t, self.x)
+                        if self.stall_check is not None:
+                            self.stall_check.look(self.t, self.x)
                         if pause is not None and perf_counter() >= pause.due:
                             pause.save(self, k, solver)
             finally:

@@ -22,7 +22,7 @@ from .integrate import choose_solver
 from .run_arguments import check_method, declare, own_step
 from .simulate import simulate
 from .stalled import Crawling
-from .stalling import Pace
+from .stalling import StallCheck
 from .tolerances import check_tolerances
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Integrator:
             plan = {"nodes": [1.0], "t_eval": [], "dense": False, "events": None, "watch": None}
             make, nowhere = eager(module.core).integrator, np.zeros(module.n_x)
             self._compiled = make(method, module.kernels.context, 0.0, nowhere, 1.0, plan=plan, **settings)
-            self._compiled.pacer = self._pace
+            self._compiled.make_stall_check = self._stall_check
         elif step is not None:
             raise UsageError("method RK4 runs in compiled code only: target='cython'")
         else:
@@ -145,10 +145,10 @@ class Integrator:
         """Evaluations of the right-hand side in the last call; of its series, for Taylor."""
         return self._evaluations if self._compiled is None else int(self._compiled.evaluations)
 
-    def _pace(self, t: float, end: float, x: Array) -> Callable[[float, Array, int], None]:
+    def _stall_check(self, t: float, end: float, x: Array) -> Callable[[float, Array, int], None]:
         """What watches the steps of a long call."""
         troubled = Run(self.module, Forcing(self.module.layout, None)).troubled
-        return Pace(t, end, x, self.module.n_q, float(self._options.get("max_step", np.inf)), troubled).look
+        return StallCheck(t, end, x, self.module.n_q, float(self._options.get("max_step", np.inf)), troubled).look
 
     def _explain(
         self, trouble: tuple[int, float, Any, BaseException | None], x: Array, end: float, p: Any, u: Any

@@ -33,7 +33,7 @@ from .sensitivity_result import Sensitivities
 from .sensitivity_start import held_names, keep_consistent, split_columns, start_sensitivity
 from .simulate import simulate
 from .stalled import Crawling
-from .stalling import Pace, describe_crawl
+from .stalling import StallCheck, describe_crawl
 from .tolerances import check_tolerances
 from .variational import Variational
 
@@ -130,11 +130,11 @@ def sensitivities(
     longest = float(options.get("max_step", np.inf))
     numbers = len(z0) if times is None else 0
     troubled = lambda t, z: fail.trouble(z[: layout.n_x], t) is not None  # noqa: E731
-    pace = Pace(start, stop, z0, layout.n_q, longest, troubled, numbers)
+    stall_check = StallCheck(start, stop, z0, layout.n_q, longest, troubled, numbers)
     try:
         with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
             solution = integrate(
-                run, nodes, z0, solver, times, salts.watched, False, options, pace, salts.reset, forcing.enter
+                run, nodes, z0, solver, times, salts.watched, False, options, stall_check, salts.reset, forcing.enter
             )
     except Crawling as crawl:
         _refuse_change_point(bound, forcing, crawl.t, crawl.x[: layout.n_x])

@@ -157,7 +157,7 @@ def start_sensitivity(
             right.append(wanted[name] / scales.q[k])
         elif name in layout.loop_rates:
             k = layout.loop_rates.index(name)
-            line, size = n_h + n_c + layout.n_k + k, layout.loop_scales[k]
+            line, size = n_h + n_c + layout.n_loop_coordinates + k, layout.loop_scales[k]
             rows.append(E[line, n_q:n_x] * scales.q / size)
             right.append((wanted[name] - other[line] - E[line, :n_q] @ dq) / size)
     dv = scales.q[:, None] * _solve(rows, right, n_v, count, columns)

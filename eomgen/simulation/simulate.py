@@ -192,11 +192,11 @@ def simulate(
         pause = None if compiled else Pause(kept, solver, dense_output)
         own = {name: value for name, value in options.items() if name != "jac" or value != run.jacobian}
         kept.open(identify(bound, forcing, watched, nodes, x0, title, stored, dense_output, own))
-    pace = run.pace(start, end, x0, longest, numbers)
+    stall_check = run.stall_check(start, end, x0, longest, numbers)
     try:
         if compiled:
             solution, failure, raised = integrate_compiled(
-                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, pace, watched, kept
+                bound, forcing, nodes, x0, title, stored, dense_output, options, watch, stall_check, watched, kept
             )
             run.last = None if failure is None else ("rhs", *failure)
             if isinstance(raised, KeyboardInterrupt):
@@ -207,7 +207,7 @@ def simulate(
             with np.errstate(all="ignore"):  # NaN is how a failed evaluation shortens a step
                 listed = watched.listed(bound, forcing)
                 solution = integrate(
-                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, pace,
+                    run.watched(watch), nodes, x0, solver, stored, listed, dense_output, options, stall_check,
                     partial(watched.reset, bound, forcing), forcing.enter, pause,
                 )  # fmt: skip
                 warn_of_unknown([e.name for e in listed if e.direction != UNWATCHED and not e.known])

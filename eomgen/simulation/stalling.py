@@ -18,14 +18,14 @@ from ..runtime.failure import place
 from .stalled import Crawling
 
 WINDOW = 200  #: steps judged together
-MANY = 100_000  #: steps left that a run may take at any pace
+MANY = 100_000  #: steps left that a run may take at any stall_check
 REMEDY = (
     "look for a force that jumps (smooth it), a singular position, or motions far faster than the run is long (try an "
     "implicit method, Radau)"
 )
 
 
-class Pace:
+class StallCheck:
     """Watches how a run advances.
 
     A run crawls if its mean step would take more than ``MANY`` further steps and is less than ``SHORT`` of its span,

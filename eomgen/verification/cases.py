@@ -142,7 +142,7 @@ def _closed(module: BoundModel, x: Array, t: float, p: Array, u: Array) -> bool:
     rate = np.abs(module.velocity_constraints(x, p=p, u=u, t=t, rows="all"))
     if residual.max(initial=0.0) > CLOSED or rate.max(initial=0.0) > CLOSED * (1.0 + np.abs(x).max()):
         return False
-    if layout.n_a and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
+    if layout.n_alignments and not (module.kernels.state("alignment")(q, p=p, u=u, t=t) > 0.0).all():
         return False
     J = scales.jacobian(module.constraint_jacobian(q, p=p, u=u, t=t, rows="all"))
     values = algebra.singular_values(J)

@@ -1,6 +1,6 @@
 """Stage verification, check runs: the generated steppers over single steps and short runs.
 
-The judge is SciPy's DOP853 with tight tolerances on the plain right-hand side (E. Hairer, S. P. Norsett, G. Wanner,
+The reference is SciPy's DOP853 with tight tolerances on the plain right-hand side (E. Hairer, S. P. Norsett, G. Wanner,
 Solving Ordinary Differential Equations I, 2nd ed. 1993, sec. II.3 and II.10): the error of one step of a method of
 order p is of order h^(p + 1).
 """
@@ -33,14 +33,14 @@ from .finding import Finding
 ORDERS = {"RK4": 4, "RK23": 3, "RK45": 5, "DOP853": 8}
 #: By how much an observed order may fall short; over all examples it is 0.31, of DOP853, and 0.01 of others.
 SHORT = 0.5
-JUDGED = 3  #: states that single steps are taken from
+TRIED = 3  #: states that single steps are taken from
 LONG = 2.0  #: length of a run, in times in which the state changes by its own size
 FIRST = 4.0  #: the first step tried, in the same times
 MOST = 3000  #: evaluations of a run that is smooth
 EVEN = 0.1  #: shortest step of a smooth run beside its longest: shorter ones pass by a singular position
 SMALLEST = 14  #: halvings of the step
 
-Judge = Callable[[float], Array]  #: h -> the state a time h later
+Reference = Callable[[float], Array]  #: h -> the state a time h later
 
 
 def check(bench: Bench) -> list[Finding]:
@@ -49,11 +49,11 @@ def check(bench: Bench) -> list[Finding]:
     if why:
         return [Finding.skipped("steppers: order of one step", why), Finding.skipped("runs: methods agree", why)]
     kinked = _kinked(bench)
-    judges = [(case, cache(_judge(bench, case))) for case in _held(bench)[:JUDGED]]
-    found = [_order(bench, method, judges) for method in ORDERS if method in _methods(bench)]
+    references = [(case, cache(_reference(bench, case))) for case in _held(bench)[:TRIED]]
+    found = [_order(bench, method, references) for method in ORDERS if method in _methods(bench)]
     if not found:
         found = [Finding.skipped("steppers: order of one step", "the module has no steppers of its own: target numpy")]
-    end = _far(bench, *judges[0])
+    end = _far(bench, *references[0])
     found += [_agreement(bench, *end), _energy(bench, end[0])]
     why = "its forces have kinks or tables, at which no method keeps its order"
     return [
@@ -99,7 +99,7 @@ def _held(bench: Bench) -> list[Case]:
     return found
 
 
-def _pace(bench: Bench, case: Case) -> float:
+def _time_scale(bench: Bench, case: Case) -> float:
     """A time in which the state changes by about its own size (s): 1 / |eigenvalue of largest size|."""
     J = bench.slopes(case)
     fastest = float(np.abs(algebra.eigvals(J)).max(initial=0.0)) if np.isfinite(J).all() else 0.0
@@ -107,7 +107,7 @@ def _pace(bench: Bench, case: Case) -> float:
     return 1.0 / max(fastest, speed, SLOWEST)
 
 
-def _judge(bench: Bench, case: Case) -> Judge:
+def _reference(bench: Bench, case: Case) -> Reference:
     """The state a time after the case, by SciPy; on the constraints."""
     integrate = require("scipy.integrate", "scipy", "verify")
     bound = bench.module.bind(case.p, case.u)
@@ -131,7 +131,7 @@ def _judge(bench: Bench, case: Case) -> Judge:
     return at
 
 
-def _far(bench: Bench, case: Case, judge: Judge) -> tuple[float, Array]:
+def _far(bench: Bench, case: Case, reference: Reference) -> tuple[float, Array]:
     """How long a smooth run from the case can be (s), and where it ends.
 
     Raises
@@ -139,16 +139,16 @@ def _far(bench: Bench, case: Case, judge: Judge) -> tuple[float, Array]:
     SimulationError
         None is possible.
     """
-    h = LONG * _pace(bench, case)
+    h = LONG * _time_scale(bench, case)
     for _ in range(SMALLEST):
         try:
-            return h, judge(h)
+            return h, reference(h)
         except EomgenError:
             h *= 0.5
     raise SimulationError(f"no run from state {case.number} succeeds, however short")
 
 
-def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> Finding:
+def _order(bench: Bench, method: str, references: Sequence[tuple[Case, Reference]]) -> Finding:
     """Between a step h and h/2 the error falls by 2^(p + 1), until it is lost in rounding.
 
     The mean over three halvings counts, and the best of three states: a fault of the method shows at each, an error
@@ -157,12 +157,12 @@ def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> F
     check, order = f"steppers: order of {method}", ORDERS[method]
     found = Comparison(check, f"how much less than {order + 1} the order of one step's error is")
     observed: list[tuple[float, int]] = []
-    for case, judge in judges:
+    for case, reference in references:
         bound = bench.module.bind(case.p, case.u)
-        size = size_of(case.x) + size_of(bench.rhs(case)) * _pace(bench, case)
+        size = size_of(case.x) + size_of(bench.rhs(case)) * _time_scale(bench, case)
         lost = 30.0 * TIGHT * size
         errors: list[float] = []
-        h = FIRST * _pace(bench, case)
+        h = FIRST * _time_scale(bench, case)
         for _ in range(SMALLEST):
             try:
                 if method == "RK4":
@@ -170,7 +170,7 @@ def _order(bench: Bench, method: str, judges: Sequence[tuple[Case, Judge]]) -> F
                 else:
                     stepper = integrator(bound, method=method, rtol=LOOSE, atol=LOOSE, first_step=h, max_step=h)
                     end = stepper(case.t, case.x, h)
-                errors.append(float(np.abs(end - judge(h)).max()))
+                errors.append(float(np.abs(end - reference(h)).max()))
             except EomgenError:
                 errors.append(np.inf)
             h *= 0.5

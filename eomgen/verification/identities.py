@@ -176,21 +176,21 @@ def _holding(module: BoundModel, cases: Sequence[Case]) -> Finding:
     found = Comparison(check)
     for c in cases:
         rate = module.rhs(c.t, c.x, p=c.p, u=c.u)
-        pace = 1.0 / max(size_of(rate), 1.0)
+        time_scale = 1.0 / max(size_of(rate), 1.0)
         C = _jacobian(module, c)
-        size = size_of(np.abs(C) @ np.abs(rate[module.n_q :])) * pace
+        size = size_of(np.abs(C) @ np.abs(rate[module.n_q :])) * time_scale
         condition = _condition(_mass(module, c), C, module.layout.scales.q)
         noise = KERNEL * size_of(np.abs(C) @ np.abs(c.v))
-        slope, error = extrapolate(_along_x(module, c, rate, pace), noise)
+        slope, error = extrapolate(_along_x(module, c, rate, time_scale), noise)
         found.add(c.number, slope, error + KERNEL * condition * size, max(size, noise))
     return found.finding()
 
 
-def _along_x(module: BoundModel, c: Case, rate: Array, pace: float) -> Callable[[float], Array]:
+def _along_x(module: BoundModel, c: Case, rate: Array, time_scale: float) -> Callable[[float], Array]:
     u_rate = moving_inputs(module.layout, c.u)
 
     def f(s: float) -> Array:
-        x, t, u = c.x + s * pace * rate, c.t + s * pace, c.u + s * pace * u_rate
+        x, t, u = c.x + s * time_scale * rate, c.t + s * time_scale, c.u + s * time_scale * u_rate
         return module.velocity_constraints(x, p=c.p, u=u, t=t)
 
     return f

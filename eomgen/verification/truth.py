@@ -74,11 +74,11 @@ class Truth(PreciseState):
     def measured(self, values: Values) -> Numbers:
         """Coordinates of cut joints."""
         terms = self.system.terms
-        return self.system.evaluate("measured", lambda: terms.loop_coordinates[: terms.n_k], values)
+        return self.system.evaluate("measured", lambda: terms.loop_coordinates[: terms.n_loop_coordinates], values)
 
     @cached_property
     def measured_slopes(self) -> list[Numbers]:
-        """dy of the coordinates of cut joints in a unit of each velocity: (n_v, n_k)."""
+        """dy of the coordinates of cut joints in a unit of each velocity: (n_v, n_loop_coordinates)."""
         return [self.slope(self.measured, partial(self.displaced, j)) for j in range(self.n)]
 
     def coordinate_slopes(self, name: str) -> Numbers:

@@ -19,7 +19,7 @@ cdef class Integrator(Journey):
     cdef double *end
     cdef double first, begun
     cdef object turn
-    cdef public object pacer
+    cdef public object make_stall_check
 
     def __cinit__(self, str method, Context context, double t0, y0, double t_bound, double rtol, atol,
                   double max_step, double first_step=0.0, signals=(), plan=None):
@@ -51,9 +51,9 @@ cdef class Integrator(Journey):
             run.step, run.h_abs = 0.0, self.first
             self.end[0], j.span = t + h, abs(h)
             run.evaluations = run.rejected = run.steps = run.differentiations = run.factorizations = 0
-            run.failure, run.stopped, run.look_in = 0, 0, self.stride
-            j.begun, j.node, self.seen, self.pace, self.raised = 0, 0, 0, None, None
-            self.looked = self.begun = perf_counter()
+            run.failure, run.stopped, run.until_callback = 0, 0, self.stride
+            j.begun, j.node, self.seen, self.stall_check, self.raised = 0, 0, 0, None, None
+            self.called_at = self.begun = perf_counter()
             if not self.correct():
                 status = EOMGEN_RESET_FAILED
             elif h != 0.0:
@@ -77,14 +77,15 @@ cdef class Integrator(Journey):
         memcpy(run.y_old, run.y, run.n * sizeof(double))
         return self.project(run.t, run.y_old, run.u, run.c, run.y, run.w) == 0
 
-    cdef long look(self, double t):
-        if self.pace is None and self.looked - self.begun > 1e-3 * WATCHED_AFTER:
+    cdef long callback(self, double t):
+        if self.stall_check is None and self.called_at - self.begun > 1e-3 * WATCHED_AFTER:
             try:
-                self.pace, self.seen = self.pacer(t, self.end[0], copy(self.run.y_old, self.run.n)), self.run.steps
+                self.stall_check = self.make_stall_check(t, self.end[0], copy(self.run.y_old, self.run.n))
+                self.seen = self.run.steps
             except BaseException as error:
                 self.raised = error
                 return 0
-        return Journey.look(self, t)
+        return Journey.callback(self, t)
 
 
 integrator = Integrator

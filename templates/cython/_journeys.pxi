@@ -1,4 +1,4 @@
-# Journeys: whole trajectories by eomgen_loop.h, with a look at Python every few milliseconds.
+# Journeys: whole trajectories by eomgen_loop.h, with a call of Python every few milliseconds.
 
 from cpython.exc cimport PyErr_CheckSignals
 from libc.math cimport INFINITY, isnan
@@ -60,8 +60,8 @@ cdef extern from "eomgen_loop.h" nogil:
     int eomgen_jump(const eomgen_method *, eomgen_run *, eomgen_journey *) noexcept
 
 
-cdef long look_out(void *looker, const double *t) noexcept with gil:
-    return (<Journey>looker).look(t[0])
+cdef long call_python(void *callback_data, const double *t) noexcept with gil:
+    return (<Journey>callback_data).callback(t[0])
 
 
 cdef int ask_outside(void *asker, double t, const double *y, double *g) noexcept with gil:
@@ -108,8 +108,9 @@ cdef class Journey(Stepper):
         As for Stepper.
     plan : dict
         nodes (n,): times not to step over, the end last; t_eval (k,) or None; dense: keep the solution between steps;
-        trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None; pace: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's, or 0),
-        tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
+        trail: numbers at most of the steps to keep where t_eval is given; watch: told the time now and then, or None;
+        stall_check: told time, state and steps since, or None; events: None, or a dict of names (how many of the model's,
+        or 0), tape (code, numbers, out) or None, outside: functions f(t, x), and for each event direction, most, action;
         resets: rows (event, state) of the model's kernel; crowd: so many resets in a row are too many; keep: (seconds, function),
         called about so often, between two steps, with what freeze gives; or None.
 
@@ -121,12 +122,12 @@ cdef class Journey(Stepper):
 
     cdef eomgen_journey journey
     cdef eomgen_events events
-    cdef object watch, pace, outside, keeper
+    cdef object watch, stall_check, outside, keeper
     cdef double pause_every, pause_due
     cdef long seen
     cdef cnp.ndarray times, states, notes, pieces, walked
     cdef list stored
-    cdef double looked
+    cdef double called_at
     cdef long stride, most
     cdef readonly object raised
 
@@ -146,10 +147,10 @@ cdef class Journey(Stepper):
         if plan["events"] is not None:
             self.expect(**plan["events"])
         self.allocate(512)
-        self.watch, self.pace, self.looked, self.seen = plan["watch"], plan.get("pace"), perf_counter(), 0
+        self.watch, self.stall_check, self.called_at, self.seen = plan["watch"], plan.get("stall_check"), perf_counter(), 0
         self.pause_every, self.keeper = plan.get("keep") or (INFINITY, None)
-        self.pause_due = self.looked + self.pause_every
-        self.run.look, self.run.looker, self.run.look_in = look_out, <void *>self, self.stride
+        self.pause_due = self.called_at + self.pause_every
+        self.run.callback, self.run.callback_data, self.run.until_callback = call_python, <void *>self, self.stride
 
     cdef hold(self, values, kind):
         array = np.array(values, dtype=kind)
@@ -321,23 +322,23 @@ cdef class Journey(Stepper):
     def resets(self):
         return self.journey.resets
 
-    cdef long look(self, double t):
-        now = self.looked
+    cdef long callback(self, double t):
+        now = self.called_at
         try:
             PyErr_CheckSignals()
             now = perf_counter()
             self.journey.pause = now >= self.pause_due
             if self.watch is not None:
                 self.watch(t)
-            if self.pace is not None and self.run.steps > self.seen:
-                self.pace(t, copy(self.run.y_old, self.run.n), self.run.steps - self.seen)
+            if self.stall_check is not None and self.run.steps > self.seen:
+                self.stall_check(t, copy(self.run.y_old, self.run.n), self.run.steps - self.seen)
                 self.seen = self.run.steps
         except BaseException as error:
             self.raised = error
             return 0
-        # the next look in 0.5 ms, as far as the time since the last tells; that of the first few evaluations tells little
-        cdef double elapsed = now - self.looked
-        self.looked = now
+        # the next call in 0.5 ms, as far as the time since the last tells; that of the first few evaluations tells little
+        cdef double elapsed = now - self.called_at
+        self.called_at = now
         self.stride = <long>min(max(self.stride * (5e-4 / max(elapsed, 1e-9)), 1.0), 16.0 * self.stride)
         return self.stride
 

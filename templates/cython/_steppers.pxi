@@ -37,9 +37,9 @@ cdef extern from "eomgen_steppers.h" nogil:
         double *failure_state
         double hold
         long steps, most_steps
-        long look_in
-        long (*look)(void *, const double *) noexcept nogil
-        void *looker
+        long until_callback
+        long (*callback)(void *, const double *) noexcept nogil
+        void *callback_data
         eomgen_function jacobian
         long differentiations, factorizations
         const eomgen_series *series

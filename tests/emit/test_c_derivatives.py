@@ -70,7 +70,7 @@ def test_the_derivatives_of_what_assembly_holds(case, systems, compiled):
         library.set_parameters(z[2 * n + len(system.u) :])
         rows = [library.fine("constraints", z[:n], t), library.fine("velocity_constraints", z[: 2 * n], t)]
         loops = library.fine("loop_coordinates", [*z[: 2 * n], *np.zeros(n)], t)
-        return np.concatenate([*rows, loops[: 2 * system.terms.n_k]])
+        return np.concatenate([*rows, loops[: 2 * system.terms.n_loop_coordinates]])
 
     h = 1e-4
     expected = np.array([(held(state + h * e) - held(state - h * e)) / (2 * h) for e in np.eye(len(state))]).T

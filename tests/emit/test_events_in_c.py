@@ -44,7 +44,7 @@ static void travel(const eomgen_method *method)
     long count[EVENTS] = {0};
     int leaving[EVENTS], whose[2 * EVENTS], fired[EVENTS], touch[EVENTS];
     eomgen_run run = {.rhs = turn, .n = N, .rtol = 1e-12, .max_step = INFINITY, .t_bound = 12.0, .direction = 1.0,
-        .atol = atol, .look_in = -1, .hold = NAN};
+        .atol = atol, .until_callback = -1, .hold = NAN};
     double *place = memory, **const parts[] = {&run.y, &run.y_old, &run.f, &run.failure_state, &run.next, &run.K};
     for (int k = 0; k < 6; k++, place += N) {
         *parts[k] = place;

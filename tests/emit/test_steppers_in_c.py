@@ -12,7 +12,7 @@ from eomgen.compilation.compiler import find_compiler
 from eomgen.emit.sources import read_template
 from eomgen.layer import read_layer
 
-BALL = r"""
+QUATERNION = r"""
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -92,7 +92,7 @@ int main(void)
 
 
 def test_bounces_without_python(tmp_path: Path) -> None:
-    texts = {**read_layer(), "ball.c": BALL}
+    texts = {**read_layer(), "ball.c": QUATERNION}
     texts |= {name: read_template(f"c/{name}") for name in ("eomgen.h", "eomgen_real.h")}
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")

@@ -72,7 +72,7 @@ static void travel(const eomgen_method *method, eomgen_series known, const doubl
 {
     double *const memory = calloc(4096, sizeof(double)), atol[N] = {1e-9, 2e-9, 3e-9}, x[N];
     eomgen_run run = {.rhs = slope, .jacobian = jacobian, .n = N, .rtol = rtol, .max_step = INFINITY, .t_bound = end,
-        .direction = 1.0, .atol = atol, .look_in = -1, .hold = NAN, .series = &known};
+        .direction = 1.0, .atol = atol, .until_callback = -1, .hold = NAN, .series = &known};
     double *place = memory, **const parts[] = {&run.y, &run.y_old, &run.f, &run.failure_state, &run.next, &run.K};
     for (int k = 0; k < 6; k++, place += N) {
         *parts[k] = place;

@@ -36,7 +36,7 @@ static void travel(const eomgen_method *method, double *row)
 {
     double *const memory = calloc(MOST * (5 + 16 + 7) + 8, sizeof(double)), atol[MOST], *place = memory;
     eomgen_run run = {.rhs = ring, .n = n, .rtol = 1e-7, .max_step = INFINITY, .t_bound = 3.0, .direction = 1.0,
-        .atol = atol, .look_in = -1, .hold = NAN};
+        .atol = atol, .until_callback = -1, .hold = NAN};
     double **const parts[] = {&run.y, &run.y_old, &run.f, &run.failure_state, &run.next, &run.K};
     for (int k = 0; k < 6; k++, place += n) {
         *parts[k] = place;

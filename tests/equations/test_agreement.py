@@ -14,7 +14,7 @@ import eomgen.equations
 from eomgen.equations import METHODS, embedding, lagrange
 from eomgen.graph import evaluate
 from eomgen.kinematics import analyse
-from eomgen.kinematics.mobility import judge
+from eomgen.kinematics.mobility import find_mobility
 
 
 def test_methods_import_only_what_they_may_share() -> None:
@@ -106,7 +106,7 @@ def test_mobility_of_closed_random_mechanisms() -> None:
     for seed in range(6):
         made = random_mechanism(seed, 4, planar=True, loop=True)
         kinematics = analyse(made.mechanism)
-        mobility = judge(kinematics)
+        mobility = find_mobility(kinematics)
         assert mobility.residual <= 1e-10
         assert mobility.n_dof == len(kinematics.q) - mobility.rank
         assert len(mobility.independent) == mobility.n_dof

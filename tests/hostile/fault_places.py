@@ -19,8 +19,8 @@ from eomgen.compilation import Cache
 #: Lets a process that is not root see a file as another user's.
 SEEN = """
 from eomgen.files import ownership
-judge, shown = ownership._judge, os.lstat({path!r}).st_ino
-ownership._judge = lambda path, status, above: judge(path, os.stat_result(
+judge, shown = ownership._require_own, os.lstat({path!r}).st_ino
+ownership._require_own = lambda path, status, above: judge(path, os.stat_result(
     (*status[:4], {owner}, *status[5:])) if status.st_ino == shown else status, above=above)
 """
 

@@ -20,7 +20,7 @@ from eomgen.robots.mjcf_text import Text
 from eomgen.robots.xml_text import read_xml
 from eomgen.solids.mesh import measure_mesh
 
-BALL = '<worldbody><body name="ball"><joint name="j"/><geom size="1"/></body></worldbody>'
+QUATERNION = '<worldbody><body name="ball"><joint name="j"/><geom size="1"/></body></worldbody>'
 SHAPE = '<worldbody><body name="shape"><joint name="j"/><geom type="mesh" mesh="m"/></body></worldbody>'
 ABSOLUTE = "{out}"  # the folder outside, from the root
 
@@ -41,7 +41,7 @@ def model(tmp_path: Path) -> Any:
         place.mkdir(parents=True)
         (place / "x.stl").write_bytes(tetrahedron(1.0))
     (folder / "a.stl").write_bytes(tetrahedron(2.0))
-    (out / "x.xml").write_text(f"<mujoco>{BALL.replace('ball', 'hidden')}</mujoco>")
+    (out / "x.xml").write_text(f"<mujoco>{QUATERNION.replace('ball', 'hidden')}</mujoco>")
     os.symlink(out, folder / "link")
     os.mkfifo(folder / "pipe.stl")
 
@@ -75,7 +75,7 @@ OUTSIDE = [
     mesh("x.stl", '<compiler meshdir="sub"/><compiler meshdir="..\\out"/>'),
     mesh("y\\..\\x.stl", '<compiler meshdir="../out" strippath="true"/>'),
     *(
-        f"{start}{BALL}"
+        f"{start}{QUATERNION}"
         for start in (
             *('<include file="..\\out\\x.xml"/>', '<Include file="../out/x.xml"/>', '<include file="link\\x.xml"/>'),
             '<asset><model name="p" file="..\\out\\x.xml"/></asset>',
@@ -143,7 +143,7 @@ def test_no_file_is_part_of_itself(cycle: str, model: Any) -> None:
     for name, text in others.items():
         model(text, name)
     with pytest.raises(eg.ModelError, match=said):
-        eg.load(model(start + BALL))
+        eg.load(model(start + QUATERNION))
 
 
 SIZES = {
@@ -163,7 +163,7 @@ SIZES = {
 @pytest.mark.parametrize("text", SIZES)
 def test_sizes_of_mjcf_are_bounded(text: str, model: Any) -> None:
     with pytest.raises(eg.ModelError, match=SIZES[text]):
-        eg.load(model(text + BALL))
+        eg.load(model(text + QUATERNION))
 
 
 @pytest.mark.parametrize(
@@ -176,13 +176,13 @@ def test_sizes_of_mjcf_are_bounded(text: str, model: Any) -> None:
     ],
 )
 def test_what_is_no_part_of_the_motion_costs_nothing(text: str, model: Any) -> None:
-    mass = eg.load(model(text + BALL)).mechanism().bodies[0].mass
+    mass = eg.load(model(text + QUATERNION)).mechanism().bodies[0].mass
     assert mass.value == pytest.approx(4000 * np.pi / 3)
 
 
 SLOW = (
     '<compiler><lengthrange mode="all" inttotal="1e9" interval="1e8" timestep="1e-6"/></compiler>'
-    f'{BALL}<actuator><muscle joint="j"/></actuator>'
+    f'{QUATERNION}<actuator><muscle joint="j"/></actuator>'
 )
 
 
@@ -198,7 +198,7 @@ def test_a_model_that_never_compiles_is_given_up(
 
 
 def test_memory_is_bounded(model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = '<asset><mesh name="s" builtin="supersphere" params="1000 1 1"/></asset>' + BALL
+    text = '<asset><mesh name="s" builtin="supersphere" params="1000 1 1"/></asset>' + QUATERNION
     monkeypatch.setattr(mjcf_compile, "MEMORY", 250_000_000)
     with pytest.raises(eg.ModelError, match=r"MuJoCo (needs more memory|refuses it|crashes|ends)"):
         eg.load(model(text))
@@ -209,10 +209,10 @@ def test_a_crash_of_mujoco_is_an_error(model: Any, monkeypatch: pytest.MonkeyPat
     program.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGSEGV)")
     monkeypatch.setattr(mjcf_compile, "_PROGRAM", program)
     with pytest.raises(eg.ModelError, match=r"MuJoCo crashes on it \(SIGSEGV\)"):
-        eg.load(model(BALL))
+        eg.load(model(QUATERNION))
     program.write_text("raise SystemExit(3)")
     with pytest.raises(eg.ModelError, match=r"MuJoCo ends without a model \(exit 3\)"):
-        eg.load(model(BALL))
+        eg.load(model(QUATERNION))
 
 
 def test_the_process_of_mujoco_opens_no_file(model: Any) -> None:
@@ -248,7 +248,7 @@ def test_the_process_makes_what_mujoco_makes(model: Any) -> None:
     """All arrays that come back, to the bit, of a model with most that is left out or replaced on the way."""
     part = '<asset><texture name="grid" type="2d" builtin="checker" width="99" height="99"/></asset>'
     model(part + '<asset><material name="paint" texture="grid"/></asset>', "part.xml")
-    model(BALL, "other.xml")
+    model(QUATERNION, "other.xml")
     path = model(RICH)
     ours = mjcf_compile.compile_mjcf(_text(path), read_xml(path))
     theirs = mujoco.MjModel.from_xml_path(str(path))
@@ -268,14 +268,14 @@ def _text(path: Path) -> Text:
 
 def test_refusals_of_mujoco_name_the_file_and_line_of_the_user(model: Any) -> None:
     part = model('\n\n<worldbody>\n<body name="b">\n<joint type="screw"/></body></worldbody>', "sub/part.xml")
-    path = model('\n<include file="sub/part.xml"/>' + BALL)
+    path = model('\n<include file="sub/part.xml"/>' + QUATERNION)
     with pytest.raises(
         eg.ModelError, match=r"sub/part.xml:6: mujoco: MuJoCo refuses it: .*line 6 of part.xml"
     ) as caught:
         eg.load(path)
     assert caught.value.problems[0].file == os.path.realpath(part)
     other = model('<worldbody>\n<body name="b"><geom size="1" shape="round"/></body></worldbody>', "sub/other.xml")
-    path = model('<asset><model name="o" file="sub/other.xml"/></asset>' + BALL)
+    path = model('<asset><model name="o" file="sub/other.xml"/></asset>' + QUATERNION)
     with pytest.raises(eg.ModelError, match=rf"{other}:3: mujoco: .*unrecognized attribute: 'shape'"):
         eg.load(path)
 
@@ -284,7 +284,7 @@ def test_all_files_together_are_bounded(model: Any, monkeypatch: pytest.MonkeyPa
     start = "".join(f'<include file="p{k}.xml"/>' for k in range(4))
     for k in range(4):
         model("<option/>" * 20, f"p{k}.xml")
-    path = model(start + BALL)
+    path = model(start + QUATERNION)
     for name, value, said in (
         ("SIZE", 500, "is too large"),
         ("ELEMENTS", 70, "too many elements"),
@@ -299,7 +299,7 @@ def test_all_files_together_are_bounded(model: Any, monkeypatch: pytest.MonkeyPa
 
 def test_models_that_attach_each_other_are_counted(model: Any) -> None:
     """Each attaches the one before it ten times: a hundred thousand bodies from six files."""
-    model(BALL, "m0.xml")
+    model(QUATERNION, "m0.xml")
     for k in range(1, 6):
         attach = "".join(f'<attach model="m" body="ball" prefix="p{n}"/>' for n in range(10))
         asset = f'<asset><model name="m" file="m{k - 1}.xml"/></asset>'

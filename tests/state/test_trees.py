@@ -16,7 +16,7 @@ import eomgen as eg
 from eomgen.api.equations import Equations
 from eomgen.equations import METHODS
 from eomgen.kinematics import analyse
-from eomgen.kinematics.mobility import judge
+from eomgen.kinematics.mobility import find_mobility
 
 STEPS = {
     "revolute": "RZ",
@@ -31,7 +31,7 @@ STEPS = {
 
 def module_of(made: Random, method: str = "embedding", target: str = "numpy") -> Any:
     kinematics = analyse(made.mechanism)
-    return Equations(kinematics, judge(kinematics), METHODS[method](kinematics)).compile(target)
+    return Equations(kinematics, find_mobility(kinematics), METHODS[method](kinematics)).compile(target)
 
 
 def random_state(module: Any, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

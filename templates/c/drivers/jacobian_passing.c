@@ -8,9 +8,9 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     if (!(weakest < CROSSINGS_NEAR) || (status != 0 && status != EOMGEN_PARTITION_BAD)) {
         return status;
     }
-    double pace, speed;
-    const double reach = interpolate_best(t, x, u, c, weakest, &pace, &speed, w);
-    if (!(reach > 0.0) || !(set_out(t, u, c, reach, pace, speed, w) > 0.0)) {
+    double time_per_length, speed;
+    const double reach = interpolate_best(t, x, u, c, weakest, &time_per_length, &speed, w);
+    if (!(reach > 0.0) || !(set_out(t, u, c, reach, time_per_length, speed, w) > 0.0)) {
         return status;
     }
     for (int k = 0; k < NX * NX; k++) {
@@ -18,8 +18,8 @@ static int jacobian_driver(double t, const double *restrict x, const double *res
     }
     for (int pair = 1; pair <= PAIRS; pair++) {
         for (int side = 0; side < 2; side++) {
-            const double at = t + (side ? -reach : reach) * pair * pace;
-            const double *const p = next_point(t, u, c, pair, side, reach, pace, w);
+            const double at = t + (side ? -reach : reach) * pair * time_per_length;
+            const double *const p = next_point(t, u, c, pair, side, reach, time_per_length, w);
             for (int k = 0; k < NX && p != NULL; k++) {
                 state[k] = k < NQ ? p[k] : w[AT_STATE + k];
             }

@@ -6,7 +6,7 @@ static const double WEIGHT[4][PAIRS] = {{ 2.0 / 3, -1.0 / 6, 0.0, 0.0, 0.0 },
 
 /* The point that follows on a side (0: ahead, 1: behind) of the curve, from those before; its place, or NULL. */
 static double *next_point(double t, const double *restrict u, const double *restrict c, int pair, int side,
-                          double reach, double pace, double *restrict w)
+                          double reach, double time_per_length, double *restrict w)
 {
     const double distance = (side ? -reach : reach) * pair;
     double *const p = w + AT_POINTS + (side * PAIRS + pair - 1) * NQ;
@@ -18,26 +18,26 @@ static double *next_point(double t, const double *restrict u, const double *rest
         const double before = pair > 2 ? p[k - 2 * NQ] : q[k], first = pair > 3 ? p[k - 3 * NQ] : q[k];
         p[k] = pair == 2 ? 2.0 * p[k - NQ] - q[k] : 3.0 * (p[k - NQ] - before) + first;
     }
-    return find_point(t + distance * pace, u, c, distance, p, w) ? p : NULL;
+    return find_point(t + distance * time_per_length, u, c, distance, p, w) ? p : NULL;
 }
 
 /* Interpolates [q v x'] into w + AT_SUMS, by pairs of points up to five reaches away. What it errs by in accelerations,
    infinite if there is no such curve, or the change point is not near its middle. */
 static double interpolate(double t, const double *restrict u, const double *restrict c, double here, double reach,
-                          double pace, double speed, double *restrict w)
+                          double time_per_length, double speed, double *restrict w)
 {
     double *const sums = w + AT_SUMS, *const state = w + AT_NEXT, *const x_dot = state + NQ + N;
     const double *const s = w + AT_SCALES;
     double around, weakest, total = 0.0, last[3] = {0.0, 0.0, 0.0};
     partition parts;
-    around = set_out(t, u, c, reach, pace, speed, w);
+    around = set_out(t, u, c, reach, time_per_length, speed, w);
     for (int k = 0; k < 4 * VALUES; k++) {
         sums[k] = 0.0;
     }
     for (int pair = 1; pair <= PAIRS; pair++) {
         for (int side = 0; side < 2; side++) { /* no curve: around = 0 */
-            const double at = t + (side ? -reach : reach) * pair * pace;
-            const double *const p = around > 0.0 ? next_point(t, u, c, pair, side, reach, pace, w) : NULL;
+            const double at = t + (side ? -reach : reach) * pair * time_per_length;
+            const double *const p = around > 0.0 ? next_point(t, u, c, pair, side, reach, time_per_length, w) : NULL;
             if (p == NULL) {
                 return HUGE_VAL;
             }

@@ -14,7 +14,8 @@ static void step_along(double t, const double *restrict u, const double *restric
 }
 
 /* Tangent basis, heading and direction, from a first point of the curve for the velocities v; its weakest pivot, or 0. */
-static double set_out(double t, const double *restrict u, const double *restrict c, double reach, double pace,
+static double set_out(double t, const double *restrict u, const double *restrict c, double reach,
+                      double time_per_length,
                    double speed, double *restrict w)
 {
     partition parts;
@@ -23,7 +24,8 @@ static double set_out(double t, const double *restrict u, const double *restrict
         w[AT_DIRECTION + k] = w[AT_STATE + NQ + k] / w[AT_SCALES + k] / speed;
     }
     step_along(t, u, c, reach, p, w);
-    const double weakest = bring(t + reach * pace, p, u, c, w) == 0 ? find_weakest(t + reach * pace, p, u, c, &parts, w) : 0.0;
+    const double at = t + reach * time_per_length;
+    const double weakest = bring(at, p, u, c, w) == 0 ? find_weakest(at, p, u, c, &parts, w) : 0.0;
     if (weakest == 0.0) {
         return 0.0;
     }

@@ -1,14 +1,15 @@
 /* The best interpolation of [q v x'] at the state x, to w + AT_BEST; its reach, 0 where none is better than the solution
    at x itself; whether time goes on along the curve, and how fast the state moves (scaled). */
 static double interpolate_best(double t, const double *restrict x, const double *restrict u, const double *restrict c,
-                               double here, double *restrict pace, double *restrict speed, double *restrict w)
+                               double here, double *restrict time_per_length, double *restrict speed,
+                               double *restrict w)
 {
     double *const best = w + AT_BEST, *const state = w + AT_STATE;
     double least = HUGE_VAL, found = 0.0;
-    *pace = *speed = 0.0;
+    *time_per_length = *speed = 0.0;
     (void)rate_block(t, x, u, c, w + AT_RATE, w);
     for (int i = 0; i < M; i++) {
-        *pace = w[AT_RATE + i] != 0.0 ? 1.0 : *pace;
+        *time_per_length = w[AT_RATE + i] != 0.0 ? 1.0 : *time_per_length;
     }
     for (int k = 0; k < NQ + N; k++) {
         state[k] = x[k];
@@ -18,10 +19,10 @@ static double interpolate_best(double t, const double *restrict x, const double 
     if (!(*speed > CROSSINGS_STILL)) {
         return 0.0;
     }
-    *pace /= *speed;
+    *time_per_length /= *speed;
     const double square = *speed * *speed, lost = fmax(here, CROSSINGS_WEAKEST);
     for (double reach = CROSSINGS_REACH; reach >= CROSSINGS_SHORTEST && !(least <= CROSSINGS_GOOD * square); reach *= 0.5) {
-        const double error = interpolate(t, u, c, here, reach, *pace, *speed, w);
+        const double error = interpolate(t, u, c, here, reach, *time_per_length, *speed, w);
         if (error < least) {
             least = error, found = reach;
             for (int k = 0; k < VALUES; k++) {

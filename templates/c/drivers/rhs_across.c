@@ -10,8 +10,8 @@ static int rhs_across(double t, const double *restrict x, const double *restrict
     for (int k = 0; k < NQ + N; k++) {
         kept[k] = w[AT_X + k];
     }
-    double pace, speed;
-    const int found = interpolate_best(t, x, u, c, weakest, &pace, &speed, w) > 0.0;
+    double time_per_length, speed;
+    const int found = interpolate_best(t, x, u, c, weakest, &time_per_length, &speed, w) > 0.0;
     for (int k = 0; k < NQ + N; k++) {
         w[AT_X + k] = found ? best[k] : kept[k];
         out[k] = found ? best[NQ + N + k] : out[k];

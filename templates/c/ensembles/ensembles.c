@@ -50,10 +50,10 @@ ptrdiff_t eomgen_ensemble_memory(const eomgen_ensemble *e, const eomgen_thread *
     return e->model->n_work + e->model->n_u + e->model->n_const + rows * e->n + further + e->n_eval;
 }
 
-static long look_at_stop(void *looker, const double *t)
+static long callback_stop(void *callback_data, const double *t)
 {
     (void)t;
-    return __atomic_load_n(&((const eomgen_ensemble *)looker)->stop, __ATOMIC_RELAXED) ? 0 : EOMGEN_GLANCE;
+    return __atomic_load_n(&((const eomgen_ensemble *)callback_data)->stop, __ATOMIC_RELAXED) ? 0 : EOMGEN_CALLBACK_STRIDE;
 }
 
 /* Keep the events noted by now, as many as there is room for. */
@@ -98,7 +98,7 @@ static void run_one(eomgen_ensemble *e, eomgen_run *run, const eomgen_thread *ow
     }
     run->evaluations = run->rejected = run->steps = run->failure = run->stopped = 0;
     run->failure_time = 0.0;
-    run->look_in = EOMGEN_GLANCE;
+    run->until_callback = EOMGEN_CALLBACK_STRIDE;
     run->t = run->t_old = e->nodes[0];
     run->h_abs = e->first_step;
     memcpy(run->y, e->x0 + k * e->n, size);
@@ -131,7 +131,7 @@ void eomgen_ensemble_work(eomgen_ensemble *e, const eomgen_thread *own)
     run.rhs = e->rhs, run.jacobian = e->jacobian, run.series = e->series;
     run.c = constants, run.signals = own->signals, run.n_u = e->model->n_u, run.n = n;
     run.rtol = e->rtol, run.atol = e->atol, run.max_step = e->max_step, run.most_steps = e->max_steps;
-    run.look = look_at_stop, run.looker = e;
+    run.callback = callback_stop, run.callback_data = e;
     run.w = constants + e->model->n_const;
     run.u = run.w + e->model->n_work;
     run.y = run.u + e->model->n_u;

@@ -10,7 +10,7 @@
 /* How a trajectory ended: 0 at the end of its span, 1 at an event, or a failure of eomgen_travel or this. */
 enum { EOMGEN_BAD_PARAMETERS = -110 };
 
-enum { EOMGEN_GLANCE = 500 }; /* evaluations between looks at `stop` */
+enum { EOMGEN_CALLBACK_STRIDE = 500 }; /* evaluations between reads of `stop` */
 
 /* The trajectories of one batch and what became of them. The caller owns every array; rows belong to trajectories. Results do
    not depend on which thread or lane takes which trajectory; those in lanes differ from others within the tolerance. */

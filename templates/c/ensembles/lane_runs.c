@@ -153,7 +153,7 @@ static inline real stretch_of(real error, int order)
 
 /* Judge the steps tried: returns the lanes that have moved; sets the size of each one's next. Steps are a ninth shorter than
    SciPy's, so that fewer are rejected: less work and smaller errors, as a rejected step costs lanes as much as another. */
-static flag judge_steps(lane_run *run, real error, int order)
+static flag accept_steps(lane_run *run, real error, int order)
 {
     const flag moved = run->awake & (error < 1.0), again = run->awake & ~moved;
     const real factor = order > 0 ? 0.8 * stretch_of(error, order) : same(0.5), most = choose(run->again, same(1.0), same(10.0));
@@ -249,7 +249,7 @@ static void prepare_round(eomgen_ensemble *e, const lane_method *method, lane_ru
 static void finish_round(eomgen_ensemble *e, const lane_method *method, lane_run *run, double direction, double *constants)
 {
     run->evaluations += run->awake & run->calls;
-    const flag moved = judge_steps(run, method->error(run, run->step), method->error_order);
+    const flag moved = accept_steps(run, method->error(run, run->step), method->error_order);
     if (e->n_eval > 0) {
         sample_lanes(e, method, run, moved, direction);
     }
@@ -268,7 +268,7 @@ static void work_in_lanes(eomgen_ensemble *e, const eomgen_thread *own)
         fill_lane(e, &run, l, constants);
     }
     for (ptrdiff_t round = 0; any_of(run.active); round++) {
-        const int stopped = round % (EOMGEN_GLANCE / 8) == 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED);
+        const int stopped = round % (EOMGEN_CALLBACK_STRIDE / 8) == 0 && __atomic_load_n(&e->stop, __ATOMIC_RELAXED);
         for (int l = 0; stopped && l < W; l++) {
             if (run.active[l]) {
                 end_lane(e, &run, l, EOMGEN_STOPPED);

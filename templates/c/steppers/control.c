@@ -7,9 +7,9 @@
 
 int eomgen_ready(eomgen_run *run, double t, const double *y, double *k)
 {
-    if (run->look_in == 0) {
-        run->look_in = run->look(run->looker, &run->t);
-        run->stopped = run->look_in <= 0;
+    if (run->until_callback == 0) {
+        run->until_callback = run->callback(run->callback_data, &run->t);
+        run->stopped = run->until_callback <= 0;
     }
     for (int i = 0; run->stopped && i < run->n; i++) {
         k[i] = (double)NAN;

@@ -54,15 +54,15 @@ typedef struct {
     double failure_time;
     double *failure_state;        /* n */
     double hold;                  /* inside the present part: where tables of order 0 and 4 have their piece; NAN: at t */
-    long look_in;                 /* evaluations until look is called; below 0 never */
-    long (*look)(void *looker, const double *t); /* the next look_in, or 0 to stop the run */
-    void *looker;
+    long until_callback;          /* evaluations until callback is called; below 0 never */
+    long (*callback)(void *callback_data, const double *t); /* the next until_callback, or 0 to stop the run */
+    void *callback_data;
     eomgen_function jacobian;     /* of implicit methods */
     long differentiations, factorizations;
     const eomgen_series *series;  /* of Taylor's method */
     int order;                    /* of its next step */
     int side, expanded;           /* which half of K has the coefficients at y, and whether it has */
-    int stopped;                  /* look said so: results of evaluations are NaN from then on, and no step is taken */
+    int stopped;                  /* the callback said so: results of evaluations are NaN from then on, and no step is taken */
 } eomgen_run;
 
 /* A method; attempt forms y after a step and all stages, with x' there in the last; error is what the norm must keep
@@ -108,7 +108,7 @@ void eomgen_force(eomgen_run *run, double t, const double *y);
 extern const char *const eomgen_operations[]; /* names of the codes, then NULL */
 void eomgen_play(const eomgen_tape *tape, double t, const double *y, const double *u, const double *p, double *out);
 
-/* What an evaluation may have to do besides: look, form the inputs; 0 where the run has stopped, with NaN in k. */
+/* What an evaluation may have to do besides: call back, form the inputs; 0 where the run has stopped, with NaN in k. */
 int eomgen_ready(eomgen_run *run, double t, const double *y, double *k);
 /* Remember a failure at (t, y); and NaN into k. */
 void eomgen_note(eomgen_run *run, int status, double t, const double *y);
@@ -117,7 +117,7 @@ void eomgen_failed(eomgen_run *run, int status, double t, const double *y, doubl
 /* x' at (t, y) into k; NaN where the right-hand side fails, which is remembered. */
 static inline void eomgen_evaluate(eomgen_run *run, double t, const double *y, double *k)
 {
-    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, k)) {
+    if ((--run->until_callback == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, k)) {
         return;
     }
     const int status = run->rhs(t, y, run->u, run->c, k, run->w);

@@ -20,7 +20,7 @@ static void taylor_begin(eomgen_run *run)
 /* Coefficients at (t, y) into rows; the status, or EOMGEN_STOPPED. */
 static int taylor_expand(eomgen_run *run, double t, const double *y, double *rows)
 {
-    if ((--run->look_in == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, rows)) {
+    if ((--run->until_callback == 0 || run->stopped || run->signals != NULL) && !eomgen_ready(run, t, y, rows)) {
         return EOMGEN_STOPPED;
     }
     int status = run->series->expand(t, y, run->u, run->c, run->order, rows, taylor_work(run));

@@ -1,5 +1,5 @@
 /* q' = N(q) v: e' = E^T w / 2 for Euler parameters e in q and angular velocities w in v (A. A. Shabana, Computational
-   Dynamics, chapter 7); BALL has their places. The length of e is kept by every step and means nothing. */
+   Dynamics, chapter 7); QUATERNION has their places. The length of e is kept by every step and means nothing. */
 static void turn(const double *restrict e, const double *restrict w, double factor, double *restrict rates)
 {
     const double x = 0.5 * factor * w[0], y = 0.5 * factor * w[1], z = 0.5 * factor * w[2];
@@ -16,9 +16,9 @@ EOMGEN_SHARED void move(double *restrict q, const double *restrict d)
             q[COORDINATE[k]] += d[k];
         }
     }
-    for (int b = 0; b < BALLS; b++) {
-        double *const e = q + BALL[b][0];
-        const double *const w = d + BALL[b][1], old[4] = {e[0], e[1], e[2], e[3]};
+    for (int b = 0; b < QUATERNIONS; b++) {
+        double *const e = q + QUATERNION[b][0];
+        const double *const w = d + QUATERNION[b][1], old[4] = {e[0], e[1], e[2], e[3]};
         const double half = 0.5 * sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
         for (int i = 0; i < 4; i++) {
             e[i] = cos(half) * old[i];
@@ -37,8 +37,8 @@ EOMGEN_SHARED void form_rates(const double *restrict q, const double *restrict v
             rates[COORDINATE[k]] = v[k];
         }
     }
-    for (int b = 0; b < BALLS; b++) {
-        turn(q + BALL[b][0], v + BALL[b][1], 1.0, rates + BALL[b][0]);
+    for (int b = 0; b < QUATERNIONS; b++) {
+        turn(q + QUATERNION[b][0], v + QUATERNION[b][1], 1.0, rates + QUATERNION[b][0]);
     }
 }
 
@@ -50,7 +50,7 @@ EOMGEN_SHARED void change_rates(const double *restrict x, const double *restrict
                                 double *restrict change)
 {
     form_rates(x, dv, change);
-    for (int b = 0; b < BALLS; b++) {
-        turn(dq + BALL[b][0], x + NQ + BALL[b][1], 1.0, change + BALL[b][0]);
+    for (int b = 0; b < QUATERNIONS; b++) {
+        turn(dq + QUATERNION[b][0], x + NQ + QUATERNION[b][1], 1.0, change + QUATERNION[b][0]);
     }
 }

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 import eomgen as eg
-from eomgen.simulation.stalling import MANY, WINDOW, Crawling, Pace
+from eomgen.simulation.stalling import MANY, WINDOW, Crawling, StallCheck
 
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
@@ -61,11 +61,13 @@ def test_hard_impacts_are_no_crawl(method: str, rtol: float) -> None:
 
 
 def test_what_counts_as_a_crawl() -> None:
-    def walk(step: float, slide: float, troubled: bool = False, max_step: float = np.inf, end: float = 1.0) -> Pace:
-        pace = Pace(0.0, end, np.array([1.0, 1.0]), 1, max_step, lambda t, x: troubled)
+    def walk(
+        step: float, slide: float, troubled: bool = False, max_step: float = np.inf, end: float = 1.0
+    ) -> StallCheck:
+        check = StallCheck(0.0, end, np.array([1.0, 1.0]), 1, max_step, lambda t, x: troubled)
         for k in range(1, 3 * WINDOW):
-            pace.look(k * step, np.array([1.0, 1.0 + k * slide]))
-        return pace
+            check.look(k * step, np.array([1.0, 1.0 + k * slide]))
+        return check
 
     for slide, troubled in ((0.0, False), (1e-9, False), (1e-2, True)):
         with pytest.raises(Crawling) as caught:
