@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ..runtime.canonical import Canonical
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
+    from ..runtime.drawing import explore as _explore
     from ..runtime.minimal import Minimal
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
@@ -69,6 +70,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
+    "explore": "runtime.drawing",
 }
 
 
@@ -176,6 +178,7 @@ class Module(BoundModel):
         report = _report
         draw = _draw
         draw_branches = _draw_branches
+        explore = _explore
 
     @cached_property
     def minimal(self) -> Minimal:

@@ -103,7 +103,7 @@ def kinematics(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    named = _values(module, asked) if asked or not (limits or grid) else {}
+    named = range_values(module, asked) if asked or not (limits or grid) else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()
     with stage("kinematics"):
@@ -172,7 +172,8 @@ def _count(text: str) -> int:
         raise UsageError(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
 
 
-def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+def range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+    """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
     if not asked:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.pictures import FAINT
 from ..numeric.scales import Array
 from ..texts import visible
 from .near_names import read_names, require, unknown
@@ -282,7 +283,7 @@ def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[l
     panels = []
     for panel in _grouped(trajectory, names, frequencies[1:], rows):
         top = max(float(y.max()) for _, _, y in panel.curves)
-        curves = [(name, f, np.maximum(y, top * 1e-9)) for name, f, y in panel.curves]
+        curves = [(name, f, np.maximum(y, top * FAINT)) for name, f, y in panel.curves]
         panels.append(panel._replace(curves=curves, logarithmic=True))
     return panels, "frequency (Hz)"
 

@@ -42,22 +42,8 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
         axes=["x", "y", "z"],
     )
     times = [0.0] if motion is None else motion.clock.tolist()
-    for item in scene.items:
-        plot += _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
-    for label in scene.labels:
-        places = [
-            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
-            for k in range(len(times))
-        ]
-        plot += viewer.text(
-            escape(label.text),
-            is_html=True,  # else underscores would be read as TeX
-            position=_over_time(times, places),
-            color=_number("#444444" if label.role == "joint" else color_of(label)),
-            size=0.7,
-            label_box=False,
-            name=f"name {label.text}",
-        )
+    for one in _objects(viewer, scene, times):
+        plot += one
     middle = 0.5 * (scene.low + scene.high)
     if scene.view is not None:
         middle, toward, up = middle @ scene.view, scene.view[2], scene.view[1]
@@ -73,6 +59,47 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
     if motion is not None:
         plot.fps = motion.fps
     return plot
+
+
+def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
+    """What k3d shows of a scene: items, then names."""
+    found = [
+        _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
+        for item in scene.items
+    ]
+    for label in scene.labels:
+        places = [
+            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
+            for k in range(len(times))
+        ]
+        found.append(
+            viewer.text(
+                escape(label.text),
+                is_html=True,  # else underscores would be read as TeX
+                position=_over_time(times, places),
+                color=_number("#444444" if label.role == "joint" else color_of(label)),
+                size=0.7,
+                label_box=False,
+                name=f"name {label.text}",
+            )
+        )
+    return found
+
+
+def move_objects(plot: Any, scene: Scene) -> None:
+    """Show another position of a scene on a plot that shows one; what has changed is sent, and no more."""
+    made = _objects(k3d("a picture in a browser"), scene, [0.0])
+    if [one.name for one in made] != [one.name for one in plot.objects]:
+        for one in plot.objects:
+            plot -= one
+        for one in made:
+            plot += one
+        return
+    for old, new in zip(plot.objects, made, strict=True):
+        for trait in ("vertices", "indices", "model_matrix", "position"):
+            value = getattr(new, trait, None)
+            if value is not None and not np.array_equal(getattr(old, trait), value, equal_nan=True):
+                setattr(old, trait, value)
 
 
 def _over_time(times: list[float], values: list[Array]) -> Any:

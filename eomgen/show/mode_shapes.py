@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import EvaluationError
 from ..files.path_names import as_path
+from ..limits.pictures import STEP
 from .animate import write
 from .build_scene import build_scene
 from .data import Array, read_picture
@@ -23,7 +24,6 @@ PERIOD = 2.0  #: seconds in which a mode is shown
 FPS = 12.0  #: of the pictures in a notebook
 SWING = 0.15  #: of the extent: the largest displacement of a point that is shown
 TURN = 0.5  #: the largest angle by which a body turns (rad)
-STEP = 1e-5  #: of the coordinates, for the displacements of points
 TRIES = 6  #: halvings of a swing that the loops do not allow
 CELL = 3.0  #: edge of a picture in a row (inch)
 
