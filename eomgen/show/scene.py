@@ -234,6 +234,9 @@ def link_items(data: PictureData, points: list[Array], symbol: float, extent: fl
     hidden = data.hidden
     blocks = {joint.S.body for joint in data.joints if joint.pieces and joint.slides and _is_block(data, joint, symbol)}
     wheels = {element["marker"].body for element in data.elements if element["kind"] in ("wheel", "contour")}
+    for element in data.elements:  # those that its circles, its rack or its law of lift show
+        ends = {"circles": ("a", "b", "beside"), "rack": ("a",), "lift": ("a",)}.get(element["kind"], ())
+        wheels |= {data.joints[element[end]].S.body for end in ends if element[end] is not None}
     rods = {frame.body for joint in data.joints if joint.slides and joint.pieces for frame in (joint.P, joint.S)}
     for k, name in enumerate(data.bodies):
         if k in shaped or k in hidden:

@@ -87,7 +87,8 @@ def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> 
         )
     times = np.linspace(start, end, max(count, 2))
     slow = "" if abs(speed - 1.0) < ROUNDED else f"  x{speed:.2g}"
-    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.2f} s{slow}" for now in times], times)
+    digits = max(2, 2 - int(np.floor(np.log10(span))))
+    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s{slow}" for now in times], times)
 
 
 def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:

@@ -77,7 +77,7 @@ def gif_bytes(frames: Frames) -> bytes:
     sheet = Image.new("RGB", (images[0].width, images[0].height * len(several)))
     for k, image in enumerate(several):
         sheet.paste(image, (0, k * image.height))
-    palette = sheet.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE)
+    palette = sheet.quantize(COLORS)
     reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     # a GIF counts hundredths of a second; pillow joins equal frames, which keeps the time
     duration = max(20, round(100.0 / frames.motion.fps) * 10)
