@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 ROW = 0.165  #: height of a line of a legend (inch)
 LOWEST = 1.9  #: height of a panel (inch)
 DASHES = ("-", "--", ":", "-.")
+ALIKE = 20.0  #: ratio of the extents of a path of a point, at most
 COLOURS = 10  #: of matplotlib's cycle
 IN_A_COLUMN = 20  #: names of a legend
 
@@ -199,8 +200,17 @@ def over_time(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None 
         return _grouped(trajectory, names, t, columns), "t (s)"
     panels = _grouped(trajectory, names, columns[x], columns)
     unit = trajectory.units.get(x, "")
-    alike = [unit == "m" == trajectory.units.get(panel.curves[0][0], "") for panel in panels]
+    alike = [_one_scale(columns[x], unit, p, trajectory.units.get(p.curves[0][0], "")) for p in panels]
     return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], label(x, unit)
+
+
+def _one_scale(x: Array, unit: str, panel: Curves, other: str) -> bool:
+    """Whether both axes are lengths, or may be: one has no unit, and both run over about as much."""
+    if unit == other == "m":
+        return True
+    y = np.concatenate([values for _, _, values in panel.curves])
+    wide, high = float(np.ptp(x)), float(np.ptp(y))
+    return {unit, other} <= {"m", ""} and max(wide, high) <= ALIKE * min(wide, high)
 
 
 def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:
