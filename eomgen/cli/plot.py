@@ -59,13 +59,24 @@ class Picture(NamedTuple):
     kind: str = "time"
 
 
+def check_picture(file: Path | None, picture: Picture) -> None:
+    """Fail before the work if nothing can be drawn, or if it is said what to draw and not where.
+
+    Raises
+    ------
+    MissingDependencyError, UsageError
+    """
+    if file is not None:
+        require_plotting(file)
+    elif picture != Picture():
+        raise UsageError("--columns, --against and --plot-as say what --plot FILE draws; give it too")
+
+
 def picture_options(verb: Callable[..., Any]) -> Callable[..., Any]:
     """``--columns``, ``--against`` and ``--plot-as``, handed to the verb as one ``picture``."""
 
     @functools.wraps(verb)
     def wrapped(*args: Any, columns: tuple[str, ...], against: str | None, plot_as: str, **kwargs: Any) -> Any:
-        if (columns or against or plot_as != "time") and kwargs.get("plot") is None:
-            raise UsageError("--columns, --against and --plot-as say what --plot FILE draws; give it too")
         return verb(*args, picture=Picture(columns, against, plot_as), **kwargs)
 
     for option in reversed(_PICTURE):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .failures import reports_failures
-from .plot import Picture, find_paths, picture_options, plot_run, require_plotting
+from .plot import Picture, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
 from .shared_options import (
     blaming_option,
@@ -91,8 +91,7 @@ def kinematics(
     grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
-    if plot is not None:
-        require_plotting(plot)
+    check_picture(plot, picture)
     require_folder("--out", out)
     require_folder("--plot", plot)
 

@@ -11,7 +11,7 @@ import click
 
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
-from .plot import Picture, find_paths, picture_options, plot_run, require_plotting
+from .plot import Picture, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 from .shared_options import (
     baumgarte_option,
@@ -112,8 +112,7 @@ def run(
     chosen = parse_settings(settings)
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: a run is written as {' or '.join(TABLES)}")
-    if plot is not None:
-        require_plotting(plot)
+    check_picture(plot, picture)
     if animate is not None:
         from ..show.writers import require_kind
 

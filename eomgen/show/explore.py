@@ -20,6 +20,7 @@ STEPS = 200  #: of a slider
 LEAPS = 40  #: of a slider's range: positions at which loops are closed on the way
 TRIED = 1.01  #: factor by which a parameter is changed to see whether it matters for the picture
 HEIGHT = 420
+ROOM = 0.2  #: of the picture's size, left free on each side
 
 
 class Explorer:
@@ -43,7 +44,9 @@ class Explorer:
         self.module, self.q, self.message = module, np.array(start), ""
         scene = build_scene(module, self.q[:, None])
         self._size = float((scene.high - scene.low).max())
-        self._plot = scene_plot(scene, height=HEIGHT)
+        room = ROOM * (scene.high - scene.low)  # for what the sliders do
+        self._plot = scene_plot(scene._replace(low=scene.low - room, high=scene.high + room), height=HEIGHT)
+        self._plot.menu_visibility = False
         self._says = self._kit.HTML()
         places = {name: float(start[k]) for name, k in self._moved().items()}
         constants = {name: float(value) for name, value in zip(module.p_names, module.p, strict=True)}
@@ -70,13 +73,14 @@ class Explorer:
         return (value - reach if low is None else low), (value + reach if high is None else high)
 
     def _slider(self, name: str, value: float, ends: tuple[float, float]) -> Any:
-        low, high = min(ends[0], value), max(ends[1], value)
+        step = (ends[1] - ends[0]) / STEPS
+        low, high = (value + step * np.fix((end - value) / step) for end in ends)  # the value is on a step
         unit = self.module.layout.unit(name)
         slider = self._kit.FloatSlider(
             value=value,
             min=low,
             max=high,
-            step=(high - low) / STEPS,
+            step=step,
             description=f"{name} ({unit})" if unit else name,
             readout_format=".3g",
             style={"description_width": "9em"},
