@@ -254,6 +254,6 @@ class Ensemble:
         return f"<Ensemble of {self._module.name}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"
 
     def _repr_html_(self) -> str:
-        from .notebook import ensemble_html
+        from .ensemble_display import ensemble_html
 
         return ensemble_html(self)

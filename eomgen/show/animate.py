@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 from ..files.path_names import as_path
 from ..files.writing import whole_file
-from .frames import DPI, Frames
+from .film_frames import DPI, Frames
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows
 from .writers import WRITERS, kind_of, require_kind
 
 
-class Curve(NamedTuple):
+class ShownColumn(NamedTuple):
     """A column of the run that is drawn along: its name and unit, and its values over what goes on."""
 
     label: str
@@ -51,7 +51,7 @@ def animate(
     still = motion.t[0] == motion.t[-1]
     over = motion.over if still else trajectory.t
     units = trajectory.units
-    curves = [Curve(f"{n} ({units[n]})" if units.get(n) else n, over, values) for n, values in columns.items()]
+    curves = [ShownColumn(f"{n} ({units[n]})" if units.get(n) else n, over, values) for n, values in columns.items()]
     return write(file, scene, motion, curves, dpi)
 
 
@@ -59,7 +59,7 @@ def write(
     file: Path | str | None,
     scene: Scene,
     motion: ShownMotion,
-    curves: Sequence[Curve] = (),
+    curves: Sequence[ShownColumn] = (),
     dpi: float = DPI,
 ) -> Any:
     """Write an animation as its ending says; without a file, something that a notebook shows."""

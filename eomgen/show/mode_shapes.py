@@ -14,7 +14,7 @@ from ..limits.pictures import STEP
 from .animate import write
 from .build_scene import build_scene
 from .data import Array, read_picture
-from .frames import DPI, Frames
+from .film_frames import DPI, Frames
 from .optional import matplotlib
 from .scene import Scene, attachments
 from .shown_motion import ShownMotion

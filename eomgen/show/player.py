@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from .frames import draw_curves
+from .film_frames import draw_curves
 from .optional import matplotlib
 from .shown_motion import ShownMotion
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import MissingDependencyError, UsageError
 from ..files.writing import refuse_link, whole_file
-from .frames import Frames
+from .film_frames import Frames
 from .optional import k3d, matplotlib
 
 COLORS = 64  #: of a GIF
