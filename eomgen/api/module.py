@@ -6,11 +6,12 @@ Analyses and runs call each other's functions: a subclass that overrides a metho
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
-from ..errors import left_out
+from ..errors import UnavailableError, left_out
 from ..runtime.argument_names import both_names
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from ..runtime.canonical import Canonical
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
+    from ..runtime.drawing import explore as _explore
     from ..runtime.minimal import Minimal
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
@@ -68,6 +70,7 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
+    "explore": "runtime.drawing",
 }
 
 
@@ -87,15 +90,15 @@ def find_function(file: str, name: str) -> Any:
     MissingDependencyError
         A slim package was generated without it.
     """
-    module = None
     try:
-        module = import_module(f"..{file}", __package__)
+        found = getattr(import_module(f"..{file}", __package__), name, None)
     except ModuleNotFoundError as error:
+        found = None
         if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
             raise  # something else that it needs
-    if not hasattr(module, name):
+    if found is None:
         raise left_out(name.lower())
-    return getattr(module, name)
+    return found
 
 
 class LateMethod:
@@ -103,14 +106,12 @@ class LateMethod:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.function: Any = None
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
-        if self.function is None:
-            self.function = self._find()
         return self.function if model is None else MethodType(self.function, model)
 
-    def _find(self) -> Any:
+    @cached_property
+    def function(self) -> Any:
         found = CALLS[self.name]
         return both_names(found if callable(found) else find_function(found, self.name))
 
@@ -198,6 +199,7 @@ class Module(BoundModel):
         report = _report
         draw = _draw
         draw_branches = _draw_branches
+        explore = _explore
         minimal: Minimal
         canonical: Canonical
         dae: Dae
@@ -222,10 +224,12 @@ class Module(BoundModel):
 
         return line(self)
 
-    def _repr_html_(self) -> str:
-        from ..runtime.summary import html
-
-        return html(self)
+    def _repr_html_(self) -> str | None:
+        try:
+            from ..runtime.notebook import module_html
+        except UnavailableError:  # a slim package has none
+            return None
+        return module_html(self)
 
 
 for _name in CALLS:

@@ -102,14 +102,15 @@ def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[...,
     )
 
 
-def _split(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that are given one by one or separated by commas."""
     return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
 
 
 independent_option = click.option(
     "--independent",
     multiple=True,
-    callback=_split,
+    callback=split_names,
     metavar="NAME",
     help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
 )

@@ -27,6 +27,5 @@ def last_state(given: Any, names: Sequence[str]) -> Any:
     if not isinstance(given, Trajectory):
         return given
     if tuple(given.x_names) != tuple(names):
-        own = ", ".join(names)
-        raise UsageError(f"initial: the run has states [{', '.join(given.x_names)}], and the model has [{own}]")
+        raise UsageError(f"initial: the run has states {', '.join(given.x_names)}; the model has {', '.join(names)}")
     return given.x[:, -1]

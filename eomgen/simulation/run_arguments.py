@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,8 +28,6 @@ def find_span(span: Span, declared: float) -> tuple[float, float]:
     if span is None:
         return 0.0, declared
     if isinstance(span, (tuple, list)):
-        if len(span) == 2 and type(span[0]) is type(span[1]) is float and isfinite(span[0]) and isfinite(span[1]):
-            return span[0], span[1]
         span = [
             read_value("span must be (start, end) in seconds: an end", end) if isinstance(end, str) else end
             for end in span

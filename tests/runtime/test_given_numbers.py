@@ -49,7 +49,7 @@ def test_a_run_goes_on_from_the_last_state_of_another(mod: Any) -> None:
     many = mod.simulate_many(1.0, initial=first, parameters={"g": [9.81, 1.62]})
     np.testing.assert_array_equal(many.x[:, 0], mod.simulate((0, 1.0), first).x[:, -1])
     other = models.build("slider_crank").compile(target="numpy")
-    with pytest.raises(eg.UsageError, match="the run has states .theta1.*and the model has .theta, B"):
+    with pytest.raises(eg.UsageError, match="the run has states theta1.*the model has theta, B"):
         other.simulate(1.0, first)
     loop = other.simulate((0.0, 0.5))
     np.testing.assert_allclose(other.simulate((0.5, 0.6), loop).x[:, 0], loop.x[:, -1], rtol=0, atol=1e-12)
