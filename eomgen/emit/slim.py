@@ -27,7 +27,6 @@ LEFT_OUT = {
     "runtime/tree_motion": "kinematics",
     "runtime/pickling": "pickling",
     "runtime/moving": "animate",
-    "runtime/notebook": "pictures in notebooks",
     "runtime/plotting": "plot",
     "runtime/storage": "save and pickles",
     "simulation/checkpoint": "checkpoint=",
