@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..files.inline_pictures import picture_html
@@ -15,6 +14,7 @@ from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
+from ..runtime.given_start import Start
 from ..runtime.near_names import require, unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number
@@ -257,7 +257,7 @@ def workspace(
     /,
     over: Mapping[str, Any],
     of: str | Sequence[str],
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Any = None,
     *,

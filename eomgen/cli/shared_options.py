@@ -16,6 +16,7 @@ from ..files.reading import kind_of
 from ..files.writing import refuse_link
 from ..suggestions import closest
 from ..targets import TARGETS
+from .number_option import NumberRange
 
 if TYPE_CHECKING:
     from ..api.model import Model
@@ -62,7 +63,7 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
     raise click.BadParameter(f"no integrator {value!r}; there are {', '.join(SOLVERS)} (derivation: --method)")
 
 
-_TOLERANCE = click.FloatRange(min=0, min_open=True)
+_TOLERANCE = NumberRange(min=0, min_open=True)
 _SOLVER = (
     click.option(
         "--solver",
@@ -152,7 +153,7 @@ _ROBOT = (
     click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
     click.option(
         "--friction",
-        type=click.FloatRange(min=0, min_open=True),
+        type=NumberRange(min=0, min_open=True),
         metavar="VELOCITY",
         help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
     ),

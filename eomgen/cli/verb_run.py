@@ -11,6 +11,7 @@ import click
 
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
+from .number_option import NumberRange
 from .plot import Picture, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 from .shared_options import (
@@ -50,7 +51,7 @@ POINTS = 5  #: change points listed
 @baumgarte_option
 @independent_option
 @target_option("cython", "numpy")
-@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option(
     "--set",
     "settings",
@@ -71,7 +72,7 @@ POINTS = 5  #: change points listed
 )
 @click.option(
     "--checkpoint-every",
-    type=click.FloatRange(min=0),
+    type=NumberRange(min=0),
     metavar="SECONDS",
     help="Write that file so often; 60 s by default.",
 )

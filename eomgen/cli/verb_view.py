@@ -11,6 +11,7 @@ import click
 
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
+from .number_option import NumberRange
 from .screen import print_json, say, stage
 from .shared_options import (
     blaming_option,
@@ -39,7 +40,7 @@ from .verb_run import complete_parameters, sort_settings
     metavar="NAME=START:END[:COUNT]",
     help="Move a coordinate over a range, without forces, e.g. theta=0:2*pi; t for drivers.",
 )
-@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time of the run in s.")
+@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time of the run in s.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -49,8 +50,8 @@ from .verb_run import complete_parameters, sort_settings
 @click.option("--trace", multiple=True, callback=split_names, metavar="MARKER", help="Draw the way of a marker.")
 @click.option("--plot", multiple=True, callback=split_names, metavar="NAME", help="Draw columns along the animation.")
 @click.option("--forces", is_flag=True, help="Draw arrows of the forces in the joints.")
-@click.option("--speed", type=click.FloatRange(min=0, min_open=True), metavar="X", help="Seconds of the run a second.")
-@click.option("--fps", type=click.FloatRange(min=0, min_open=True), metavar="N", help="Frames a second; 25 by default.")
+@click.option("--speed", type=NumberRange(min=0, min_open=True), metavar="X", help="Seconds of the run a second.")
+@click.option("--fps", type=NumberRange(min=0, min_open=True), metavar="N", help="Frames a second; 25 by default.")
 @click.option(
     "--set",
     "settings",
