@@ -11,7 +11,7 @@ from importlib import import_module
 from types import MethodType
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UnavailableError, left_out
+from ..errors import left_out
 from ..runtime.argument_names import both_names
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
@@ -224,11 +224,9 @@ class Module(BoundModel):
 
         return line(self)
 
-    def _repr_html_(self) -> str | None:
-        try:
-            from ..runtime.notebook import module_html
-        except UnavailableError:  # a slim package has none
-            return None
+    def _repr_html_(self) -> str:
+        from ..runtime.notebook import module_html
+
         return module_html(self)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UnavailableError, UsageError
+from ..errors import UsageError
 from ..numeric.scales import Array
 from .near_names import find_lacking, require, unknown
 from .room import read_numbers
@@ -145,11 +145,9 @@ class Trajectory:
         span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, " if len(self.t) else ""
         return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
 
-    def _repr_html_(self) -> str | None:
-        try:
-            from .notebook import trajectory_html
-        except UnavailableError:  # a slim package has none
-            return None
+    def _repr_html_(self) -> str:
+        from .notebook import trajectory_html
+
         return trajectory_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -329,21 +327,15 @@ class Trajectory:
 
         return animate(self, file, model, options)
 
-    def plot(
-        self,
-        *names: str,
-        x: str | None = None,
-        y: str | Sequence[str] | None = None,
-        kind: str = "time",
-        ax: Any = None,
-    ) -> Any:
+    def plot(self, *names: str, x: str | None = None, y: Any = None, kind: str = "time", ax: Any = None) -> Any:
         """Plot columns over time, or against each other; columns of one unit share a panel.
 
         Parameters
         ----------
         *names : str
             Columns; all coordinates by default.
-        x, y : str
+        x : str
+        y : str or sequence of str
             A column to draw others against: ``plot(x="tip_x", y="tip_y")`` is the path of a point.
         kind : {'time', 'phase', 'energy', 'residuals', 'spectrum'}
             ``phase``: rates over coordinates; ``energy``: kinetic, potential, total and its change; ``residuals`` of

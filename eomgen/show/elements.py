@@ -13,7 +13,8 @@ from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
 
-TEETH = 24  #: of a pinion, as long as the rack that is drawn
+TEETH = 24  #: of a pinion
+RACK = 14  #: those of its rack that are drawn
 BESIDE = 2.4  #: distance of elements between the same points, in sizes of a symbol
 
 
@@ -217,7 +218,7 @@ def _rack(data: PictureData, element: dict[str, Any], symbol: float, poses: Arra
     # n x e = d of the unit vector e to the pitch point, where the pinion's speed is radius times its rate along d
     out = np.sign(radius) * np.cross(d, n)
     tooth = 2.0 * np.pi * abs(radius) / TEETH
-    steps = np.arange(-TEETH // 2, TEETH // 2 + 1)
+    steps = np.arange(-RACK // 2, RACK // 2 + 1)
     heights = np.where(steps % 2 == 0, 0.25, -0.25) * tooth
     line = center + abs(radius) * out + np.outer(steps * tooth, d) + np.outer(heights, out)
     back = center + (abs(radius) + tooth) * out + np.outer(steps[[-1, 0, 0]] * tooth, d)
