@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import re
 from pathlib import Path
 
@@ -11,6 +10,8 @@ import click
 
 from ..errors import UsageError
 from ..files.writing import write_whole
+from ..suggestions import hint
+from ..syntax_trees import parse_module
 from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say
@@ -21,7 +22,7 @@ def describe_example(file: Path) -> str:
     """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
     text = file.read_text(encoding="utf-8")
     if file.name.endswith(".py"):
-        return (ast.get_docstring(ast.parse(text)) or "").split("\n", 1)[0]
+        return (ast.get_docstring(parse_module(text)) or "").split("\n", 1)[0]
     if file.name.endswith(".urdf"):
         comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
         return " ".join(comment.group(1).split()) if comment else ""
@@ -56,9 +57,8 @@ def examples(name: str | None, force: bool, as_json: bool) -> None:
 def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
     file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
     if file is None:
-        near = difflib.get_close_matches(name, found, 1)
-        hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(found)}"
-        raise UsageError(f"no example {name!r}; {hint}")
+        near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
+        raise UsageError(f"no example {name!r}; {near}")
     target = Path(file.name)
     if target.exists() and not force:
         raise UsageError(f"{target} exists; add --force to overwrite it")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import ROUNDED, SAME
+from ..suggestions import hint
 from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
@@ -86,9 +86,8 @@ def _tracked(data: PictureData, name: str) -> PlacedFrame:
     if name in data.bodies:
         return PlacedFrame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
-    near = get_close_matches(str(name), known, 1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-    raise UsageError(f"no marker or body {name!r} to trace; {hint}")
+    near = hint(name, known, quoted=False) or f"there are {', '.join(known)}"
+    raise UsageError(f"no marker or body {name!r} to trace; {near}")
 
 
 def _with_ground(poses: Array) -> Array:
@@ -111,9 +110,10 @@ def _labels(data: PictureData, points: list[Array]) -> list[Label]:
     labels: list[Label] = []
     at: dict[tuple[Any, ...], list[str]] = {}
     for joint in data.joints:
-        if joint.pieces:
-            frame = joint.S if joint.P.body == GROUND else joint.P
-            at.setdefault((frame.body, *np.round(frame.position, 9).tolist()), []).append(joint.name)
+        if joint.pieces:  # joints on one pin are named together
+            frames = [frame for frame in (joint.P, joint.S) if frame.body != GROUND]
+            keys = [(frame.body, *np.round(frame.position, 9).tolist()) for frame in frames]
+            at.setdefault(next((key for key in keys if key in at), keys[0]), []).append(joint.name)
     labels += [Label(", ".join(names), key[0], np.array(key[1:]), "joint") for key, names in at.items()]
     for k, name in enumerate(data.bodies):
         if k in data.hidden:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..runtime.layout import Layout
 from ..runtime.trajectory import Trajectory
-from .events import is_told_by_the_caller
+from .events import calls_within, is_told_by_the_caller
 
 SHOWN = 4  #: limits that a warning names
 
@@ -38,8 +38,8 @@ def passed_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: flo
     return found
 
 
-def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: float, depth: int) -> None:
-    """Tell of limits that a run passes, ``depth`` calls below that of the user."""
+def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: float) -> None:
+    """Tell the line of the user's that called of limits that a run passes."""
     found = [] if is_told_by_the_caller() else passed_limits(trajectory, layout, rtol, atol)
     if found:
         more = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
@@ -47,5 +47,5 @@ def warn_of_limits(trajectory: Trajectory, layout: Layout, rtol: float, atol: fl
             f"the run passes limits of joints: {'; '.join(found[:SHOWN])}{more}. Nothing stops there: a robot loaded "
             "with limits='stop' has stops, a model file can have forces of type stop; limits: off is silent",
             LimitWarning,
-            stacklevel=depth + 1,
+            stacklevel=calls_within() + 1,
         )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
@@ -37,8 +38,8 @@ OPTIONS = (
 def simulate(
     module: BoundModel,
     /,
-    span: float | tuple[float, float] | None = None,
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    span: Span = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Mapping[str, Any] | None = None,
     *,
@@ -63,8 +64,9 @@ def simulate(
     ----------
     span : (float, float) or float, optional
         Start and end (s); the end alone for a start at 0; the model's own end by default.
-    initial : mapping of str to float, or (n_x,) array, optional
-        Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints.
+    initial : mapping of str to float, (n_x,) array, or Trajectory, optional
+        Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints; of a
+        run, its last state.  Here, in `span` and in `parameters` a text is an expression of numbers: ``"deg(30)"``.
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional
@@ -235,7 +237,7 @@ def simulate(
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
     if bound.layout.limits:
         atol = float(np.max(options.get("atol", 0.0)))
-        warn_of_limits(made, bound.layout, float(options.get("rtol", 0.0)), atol, depth=2)
+        warn_of_limits(made, bound.layout, float(options.get("rtol", 0.0)), atol)
     return made
 
 
