@@ -69,7 +69,7 @@ BROKEN = [
     ("value: tau}", "value: speed}", 21, "forces.motor.value", "unknown name 'speed'", "known here"),
     ("axis: x", "axis: w", 19, "joints.D.axis", "'w' is not an axis", "x, y, z, -x, -y, -z or three numbers"),
     ("axis: x", "axis: [0, 0, 0]", 19, "joints.D.axis", "no length", "three numbers"),
-    ("axis: x", "axes: x", 19, "joints.D.axes", "unknown key", "did you mean 'axis'?"),
+    ("axis: x", "axs: x", 19, "joints.D.axs", "unknown key", "did you mean 'axis'?"),
     ("type: prismatic", "type: prismatik", 19, "joints.D.type", "no joint of type 'prismatik'", "'prismatic'"),
     ("{type: prismatic, ", "{", 19, "joints.D.type", "is missing", "revolute, continuous"),
     ("between: [ground, slider], axis", "axis", 19, "joints.D.between", "is missing", "two markers"),
