@@ -74,6 +74,15 @@ class Linearization:
         n_z = len(states) - layout.n_dof if tangent is not None else layout.n_q
         self.position_names, self.velocity_names = states[:n_z], states[n_z:]
 
+    @property
+    def to_x(self) -> Array:
+        """(n_x, n) array: dx = to_x @ s is the change of the state x; columns are tangent to the constraints.
+
+        A small rotation changes the four Euler parameters of its joint, dependent coordinates follow the independent
+        ones.  In the full form it is the identity.
+        """
+        return np.eye(len(self.states)) if self.tangent is None else np.array(self.tangent.T, dtype=float)
+
     @cached_property
     def _sorted(self) -> tuple[Any, Any]:
         values, vectors = algebra.eig(self.A)
