@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.motions import ALIGNED, POOR, SAME
+from ..numeric.continuation import Continuation, Point
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
-from .driven_coordinates import DrivenCoordinates
-from .path_following import Continuation, Point, StraightPath
+from .driven_coordinates import DrivenPath
 from .singular import Singular, find_change_points, find_stop, name_singular
 
 ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean another branch
 
 
 class FollowedPath:
-    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is smooth and was walked before.
+    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is known to be smooth.
 
-    ``extent`` is that of :class:`~.path_following.Continuation`.
+    ``extent`` is that of :class:`~..numeric.continuation.Continuation`.
 
     Attributes
     ----------
@@ -30,17 +30,10 @@ class FollowedPath:
         Change points on the way.
     """
 
-    def __init__(
-        self,
-        driven: DrivenCoordinates,
-        path: StraightPath,
-        start: Array,
-        end: float,
-        known: float = 0.0,
-        extent: float = 0.0,
-    ) -> None:
-        self.driven, self.path, self.end = driven, path, end
-        self.continuation = continuation = Continuation(driven, path, start, extent)
+    def __init__(self, path: DrivenPath, start: Array, end: float, known: float = 0.0, extent: float = 0.0) -> None:
+        self.path, self.end = path, end
+        self.driven = driven = path.driven
+        self.continuation = continuation = Continuation(path, start, extent)
         whole = continuation.to(end, known)
         self.interpolants, self.singular = find_change_points(continuation)
         self.stop: Singular | None = None
@@ -145,14 +138,13 @@ class FollowedPath:
         return q, v, a
 
     def _closer(self, s: float, guess: Array) -> Array:
-        """The position next to a guess, walked to from the nearest point if Newton's iteration goes astray."""
+        """The position next to a guess, followed to from the nearest point if Newton's iteration goes astray."""
         driven, scales = self.driven, self.driven.scales
         found = driven.position(*self.path.at(s), guess)
         if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
             return found
         before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
-        t, y = self.path.at(before.s)
-        short = Continuation(driven, StraightPath(t, y, self.path.t1, self.path.y1), before.q)
+        short = Continuation(self.path.beyond(before.s), before.q)
         short.to(s - before.s)
         return short.points[-1].q
 

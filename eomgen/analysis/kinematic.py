@@ -21,12 +21,11 @@ from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_flag, read_number, read_numbers, require_room
 from ..texts import shown
-from .driven_coordinates import DrivenCoordinates
+from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic_motion import KinematicAnalysis, keep
 from .known_range import KnownRange
 from .open_joint import describe_gap
-from .path_following import StraightPath
 from .singular import Singular
 
 if TYPE_CHECKING:
@@ -208,7 +207,7 @@ def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | No
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):
         raise UsageError(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
-    return t0, here.close(q, {}).q if layout.n_h else q
+    return t0, here.system.close(q, {}).q if layout.n_h else q
 
 
 def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
@@ -296,7 +295,7 @@ def follow_to_start(
     length = largest(np.concatenate([(y0 - y) / driven.led_scales, [t0 - t]]))
     if length <= UNMOVED:
         return q
-    followed = FollowedPath(driven, StraightPath(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
+    followed = FollowedPath(DrivenPath(driven, t, y, (t0 - t) / length, (y0 - y) / length), q, length)
     if followed.stop is not None:
         raise PartitionError(
             f"the way from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
@@ -321,10 +320,10 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
         t, y = float(asked.t[first]), asked.y[:, first]
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
         length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
-        path = StraightPath(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
+        path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
         extent = extents[0] if dt[-1] else extents[1]
-        followed = FollowedPath(driven, path, q, length, known_range.known(first, last) * length, extent)
+        followed = FollowedPath(path, q, length, known_range.known(first, last) * length, extent)
         known_range.walked(first, last, followed.smooth)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([followed.holds(s) for s in along])

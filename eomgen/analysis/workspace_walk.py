@@ -3,7 +3,7 @@
 The walk begins at the grid point next to the initial position and floods the grid, so every position hangs together
 with it by a continuous motion: the assembly mode stays.  A step from one point to the next counts only if position and
 direction come out as foretold; else it is halved; near singular positions it is walked in the small steps of
-:mod:`.path_following`, over change points too.
+:mod:`..numeric.continuation`, over change points too.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, PartitionError
 from ..limits.motions import SLACK
+from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
 from ..numeric.scales import Array
-from .driven_coordinates import DrivenCoordinates
+from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic import complete, start_from
-from .path_following import Continuation, StraightPath
 from .singular import LOW, Singular
 from .workspace_grid import Grid, Index
 
@@ -119,20 +119,20 @@ class Stage:
             y1[column] = 1.0
         return float(column < 0), y1
 
-    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[StraightPath, float]:
+    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[DrivenPath, float]:
         """The straight path between two places, and its length."""
         (t, y), (t1, y1) = start, end
         length = largest(np.concatenate([(y1 - y) / self.driven.led_scales, [t1 - t]]))
-        return StraightPath(t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
+        return DrivenPath(self.driven, t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
 
     def step(self, q: Array, start: Index, end: Index) -> tuple[Array | None, list[Singular]]:
         """The position at a neighbour, None if the way is blocked, and what is singular on the way."""
         path, length = self.path(self.at(start), self.at(end))
-        if not self.module.layout.n_c and all(self.driven.in_tree):  # an open chain goes where it is led
+        if not self.module.layout.n_c and len(self.rows) == len(self.driven.led):  # an open chain goes where it is led
             moved = q.copy()
             moved[self.rows] = path.at(length)[1]
             return moved, []
-        walk = Continuation(self.driven, path, q)
+        walk = Continuation(path, q)
         h = length
         while walk.points[-1].tangent.quality > LOW and h > FINEST * length:
             here = walk.points[-1]
@@ -147,7 +147,7 @@ class Stage:
                 return found.q, []
         here = walk.points[-1]  # near a singular position, or one is in between
         rest = length - here.s
-        followed = FollowedPath(self.driven, StraightPath(*path.at(here.s), path.t1, path.y1), here.q, rest)
+        followed = FollowedPath(path.beyond(here.s), here.q, rest)
         stop = [] if followed.stop is None else [followed.stop]
         return (None if stop else followed.position(rest)), followed.singular + stop
 
@@ -222,7 +222,7 @@ def _first(stage: Stage) -> tuple[Index, Array]:
         path, length = stage.path((stage.t, stage.y), stage.at(index))
         q: Array | None = stage.q
         if length > 0.0:
-            followed = FollowedPath(stage.driven, path, stage.q, length)
+            followed = FollowedPath(path, stage.q, length)
             q = followed.position(length) if followed.stop is None else None
             blocked = followed.stop or blocked
         if q is not None and stage.allowed(q, stage.at(index)[0]):

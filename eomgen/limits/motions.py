@@ -41,3 +41,5 @@ ASTRAY = 1e-5
 FLAT_CELL = 1e-12
 #: Scaled way to either side over which the rate of a led coordinate is differenced where it turns back.
 EXTREME = 1e-4
+#: Part of a path in time over which constraints are differenced at a position that stands still: the root of rounding.
+DRIFTED = 1e-6

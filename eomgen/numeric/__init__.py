@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
-    from .continuation import follow
     from .dependent import kinematics, solve_dependent
     from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
+    from .held_path import follow
     from .partitions import Partition, partition
     from .projection import correct_position, correct_velocity, project, tangent_projector
     from .ranks import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows
@@ -38,7 +38,7 @@ _HOMES = {
     "correct_velocity": "projection",
     "embed": "embedded",
     "embedded_mass": "embedded",
-    "follow": "continuation",
+    "follow": "held_path",
     "independent_rows": "ranks",
     "jacobian": "embedded",
     "kinematics": "dependent",

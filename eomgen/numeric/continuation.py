@@ -1,137 +1,176 @@
-"""Stage numeric: a closed position, other values of held coordinates -> the position reached by moving there steadily.
+"""Stage numeric: a curve of positions and a point on it -> points further along, without ever leaving the branch.
 
-The way to stay on the branch the mechanism is on: small steps along the straight line of the held values.
+Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
+and 6).  A step counts only if position and direction come out near to what the points before foretold: near a singular
+position another branch is near too, but runs in another direction.  A singular position itself is leapt over, to the
+point behind it that continues the motion smoothly, if there is one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ..errors import AssemblyError
-from .closure import DAMPING, ClosureSystem, WantedValues, close, closed
+from ..limits.motions import BLOCKED, LEAPS, UNJUDGED
 from .projection import largest
-from .scales import Array, Indices, Position, Scales
+from .scales import Array, Scales
 
-STEP = 0.1  #: largest scaled change of a held value in one step
-JUMP = 0.6  #: largest scaled change of any coordinate in one step
-SMALLEST = 2.0**-10  #: of STEP, before giving up
-TIMED = 0.3  #: STEP of a walk in time, which is predicted
-TRIES = 4000  #: its steps and halvings
-LONGEST = 200.0  #: scaled distance too long to walk
-TRIALS = 5000  #: steps at most, those taken back included
-
-
-def follow(
-    position: Position,
-    start: Array,
-    scales: Scales,
-    held: Indices,
-    values: Array,
-    equations: WantedValues | None = None,
-) -> Array:
-    """Move held coordinates, and functions y(q), from where they are to new values; the others follow.
-
-    Parameters
-    ----------
-    position : callable
-        q (n,) -> C (m,), C_q (m, n).
-    start : (n,) array
-        A closed position.
-    held : (k,) array of int
-        Coordinates that are led; all four Euler parameters of a rotation or none.
-    values : (k,) array
-        Their values at the end, reached exactly.
-    equations : WantedValues, optional
-        Functions of q that are led to values as well.
-
-    Returns
-    -------
-    (n,) array
-
-    Raises
-    ------
-    AssemblyError
-        The way is blocked (a dead centre of a led coordinate), longer than 200 rad or length scales, or too winding
-        for the number of steps allowed, as the many turns of a fine thread are.
-    """
-    q, target = np.array(start), np.array(start)
-    target[held] = values
-    moving = scales.velocities(held)
-    free = np.ones_like(scales.q)
-    free[moving] = 0.0
-    way = (1.0 - free) * scales.distance(target, start)
-    gap = equations.difference(equations.evaluate(q)[0]) if equations else np.empty(0)
-    length = max(largest(way), largest(gap / equations.scales) if equations else 0.0)
-    if not length <= LONGEST:
-        raise AssemblyError(f"the way from the reference position is too long ({length:.3g} rad or length scales)")
-    done, step = 0.0, min(1.0, STEP / length) if length else 1.0
-    usual, trials = step, 0
-    while done < 1.0:
-        trials += 1
-        if trials > TRIALS:
-            raise AssemblyError(f"the way is too winding: {TRIALS} steps lead through {100 * done:.0f} % of it")
-        reached = min(1.0, done + step)
-        trial = np.array(q)
-        trial[held] = values if reached == 1.0 else scales.move(start, reached * way)[held]
-        part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
-        system = ClosureSystem(position, scales, free, part)
-        for damping in (0.0, DAMPING):
-            moved, residual = close(system, trial, steps=15, damping=damping)
-            if closed(residual):
-                break
-        if closed(residual) and largest(scales.distance(moved, q)) <= JUMP:
-            q, done = moved, reached
-            step = min(2.0 * step, usual)
-        else:
-            step *= 0.5
-            if step < SMALLEST * usual:
-                raise AssemblyError(
-                    f"the way is blocked after {100 * done:.0f} % of it: there the loops stay open by "
-                    f"{residual:.2g} (scaled), or the mechanism jumps, as at a dead centre of what is led; "
-                    "lead another coordinate, or give a position on the other side"
-                )
-    return q
+FIRST = 0.1  #: scaled motion in the first step
+LONG = 0.35  #: scaled motion aimed at in one step
+JUMP = 0.5  #: largest scaled motion in one step
+OFF = 0.1  #: largest part of a step by which a position may miss its prediction
+TURNED = 0.3  #: the same of a direction
+FEWEST = 50  #: steps of a continuation over time
+STEPS = 200_000  #: of one continuation
 
 
-def follow_time(position: Callable[[float], Position], start: Array, scales: Scales, end: float) -> Array:
-    """From a closed position at t = 0 to another time, in steps short enough to stay on the branch.
+class Tangent(NamedTuple):
+    """The direction of the motion at one point, and how well it is determined."""
+
+    rate: Array  #: (n_v,) dq/ds as velocities
+    quality: float = 1.0  #: smallest over largest singular value of K: 0 at a singular position
+    sign: float = 1.0  #: of the determinant of as many independent rows of K as there are columns
+    free: Array = np.empty(0)  #: (n_v,) scaled motion that K restrains least
+    rows: Array = np.empty(0)  #: (n_c + k,) rows of K that hold that motion least
+
+
+class Point(NamedTuple):
+    """One point of a continuation; s is the curve's parameter."""
+
+    s: float
+    q: Array
+    tangent: Tangent  #: along s
+
+
+class Curve(Protocol):
+    """Positions that depend on one parameter s."""
+
+    @property
+    def scales(self) -> Scales:
+        """The scales of positions."""
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position."""
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess; None if Newton's iteration finds none."""
+
+
+C = TypeVar("C", bound=Curve)
+
+
+class Continuation(Generic[C]):
+    """Follows one curve.
 
     Parameters
     ----------
-    position : callable
-        t -> (q (n,) -> C (m,), C_q (m, n)).
-    start : (n,) array
-        A closed position at t = 0.
-    scales : Scales
-    end : float
-        Time; what moves only because of it is moved.
-
-    Returns
-    -------
-    (n,) array
-
-    Raises
-    ------
-    AssemblyError
-        The way is blocked, or too long.
+    curve : Curve
+    start : (n_q,) array
+        Position at s = 0.
+    extent : float, optional
+        Length in s of the whole range that the curve is a piece of: the pieces of a range to and fro need no shorter
+        steps than one way over all of it.
+    fewest : int
+        Steps at least, however still it stands, so that short driver pulses are not skipped.
     """
-    q, t, step = np.array(start), 0.0, end / 64.0
-    slope = np.zeros_like(scales.q)  # scaled motion per time in the last step
-    free = np.ones_like(scales.q)
-    for _ in range(TRIES):
-        if t == end:
-            return q
-        reached = end if abs(end - t) <= abs(step) else t + step
-        ahead = scales.move(q, slope * (reached - t))
-        trial, residual = close(ClosureSystem(position(reached), scales, free), ahead, steps=15)
-        change = scales.distance(trial, q)
-        if closed(residual) and largest(change) <= TIMED:
-            q, t, slope = trial, reached, change / (reached - t)
-            step *= 2.0 if largest(change) < 0.4 * TIMED else 1.0
-        else:
-            step *= 0.5
-            if abs(step) < SMALLEST**2 * abs(end):
-                break
-    raise AssemblyError(f"the way from t = 0 to t = {end:.6g} s is blocked at t = {t:.6g} s")
+
+    def __init__(self, curve: C, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
+        self.curve, self.scales, self.extent, self.fewest = curve, curve.scales, extent, fewest
+        self.points = [Point(0.0, start, curve.tangent(0.0, start))]
+        self.leaps: list[tuple[Point, Point]] = []
+        self.blocked = False
+        rate = largest(self.points[0].tangent.rate / self.scales.q)
+        self.step = FIRST / rate if rate > 0.0 else 1.0
+
+    def to(self, end: float, known: float = 0.0, steps: int = STEPS) -> bool:
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
+
+        Up to s = ``known`` the way was followed before and is smooth, so that only the motion limits the steps.
+        """
+        for _ in range(steps):
+            here = self.points[-1]
+            left = end - here.s
+            if left <= 0.0:
+                return True
+            longest = max(end / self.fewest, self.extent / self.fewest, known - here.s)
+            rate = largest(here.tangent.rate / self.scales.q)
+            self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
+            h = left if self.step >= left else min(self.step, 0.5 * left)
+            found = self.forward(here, h, end if h == left else here.s + h)
+            if found is None:
+                self.step = 0.5 * h
+                if self.step > BLOCKED * max(1.0, abs(here.s)):
+                    continue
+                found = self.leap(here)
+                if found is None:
+                    self.blocked = True
+                    return False
+                self.leaps.append((here, found))
+                self.step = found.s - here.s
+            self.points.append(found)
+        return self.points[-1].s >= end
+
+    def forward(self, here: Point, h: float, s: float) -> Point | None:
+        """One step, None if it fails or is not a smooth continuation."""
+        bend = self._bend(here)
+        ahead = self._predict(here, bend, h)
+        if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
+            return None
+        found = self.curve.solve(s, ahead)
+        if found is None:
+            return None
+        off = largest(self.scales.distance(found.q, ahead))
+        move = largest(self.scales.distance(found.q, here.q))
+        turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
+        if not (off <= max(OFF * move, UNJUDGED) and turned <= max(TURNED * move, UNJUDGED) and move <= JUMP):
+            return None
+        worst = max(off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED))
+        if h >= 0.999 * self.step:
+            self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
+        return found
+
+    def _bend(self, here: Point) -> Array:
+        """Second derivative along s, from the point before."""
+        if len(self.points) < 2 or self.points[-2].s >= here.s:
+            return np.zeros_like(here.tangent.rate)
+        before = self.points[-2]
+        return (here.tangent.rate - before.tangent.rate) / (here.s - before.s)
+
+    def _predict(self, here: Point, bend: Array, h: float) -> Array:
+        return self.scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / self.scales.q)
+
+    def leap(self, here: Point) -> Point | None:
+        """A point behind a singular position that continues the motion smoothly; None if there is none."""
+        for size in LEAPS:
+            near = self._behind(here, size)
+            if near is None:
+                continue
+            rate = largest(near.tangent.rate / self.scales.q)
+            gap = here.s - near.s
+            s = here.s + gap
+            other = self._behind(here, 2.0 * size)
+            bend = np.zeros_like(near.tangent.rate)
+            if other is not None and near.s > other.s:
+                bend = (near.tangent.rate - other.tangent.rate) / (near.s - other.s)
+            ahead = self._predict(near, bend, 2.0 * gap)
+            found = self.curve.solve(s, ahead)
+            if found is None or rate == 0.0:
+                continue
+            move = largest(self.scales.distance(found.q, near.q))
+            off = largest(self.scales.distance(found.q, ahead))
+            turned = 2.0 * gap * largest((found.tangent.rate - near.tangent.rate - 2.0 * gap * bend) / self.scales.q)
+            if off <= OFF * move and turned <= TURNED * move and move <= 10.0 * size:
+                return found
+        return None
+
+    def _behind(self, here: Point, size: float) -> Point | None:
+        """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
+        for point in reversed(self.points):
+            distance = largest(self.scales.distance(here.q, point.q))
+            if distance >= size:
+                part = size / distance
+                s = here.s - part * (here.s - point.s)
+                guess = self.scales.move(here.q, part * self.scales.distance(point.q, here.q))
+                return self.curve.solve(s, guess) or point
+        return None

@@ -321,7 +321,7 @@ def test_change_points_where_the_determinant_only_touches_zero() -> None:
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.path_following import Continuation
+    from eomgen.numeric.continuation import Continuation
 
     count, real = [0], Continuation.forward
 
@@ -345,7 +345,7 @@ def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, mon
 
 
 def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.path_following import Continuation
+    from eomgen.numeric.continuation import Continuation
 
     count, real = [0], Continuation.forward
 

@@ -21,6 +21,7 @@ from eomgen.numeric import (
     redundant_rows,
 )
 from eomgen.numeric.closure import WantedValues
+from eomgen.numeric.constraint_system import ConstraintSystem, CutJoints
 
 NAMES, LABELS = ["theta", "beta", "s"], ["C.x", "C.y", "C.x again"]
 REFERENCE = Path(__file__).parents[1] / "reference" / "slider_crank_kinematics.json"
@@ -28,6 +29,13 @@ REFERENCE = Path(__file__).parents[1] / "reference" / "slider_crank_kinematics.j
 
 def put_together(c, guess, **options):
     return assemble(c.position, np.array(guess, dtype=float), c.scales, names=NAMES, labels=LABELS, **options)
+
+
+def system_of(c):
+    cut = CutJoints((), (), np.empty(0), lambda q, t: (np.empty(0), np.empty((0, 3))))
+    return ConstraintSystem(
+        lambda q, t: c.position(q), c.scales, tuple(NAMES), ("angle", "angle", "length"), LABELS, cut
+    )
 
 
 def test_a_rough_guess_closes_and_held_values_stay(crank):
@@ -104,17 +112,17 @@ def test_flipped_positions_are_refused(crank):
 def test_following_a_held_value_stays_on_the_branch(crank):
     c = crank()
     start = c.closed(0.1)
-    q = follow(c.position, start, c.scales, np.array([0]), np.array([9.0]))
+    q = follow(system_of(c), start, {"theta": 9.0}).points[-1].q
     np.testing.assert_allclose(q, c.closed(9.0), atol=1e-12)
     with pytest.raises(AssemblyError, match="blocked"):
-        follow(c.position, start, c.scales, np.array([2]), np.array([0.6]))
+        follow(system_of(c), start, {"s": 0.6})
 
 
 def test_a_way_of_too_many_steps_is_given_up(crank, monkeypatch):
     c = crank()
-    monkeypatch.setattr("eomgen.numeric.continuation.TRIALS", 20)
-    with pytest.raises(AssemblyError, match=r"too winding: 20 steps lead through 22 % of it"):
-        follow(c.position, c.closed(0.1), c.scales, np.array([0]), np.array([9.0]))
+    monkeypatch.setattr("eomgen.numeric.held_path.TRIALS", 20)
+    with pytest.raises(AssemblyError, match=r"too winding: 20 steps lead through 73 % of it"):
+        follow(system_of(c), c.closed(0.1), {"theta": 9.0})
 
 
 def test_velocities_given_are_exact_and_contradictions_are_told(crank):

@@ -1,0 +1,37 @@
+"""Stage runtime: the kernels of a module -> its constraints and cut joints as one record of functions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numeric.constraint_system import ConstraintSystem, CutJoints
+from ..numeric.scales import Array
+from .kernels import Kernels
+
+
+def constraint_system(kernels: Kernels, t: float = 0.0) -> ConstraintSystem:
+    """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
+    layout = kernels.layout
+    C = kernels.state("constraints", nan=True)
+    slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
+    C_q = kernels.state(slopes, nan=True)
+    zero = np.zeros(layout.n_v)
+    cut = CutJoints((), (), np.empty(0), lambda q, t: (np.empty(0), np.empty((0, layout.n_v))))
+    if layout.n_loop_coordinates:
+        y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
+
+        def evaluate(q: Array, t: float) -> tuple[Array, Array]:
+            return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
+
+        cut = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, evaluate)
+    alignment = kernels.state("alignment", nan=True) if layout.n_alignments else None
+    return ConstraintSystem(
+        lambda q, t: (C(q, t=t), C_q(q, t=t)),
+        layout.place_scales,
+        layout.q,
+        layout.coordinate_kinds,
+        layout.constraint_labels,
+        cut,
+        None if alignment is None else lambda q, t: alignment(q, t=t),
+        t,
+    )
