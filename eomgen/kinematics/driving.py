@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .constraint_functions import ConstraintFunctions
 
 Array = NDArray[np.float64]
-STEPS = 16  #: that a motion over the span is followed for, at most
+FIRST, STEPS = 1e-3, 16  #: part of the span in the first step of a motion over it; its steps at most
 
 
 def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
@@ -71,6 +71,7 @@ def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) 
     """Closed positions at times after 0, a small motion apart."""
     end = functions.kinematics.mechanism.simulation.end
     continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
+    continuation.step = FIRST
     continuation.to(1.0, steps=STEPS)
     return [(point.s * end, point.q) for point in continuation.points[1:]]
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import ACCEPTED, AT_ONCE, EXACT, SETTLED, TIKHONOV
+from ..limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
 from ..limits.motions import NULL
 from . import algebra
 from .projection import largest, within
@@ -76,7 +76,7 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | 
     long = system.scales.long
     for _ in range(steps):
         size = largest(e)
-        if size <= AT_ONCE or not np.isfinite(size):
+        if size <= EXACT or not np.isfinite(size):
             break
         steepness = np.sqrt((J * J).sum(axis=1))
         weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
