@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 #: Scaled way (rad, lengths) that a position is led along in small steps: 300 turns, 20,000 steps.
-WALKED = 2000.0
+FOLLOWED = 2000.0
 #: Scaled step along the constraints at which the nearest position is found, a thousand roundings.
 NEAREST = 1e-12
 #: Relative difference of two directions that count as one.

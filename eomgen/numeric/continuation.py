@@ -111,6 +111,17 @@ class Continuation(Generic[C]):
             self.points.append(found)
         return self.points[-1].s >= end
 
+    def reach(self, end: float, steps: int = STEPS) -> Point | None:
+        """The point at s = end, found between its ends where a leap goes on; None where the way is blocked before."""
+        if not self.to(end, steps=steps):
+            return None
+        last = self.points[-1]
+        if last.s == end:
+            return last
+        before = self.leaps[-1][0]
+        part = (end - before.s) / (last.s - before.s)
+        return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
+
     def forward(self, here: Point, h: float, s: float) -> Point | None:
         """One step, None if it fails or is not a smooth continuation."""
         bend = self._bend(here)

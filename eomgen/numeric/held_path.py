@@ -87,12 +87,10 @@ class HeldPath:
         return np.asarray((sides[0] - sides[1]) / (2.0 * DRIFTED))
 
 
-def follow(
-    system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None
-) -> Continuation[HeldPath]:
+def follow(system: ConstraintSystem, start: Array, held: Mapping[str, float], end: float | None = None) -> Array:
     """Move held values, and the time, from where they are to others; the rest follows.
 
-    See :class:`HeldPath` for the parameters.  The last point has the position at the end.
+    See :class:`HeldPath` for the parameters.  Returns the position (n_q,) at the end.
 
     Raises
     ------
@@ -105,17 +103,9 @@ def follow(
         raise AssemblyError(f"the way from the reference position is too long ({path.length:.3g} rad or length scales)")
     timed = path.end != system.t
     continuation = Continuation(path, start, fewest=FEWEST if timed else 1)
-    if continuation.to(1.0, steps=TRIALS):
-        last = continuation.points[-1]
-        if last.s > 1.0:  # the end lies within the last leap
-            before, after = continuation.leaps[-1]
-            part = (1.0 - before.s) / (after.s - before.s)
-            between = path.scales.move(before.q, part * path.scales.distance(after.q, before.q))
-            found = path.solve(1.0, between)
-            if found is not None:
-                continuation.points[-1] = found
-        if continuation.points[-1].s == 1.0:
-            return continuation
+    found = continuation.reach(1.0, TRIALS)
+    if found is not None:
+        return found.q
     last = continuation.points[-1]
     if timed:
         t = system.t + last.s * (path.end - system.t)

@@ -84,7 +84,7 @@ class Initial:
 
     def follow(self, start: Array, held: Mapping[str, float]) -> Array:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
-        q = follow(self.system, start, held).points[-1].q
+        q = follow(self.system, start, held)
         if not self.system.aligned(q):
             raise AssemblyError("a joint's axes flipped on the way")
         return q
@@ -106,7 +106,7 @@ class Initial:
             return None
         first = Initial(self.kernels).reference()
         try:
-            return follow(self.system.at(0.0), first, {}, self.t).points[-1].q
+            return follow(self.system.at(0.0), first, {}, self.t)
         except AssemblyError:
             return None
 
