@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.motions import ALIGNED, POOR, SAME
-from ..numeric.continuation import Continuation, Point
+from ..numeric.continuation import ASTRAY, Continuation, Point
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
 from .driven_coordinates import DrivenPath
 from .singular import Singular, find_change_points, find_stop, name_singular
-
-ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean another branch
 
 
 class FollowedPath:
@@ -42,8 +40,6 @@ class FollowedPath:
             self.reached, last = find_stop(continuation, continuation.points[-1])
             self.stop = name_singular(driven, "stop", path.at(self.reached)[0], last.q, last.tangent)
         self.nodes = np.array([p.s for p in continuation.points])
-        self._values = np.array([p.q for p in continuation.points]).T
-        self._slopes = np.array([driven.scales.rates(p.q, p.tangent.rate) for p in continuation.points]).T
 
     @property
     def smooth(self) -> bool:
@@ -70,7 +66,7 @@ class FollowedPath:
         y1, y2 = self._rates(len(s)) if rates is None else rates
         layout = self.driven.layout
         q, v, a = (np.empty((n, len(s))) for n in (layout.n_q, layout.n_v, layout.n_v))
-        guesses = self._guesses(s)
+        guesses = self.continuation.between(s)
         odd = np.ones(len(s), dtype=bool)
         if self.driven.direct:
             t, y = self._along(s)
@@ -91,21 +87,6 @@ class FollowedPath:
     def _edge(self) -> float:
         """The parameter from which on the position is that of the stop."""
         return np.inf if self.stop is None else self.reached - SAME * max(1.0, self.end)
-
-    def _guesses(self, s: Array) -> Array:
-        """Cubic interpolation between the points of the continuation (n_q, k)."""
-        points, scales = self.continuation.points, self.driven.scales
-        if len(points) == 1:
-            return np.repeat(points[0].q[:, None], len(s), axis=1)
-        k = np.clip(np.searchsorted(self.nodes, s), 1, len(points) - 1)
-        width = self.nodes[k] - self.nodes[k - 1]
-        x = np.clip((s - self.nodes[k - 1]) / width, 0.0, 1.0)
-        q0, q1 = self._values[:, k - 1], self._values[:, k]
-        d0, d1 = self._slopes[:, k - 1] * width, self._slopes[:, k] * width
-        result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
-        for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
-            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
-        return result
 
     def _rates(self, k: int) -> tuple[Array, Array]:
         rate = self.path.y1 / (self.path.t1 or 1.0)

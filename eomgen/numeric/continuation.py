@@ -23,6 +23,7 @@ OFF = 0.1  #: largest part of a step by which a position may miss its prediction
 TURNED = 0.3  #: the same of a direction
 FEWEST = 50  #: steps of a continuation over time
 STEPS = 200_000  #: of one continuation
+ASTRAY = 0.02  #: scaled distance of a position from its interpolation that may mean another branch
 
 
 class Tangent(NamedTuple):
@@ -121,6 +122,24 @@ class Continuation(Generic[C]):
         before = self.leaps[-1][0]
         part = (end - before.s) / (last.s - before.s)
         return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
+
+    def between(self, s: Array) -> Array:
+        """Cubic interpolation (n_q, k) between the points of the continuation."""
+        points, scales = self.points, self.scales
+        if len(points) == 1:
+            return np.repeat(points[0].q[:, None], len(s), axis=1)
+        nodes = np.array([p.s for p in points])
+        values = np.array([p.q for p in points]).T
+        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in points]).T
+        k = np.clip(np.searchsorted(nodes, s), 1, len(points) - 1)
+        width = nodes[k] - nodes[k - 1]
+        x = np.clip((s - nodes[k - 1]) / width, 0.0, 1.0)
+        q0, q1 = values[:, k - 1], values[:, k]
+        d0, d1 = slopes[:, k - 1] * width, slopes[:, k] * width
+        result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
+        for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
+            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
+        return result
 
     def forward(self, here: Point, h: float, s: float) -> Point | None:
         """One step, None if it fails or is not a smooth continuation."""

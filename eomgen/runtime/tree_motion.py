@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, ProjectionError, UsageError
 from ..limits.motions import FOLLOWED
-from ..numeric.continuation import Continuation, Point, Tangent
+from ..numeric.continuation import ASTRAY, Continuation, Point, Tangent
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
@@ -43,6 +43,8 @@ class IndependentPath:
         self.length = float(np.abs(way / motion.scales_i).max(initial=0.0))
         self.rate = way / (self.length or 1.0)
         self.failed = np.empty(0)  # what the kernel gave where it found nothing
+        n_q, n = len(start), len(self.scales.q)
+        self.drifts = bool(self._kinematics(0.0, np.zeros_like(way), start)[n_q : n_q + n].any())
 
     def at(self, s: float) -> Array:
         """Independent coordinates."""
@@ -56,8 +58,9 @@ class IndependentPath:
             self.failed = found
             return None
         q, v = found[:n_q], found[n_q : n_q + len(self.scales.q)]
-        drift = self._kinematics(s, np.zeros_like(self.rate), q)[n_q : n_q + len(v)]  # the time stands still here
-        return Point(s, q, Tangent(v - drift))
+        if self.drifts:  # the time stands still here
+            v = v - self._kinematics(s, np.zeros_like(self.rate), q)[n_q : n_q + len(v)]
+        return Point(s, q, Tangent(v))
 
     def tangent(self, s: float, q: Array) -> Tangent:
         """The direction at a position."""
@@ -120,17 +123,27 @@ class DependentMotion:
         """
         if self.layout.n_dof != 1 or not self.layout.rank:
             return [self.follow(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
-        origin, known = start[self.layout.independent_q], {1.0: [start], -1.0: [start]}
-        result = []
-        for target in targets.T:
-            sign = 1.0 if target[0] >= origin[0] else -1.0
-            points = known[sign]
-            length = float(np.abs((target - origin) / self.scales_i)[0])
-            self._require_near(target, length)
-            while len(points) <= int(length):
-                points.append(self.follow(points[-1], origin + sign * len(points) * self.scales_i, 0.0))
-            result.append(self.follow(points[int(length)], target, 0.0))
-        return result
+        origin, unit, n_q = start[self.layout.independent_q], self.scales_i[0], self.layout.n_q
+        lengths = (targets[0] - origin[0]) / unit
+        self._require_near(targets[:, np.abs(lengths).argmax()], float(np.abs(lengths).max()))
+        result = np.full((n_q, len(lengths)), np.nan)
+        for sense in (1.0, -1.0):
+            chosen = np.flatnonzero((lengths >= 0.0) == (sense > 0.0))
+            if not chosen.size:
+                continue
+            path = IndependentPath(self, start, origin + sense * unit, 0.0)
+            path.length = np.inf  # it has no end of its own
+            way = Continuation(path, start, fewest=1)
+            farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
+            while not way.blocked and way.points[-1].s <= farthest:
+                way.to(np.floor(way.points[-1].s) + 1.0)
+            guesses = way.between(np.abs(lengths[chosen]))
+            x = np.concatenate([targets[:, chosen], np.zeros((2, len(chosen))), guesses])
+            found = self.kernel(x, t=0.0)[:n_q]
+            for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
+                near = np.abs(path.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
+                result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
+        return list(result.T)
 
     def _require_near(self, target: Array, length: float) -> None:
         if not length <= FOLLOWED:
