@@ -1,13 +1,14 @@
 """Stage runtime: values by name -> an assembled position or state.
 
 Values given explicitly are held exactly.  Declared initial values are held too, as long as the given ones leave them
-room: one after the other in the order of the model, each if it is independent of those before.  The way from the
-model's reference position is walked in small steps, so that the mechanism stays on its branch; where that way is
-blocked, the loops are closed from the nearest guess.
+room: one after the other in the order of the model, each if it is independent of those before.  The values are followed
+from the model's reference position, so that the mechanism stays on its branch; where that way is blocked, the loops are
+closed from the nearest guess, and a warning says so.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly import Rates, VelocityEquations, assemble_velocity
+from ..numeric.assembly import RESTARTS, Rates, VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
 from ..numeric.held_path import follow
 from ..numeric.projection import largest
@@ -107,8 +108,18 @@ class Initial:
         first = Initial(self.kernels).reference()
         try:
             return follow(self.system.at(0.0), first, {}, self.t)
-        except AssemblyError:
+        except AssemblyError as error:
+            self._tell_branch(f"the position at t = {self.t:.6g} s", error)
             return None
+
+    def _tell_branch(self, what: str, error: AssemblyError | None) -> None:
+        """Warn that a position was found by closing the loops anew."""
+        warnings.warn(
+            f"{what} is not reached from the reference position without leaving its branch: {error}.  The loops are "
+            "closed from the nearest guess instead; branches() gives all positions found, assemble() the one near a "
+            "guess",
+            stacklevel=2,
+        )
 
     @np.errstate(all="ignore")
     def assembled(self, given: Mapping[str, float]) -> Array:
@@ -128,17 +139,20 @@ class Initial:
         except AssemblyError:
             return self.system.close(layout.q_reference, given).q  # these parameters close somewhere else, if anywhere
         soft = self.compatible(start, given, rest)
+        blocked = None
         for held in ({**given, **soft}, given):
             try:
                 return self.follow(start, held)
-            except AssemblyError:
-                continue
-        if soft:
-            try:
-                return self.system.close(start, {**given, **soft}, restarts=4).q
-            except AssemblyError:
-                pass
-        return self.system.close(start, given).q
+            except AssemblyError as error:
+                blocked = error
+        try:
+            found = self.system.close(start, {**given, **soft}, restarts=4 if soft else RESTARTS).q
+        except AssemblyError:
+            if not soft:
+                raise
+            found = self.system.close(start, given).q
+        self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
+        return found
 
     def from_guess(self, guess: Mapping[str, float]) -> Array:
         """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
