@@ -8,7 +8,6 @@ systems, Multibody System Dynamics 7 (2002), 265-284, has W = M).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.room import read_number, read_numbers
+from ..suggestions import hint, joined
 from ..texts import shown
 
 if TYPE_CHECKING:
@@ -106,9 +106,8 @@ def _check_names(layout: Layout, weights: Mapping[str, float] | str | None, held
     for what, names in (("weights", given), ("hold", held)):
         for name in names:
             if name not in allowed:
-                near = get_close_matches(name, allowed, 1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
-                raise UsageError(f"{what}: no coordinate or velocity {name!r}{hint}; there are {', '.join(allowed)}")
+                near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
+                raise UsageError(f"{what}: no coordinate or velocity {name!r}; {near}")
     if isinstance(weights, Mapping):
         for name, weight in weights.items():
             if not weight > 0.0:

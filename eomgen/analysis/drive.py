@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from ..numeric.scales import Array
 from ..runtime.layout import Layout
 from ..runtime.near_names import read_names
 from ..runtime.room import read_numbers
+from ..suggestions import hint, joined
 from .constrained import ProjectedStates, free_motions, prepare, solve_multipliers
 from .tables import as_text
 
@@ -216,9 +216,8 @@ def _drives(layout: Layout, actuated: Sequence[str] | None) -> tuple[str, ...]:
     allowed = [*layout.velocity_labels, *layout.loops, *layout.u]
     for name in names:
         if name not in allowed:
-            near = get_close_matches(name, allowed, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UsageError(f"actuated: no coordinate or input {name!r}{hint}; there are {', '.join(allowed)}")
+            near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
+            raise UsageError(f"actuated: no coordinate or input {name!r}; {near}")
     if not names or len(set(names)) < len(names):
         raise UsageError("actuated: at least one coordinate or input, each once")
     return names

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from ..runtime.layout import Layout
 from ..runtime.room import read_number
 from ..runtime.signal_rates import derive, drift, moving_inputs, rate_pairs
 from ..runtime.tapes import DeclaredSignal
+from ..suggestions import hint, joined
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
@@ -196,9 +196,8 @@ def check_gaps(
     for what, names, allowed in ((word, gaps or {}, [*placed, *layout.y]), (other, locked, coordinates)):
         for name in names:
             if name not in allowed:
-                near = get_close_matches(str(name), allowed, 1)
-                hint = f"; did you mean {near[0]!r}?" if near else ""
-                raise UsageError(f"{what}: no coordinate or output {name!r}{hint}; there are {', '.join(allowed)}")
+                near = joined(hint(name, allowed), f"there are {', '.join(allowed)}")
+                raise UsageError(f"{what}: no coordinate or output {name!r}; {near}")
     found: dict[str, float] = {}
     for name, e in (gaps or {}).items():
         found[name] = read_number(f"{word}: the restitution of {name}", e)

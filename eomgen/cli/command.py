@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import io
 import os
 import sys
@@ -11,6 +10,7 @@ from importlib import import_module
 
 import click
 
+from ..suggestions import hint
 from ..texts import visible
 from .failures import USAGE
 
@@ -54,10 +54,8 @@ class Verbs(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args[0] not in VERBS:
-            near = difflib.get_close_matches(args[0], VERBS, 1)
-            ctx.fail(
-                f"no verb {args[0]!r}; " + (f"did you mean {near[0]}?" if near else f"there are: {', '.join(VERBS)}")
-            )
+            near = hint(args[0], VERBS, quoted=False) or f"there are: {', '.join(VERBS)}"
+            ctx.fail(f"no verb {args[0]!r}; {near}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import os
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ import click
 from ..errors import ModelError, UsageError
 from ..files.reading import kind_of
 from ..files.writing import refuse_link
+from ..suggestions import closest
 from ..targets import TARGETS
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def _missing(path: Path) -> str:
         return f"{path}: no such file; there is an example of that name: eomgen examples {path.stem}"
     here = path.parent if path.parent.is_dir() else Path()
     names = [p.name for p in here.iterdir() if p.suffix in (".yaml", ".yml", ".urdf", ".xml")]
-    near = difflib.get_close_matches(path.name, names, 1)
+    near = closest(path.name, names)
     return f"{path}: no such file" + (f"; did you mean {here / near[0]}?" if near else "")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import re
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import click
 
 from ..errors import UsageError
 from ..files.writing import write_whole
+from ..suggestions import hint
 from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say
@@ -56,9 +56,8 @@ def examples(name: str | None, force: bool, as_json: bool) -> None:
 def _copy(name: str, found: dict[str, Path], force: bool) -> Path:
     file = found.get(name) or found.get(name.removesuffix(".yaml")) or found.get(f"{name}.urdf")
     if file is None:
-        near = difflib.get_close_matches(name, found, 1)
-        hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(found)}"
-        raise UsageError(f"no example {name!r}; {hint}")
+        near = hint(name, found, quoted=False) or f"there are: {', '.join(found)}"
+        raise UsageError(f"no example {name!r}; {near}")
     target = Path(file.name)
     if target.exists() and not force:
         raise UsageError(f"{target} exists; add --force to overwrite it")

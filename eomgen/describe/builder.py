@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..constraints import CONSTRAINTS
 from ..forces import FORCES
 from ..joints import JOINTS
+from ..suggestions import hint
 from .build_mechanism import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
@@ -287,13 +288,11 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods):
             method = self._method(name)
             if method is not None:
                 return method
-        from .names import suggestion
-
-        near = suggestion(name, [n for n in dir(type(self)) if not n.startswith("_")])
-        hint = near or (
+        known = (*dir(type(self)), *JOINTS, *FORCES, *CONSTRAINTS)
+        near = hint(name, [n for n in known if not n.startswith("_")]) or (
             f"joints: {', '.join(JOINTS)}; forces: {', '.join(FORCES)}; constraints: {', '.join(CONSTRAINTS)}"
         )
-        raise AttributeError(f"a Model has no attribute {name!r}; {hint}")
+        raise AttributeError(f"a Model has no attribute {name!r}; {near}")
 
     def _counts(self) -> str:
         counts = ((section, len(self._description.sections[section])) for section in SECTIONS)

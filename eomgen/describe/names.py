@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 from ..graph.shown import quoted
 from ..operations import OPERATIONS
+from ..suggestions import hint, joined
 
 #: Arguments that a function of any number of them takes at most.
 MOST = 64
@@ -107,20 +108,6 @@ def fault_of_model_name(name: object) -> tuple[str, str] | None:
     return fault_of_name(name, symbol=True)
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """``"did you mean 'theta'?"`` if a known name is near, else an empty text."""
-    import difflib  # only needed once something is wrong
-
-    options = list(known)
-    if len(options) > 2000:
-        return ""  # a comparison with each would take long
-    near = difflib.get_close_matches(name, options, n=1, cutoff=0.6)
-    if not near:
-        folded = {option.lower(): option for option in options}
-        near = [folded[name.lower()]] if name.lower() in folded else []
-    return f"did you mean {near[0]!r}?" if near else ""
-
-
 def listing(known: Iterable[str], limit: int = 20) -> str:
     """The names joined by commas, cut after ``limit``; ``"none"`` if there are none."""
     names = list(known)
@@ -131,4 +118,4 @@ def listing(known: Iterable[str], limit: int = 20) -> str:
 def nearest(name: str, known: Iterable[str], what: str = "known") -> str:
     """A remedy for an unknown name: the near miss if there is one, and what is allowed."""
     options = list(known)
-    return " ".join(part for part in (suggestion(name, options), f"{what}: {listing(options)}") if part)
+    return joined(hint(name, options), f"{what}: {listing(options)}", by=" ")

@@ -22,13 +22,14 @@ from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
 from ..numeric.rigid_inertia import word_of_check
+from ..suggestions import hint
 from ..texts import WHOLE, join_surrogates, lone_surrogate
 from .checks import check_keys
 from .description import GROUND_NAME, Description, Faults, items, label_of
 from .expressions import parse
 from .fields import CONSTANT, INERTIA, KINDS, MARKER, NUMBER, OUTPUT, PLACED, Field
 from .mechanism import Quantity
-from .names import nearest, suggestion
+from .names import nearest
 from .placement import TURNS, Numbers, axis_columns, rpy_rotation
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy
@@ -220,7 +221,7 @@ class Reader:
         body, dot, name = label.partition(".")
         if body in self.bodies and dot:
             own = [key.split(".", 1)[1] for key in self.markers if key.startswith(body + ".")]
-            near = suggestion(name, own)
+            near = hint(name, own)
             have = ", ".join(own) or "none"
             return f"{body!r} has no marker {name!r}", 0, " ".join(x for x in (near, f"its markers: {have}") if x)
         return f"no body {body!r}", 0, nearest(body, self.bodies, "bodies")

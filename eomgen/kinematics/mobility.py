@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ..numeric import (
     rank,
 )
 from ..records import dataclass
+from ..suggestions import hint, joined
 from .candidates import rate_candidates
 from .constraint_functions import Array, ConstraintFunctions
 from .driving import close_driven, follow_drivers
@@ -140,9 +140,7 @@ def _check_names(kinematics: Kinematics, wanted: Sequence[str]) -> None:
                 kinematics.mechanism.problem("independent", message, "choose fewer coordinates of one loop")
             )
         else:
-            near = get_close_matches(name, known, 1)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            what, remedy = f"no coordinate {name!r}", f"{hint}allowed: {', '.join(known)}"
+            what, remedy = f"no coordinate {name!r}", joined(hint(name, known), f"allowed: {', '.join(known)}", by=" ")
             problems.append(kinematics.mechanism.problem("independent", what, remedy))
     if problems:
         raise ModelError(problems)

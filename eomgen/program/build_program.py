@@ -8,12 +8,12 @@ blocks (Newton iterations, factorisations of the embedded system).  Trees that d
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from typing import Any
 
 from ..errors import UsageError
 from ..graph.substitute import symbols_of
 from ..kernel_table import KERNELS, Kernel, Sizes
+from ..suggestions import hint, joined
 from .blocks import SHIFTS, BlockMaker
 from .hoist import count_apart, hoist
 from .jacobian_blocks import sparsity
@@ -167,9 +167,8 @@ def _select(kernels: Sequence[str] | None) -> list[Kernel]:
     known = [k.name for k in KERNELS]
     for name in kernels or ():
         if name not in known:
-            near = get_close_matches(name, known, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise UsageError(f"no kernel is named {name!r}{hint}; there are {', '.join(known)}")
+            near = joined(hint(name, known), f"there are {', '.join(known)}")
+            raise UsageError(f"no kernel is named {name!r}; {near}")
     return [k for k in KERNELS if kernels is None or k.name in kernels]
 
 

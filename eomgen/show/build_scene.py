@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from ..errors import UsageError
 from ..limits.pictures import ROUNDED, SAME
+from ..suggestions import hint
 from .data import GROUND, Array, PictureData, PlacedFrame, read_picture
 from .elements import element_items
 from .joints import joint_items, wall_items
@@ -86,9 +86,8 @@ def _tracked(data: PictureData, name: str) -> PlacedFrame:
     if name in data.bodies:
         return PlacedFrame(data.bodies.index(name), np.eye(3), np.zeros(3))
     known = [*data.markers, *data.bodies]
-    near = get_close_matches(str(name), known, 1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
-    raise UsageError(f"no marker or body {name!r} to trace; {hint}")
+    near = hint(name, known, quoted=False) or f"there are {', '.join(known)}"
+    raise UsageError(f"no marker or body {name!r} to trace; {near}")
 
 
 def _with_ground(poses: Array) -> Array:

@@ -1,0 +1,50 @@
+"""Words of other programs and slips of spelling lead to the name that was meant."""
+
+from __future__ import annotations
+
+import pytest
+
+import eomgen as eg
+from eomgen.cli.command import VERBS
+from eomgen.constraints import CONSTRAINTS
+from eomgen.forces import FORCES
+from eomgen.joints import JOINTS
+from eomgen.suggestions import SYNONYMS, closest, hint
+
+METHODS = {name for name in dir(eg.Model("m")) if not name.startswith("_")}
+OTHERS = {"plot", "rhs", "marker", "mass_matrix", "driving_forces", *VERBS}
+
+
+def test_every_suggestion_exists() -> None:
+    known = METHODS | OTHERS | {*JOINTS, *FORCES, *CONSTRAINTS}
+    assert {name for meant in SYNONYMS.values() for name in meant.split()} - known == set()
+    words = [word for words in SYNONYMS for word in words.split()]
+    assert len(set(words)) == len(words)
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("hinge", "revolute"), ("pin", "revolute"), ("ball", "spherical"), ("fixed", "weld"), ("slider", "prismatic"),
+     ("motor", "driver"), ("dashpot", "damper"), ("rope", "spring"), ("animate", "draw"), ("Revolute", "revolute"),
+     ("sprnig", "spring"), ("COM", "center_of_mass")],
+)  # fmt: skip
+def test_a_method_of_model(word: str, meant: str) -> None:
+    with pytest.raises(AttributeError, match=f"did you mean '{meant}'"):
+        getattr(eg.Model("m"), word)
+
+
+def test_types_in_a_file_and_verbs() -> None:
+    m = eg.Model("m")
+    m.body("a")
+    with pytest.raises(eg.ModelError, match="did you mean 'revolute'"):
+        m.joint("hinge", "j", m.ground, "a")
+        m.derive()
+    assert closest("integrate", VERBS) == ["run"]
+    assert closest("eigenvalues", VERBS) == ["modes"]
+
+
+def test_what_a_name_is_not_near() -> None:
+    assert hint("zzzzz", ["theta", "s"]) == ""
+    assert hint("Theta", ["theta", "s"]) == "did you mean 'theta'?"
+    assert hint("pin", ["theta", "spin"]) == "did you mean 'spin'?"  # no revolute among what there is
+    assert closest("x", [f"n{k}" for k in range(3000)]) == []
