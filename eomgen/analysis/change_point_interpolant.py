@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..limits.motions import ASTRAY
-from ..numeric.continuation import Point
+from ..numeric.curves import Point
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales
 from .driven_coordinates import DrivenContinuation

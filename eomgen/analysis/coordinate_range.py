@@ -66,7 +66,7 @@ def motion_range(
     t: float = 0.0,
     within: tuple[float, float] | None = None,
 ) -> MotionRange:
-    """The limits between which a coordinate can move the mechanism, found by walking both ways.
+    """The limits between which a coordinate can move the mechanism, followed both ways.
 
     Parameters
     ----------
@@ -94,10 +94,10 @@ def motion_range(
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):
-        return _walk_both_ways(module, name, initial, t, within)
+        return _follow_both_ways(module, name, initial, t, within)
 
 
-def _walk_both_ways(
+def _follow_both_ways(
     module: BoundModel,
     name: str,
     initial: Mapping[str, float] | ArrayLike | None,

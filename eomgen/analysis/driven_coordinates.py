@@ -17,7 +17,8 @@ from ..limits.motions import NULL
 from ..numeric import algebra
 from ..numeric.closure import ClosureSystem, WantedValues, close, closed
 from ..numeric.constraint_system import ConstraintSystem
-from ..numeric.continuation import Continuation, Point, Tangent
+from ..numeric.continuation import Continuation
+from ..numeric.curves import Point, Tangent
 from ..numeric.scales import Array, Scales
 from ..runtime.constraint_kernels import constraint_system
 

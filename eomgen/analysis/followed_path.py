@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.motions import ALIGNED, POOR, SAME
-from ..numeric.continuation import ASTRAY, Continuation, Point
+from ..numeric.continuation import Continuation
+from ..numeric.curves import ASTRAY, Point, interpolate
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
@@ -66,7 +67,7 @@ class FollowedPath:
         y1, y2 = self._rates(len(s)) if rates is None else rates
         layout = self.driven.layout
         q, v, a = (np.empty((n, len(s))) for n in (layout.n_q, layout.n_v, layout.n_v))
-        guesses = self.continuation.between(s)
+        guesses = interpolate(self.continuation.points, self.driven.scales, s)
         odd = np.ones(len(s), dtype=bool)
         if self.driven.direct:
             t, y = self._along(s)

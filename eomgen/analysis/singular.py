@@ -1,4 +1,4 @@
-"""Analysis: walks -> the singular positions on them: where they are, and which coordinates and joints are to blame.
+"""Analysis: followed paths -> the singular positions on them: where they are, which coordinates and joints cause them.
 
 At a singular position a motion is possible while the led coordinates (and the drivers) stand still.  Either the branch
 goes on through it, beside others (a change point: the sign of det K changes), or the led coordinates turn back there (a
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
-from ..numeric.continuation import Point, Tangent
+from ..numeric.curves import Point, Tangent
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant, build_interpolant

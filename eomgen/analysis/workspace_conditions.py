@@ -17,8 +17,8 @@ from ..numeric import algebra
 from ..numeric.scales import Array
 from .roots import find_root
 from .singular import SHARE, Singular
+from .workspace_flood import OUT, Flood, Stage
 from .workspace_grid import Index
-from .workspace_walk import OUT, Flood, Stage
 
 
 class WorkspaceSingular(NamedTuple):

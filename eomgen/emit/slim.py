@@ -13,6 +13,7 @@ from .uses import SourceText
 LEFT_OUT = {
     "analysis/impact": "events with impacts",
     "numeric/assembly_failure": "what keeps loops from closing",
+    "numeric/leaps": "motions over change points",
     "numeric/splines": "cubic tables",
     "runtime/culprit": "what a failure is due to",
     "runtime/origin": "where a result comes from",

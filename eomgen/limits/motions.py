@@ -1,4 +1,4 @@
-"""Limits: walks along constraints without forces, singular positions, workspaces."""
+"""Limits: motions along constraints without forces, singular positions, workspaces."""
 
 from __future__ import annotations
 

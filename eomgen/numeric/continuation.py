@@ -8,57 +8,24 @@ point behind it that continues the motion smoothly, if there is one.
 
 from __future__ import annotations
 
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
-from ..limits.motions import BLOCKED, LEAPS, UNJUDGED
+from ..errors import UnavailableError
+from ..limits.motions import BLOCKED, UNJUDGED
+from .curves import OFF, TURNED, Point, PositionCurve, predict
 from .projection import largest
-from .scales import Array, Scales
+from .scales import Array
 
 FIRST = 0.1  #: scaled motion in the first step
 LONG = 0.35  #: scaled motion aimed at in one step
 JUMP = 0.5  #: largest scaled motion in one step
-OFF = 0.1  #: largest part of a step by which a position may miss its prediction
-TURNED = 0.3  #: the same of a direction
 FEWEST = 50  #: steps of a continuation over time
 STEPS = 200_000  #: of one continuation
-ASTRAY = 0.02  #: scaled distance of a position from its interpolation that may mean another branch
 
 
-class Tangent(NamedTuple):
-    """The direction of the motion at one point, and how well it is determined."""
-
-    rate: Array  #: (n_v,) dq/ds as velocities
-    quality: float = 1.0  #: smallest over largest singular value of K: 0 at a singular position
-    sign: float = 1.0  #: of the determinant of as many independent rows of K as there are columns
-    free: Array = np.empty(0)  #: (n_v,) scaled motion that K restrains least
-    rows: Array = np.empty(0)  #: (n_c + k,) rows of K that hold that motion least
-
-
-class Point(NamedTuple):
-    """One point of a continuation; s is the curve's parameter."""
-
-    s: float
-    q: Array
-    tangent: Tangent  #: along s
-
-
-class Curve(Protocol):
-    """Positions that depend on one parameter s."""
-
-    @property
-    def scales(self) -> Scales:
-        """The scales of positions."""
-
-    def tangent(self, s: float, q: Array) -> Tangent:
-        """The direction at a position."""
-
-    def solve(self, s: float, guess: Array) -> Point | None:
-        """The point next to a guess; None if Newton's iteration finds none."""
-
-
-C = TypeVar("C", bound=Curve)
+C = TypeVar("C", bound=PositionCurve)
 
 
 class Continuation(Generic[C]):
@@ -66,7 +33,7 @@ class Continuation(Generic[C]):
 
     Parameters
     ----------
-    curve : Curve
+    curve : PositionCurve
     start : (n_q,) array
         Position at s = 0.
     extent : float, optional
@@ -103,7 +70,7 @@ class Continuation(Generic[C]):
                 self.step = 0.5 * h
                 if self.step > BLOCKED * max(1.0, abs(here.s)):
                     continue
-                found = self.leap(here)
+                found = self._leap(here)
                 if found is None:
                     self.blocked = True
                     return False
@@ -123,28 +90,10 @@ class Continuation(Generic[C]):
         part = (end - before.s) / (last.s - before.s)
         return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
 
-    def between(self, s: Array) -> Array:
-        """Cubic interpolation (n_q, k) between the points of the continuation."""
-        points, scales = self.points, self.scales
-        if len(points) == 1:
-            return np.repeat(points[0].q[:, None], len(s), axis=1)
-        nodes = np.array([p.s for p in points])
-        values = np.array([p.q for p in points]).T
-        slopes = np.array([scales.rates(p.q, p.tangent.rate) for p in points]).T
-        k = np.clip(np.searchsorted(nodes, s), 1, len(points) - 1)
-        width = nodes[k] - nodes[k - 1]
-        x = np.clip((s - nodes[k - 1]) / width, 0.0, 1.0)
-        q0, q1 = values[:, k - 1], values[:, k]
-        d0, d1 = slopes[:, k - 1] * width, slopes[:, k] * width
-        result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
-        for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
-            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
-        return result
-
     def forward(self, here: Point, h: float, s: float) -> Point | None:
         """One step, None if it fails or is not a smooth continuation."""
         bend = self._bend(here)
-        ahead = self._predict(here, bend, h)
+        ahead = predict(self.scales, here, bend, h)
         if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
             return None
         found = self.curve.solve(s, ahead)
@@ -160,47 +109,17 @@ class Continuation(Generic[C]):
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
         return found
 
+    def _leap(self, here: Point) -> Point | None:
+        """The point behind a singular position; a slim package stops there."""
+        try:
+            from .leaps import leap
+        except UnavailableError:
+            return None
+        return leap(self.curve, self.points, here)
+
     def _bend(self, here: Point) -> Array:
         """Second derivative along s, from the point before."""
         if len(self.points) < 2 or self.points[-2].s >= here.s:
             return np.zeros_like(here.tangent.rate)
         before = self.points[-2]
         return (here.tangent.rate - before.tangent.rate) / (here.s - before.s)
-
-    def _predict(self, here: Point, bend: Array, h: float) -> Array:
-        return self.scales.move(here.q, (here.tangent.rate + 0.5 * h * bend) * h / self.scales.q)
-
-    def leap(self, here: Point) -> Point | None:
-        """A point behind a singular position that continues the motion smoothly; None if there is none."""
-        for size in LEAPS:
-            near = self._behind(here, size)
-            if near is None:
-                continue
-            rate = largest(near.tangent.rate / self.scales.q)
-            gap = here.s - near.s
-            s = here.s + gap
-            other = self._behind(here, 2.0 * size)
-            bend = np.zeros_like(near.tangent.rate)
-            if other is not None and near.s > other.s:
-                bend = (near.tangent.rate - other.tangent.rate) / (near.s - other.s)
-            ahead = self._predict(near, bend, 2.0 * gap)
-            found = self.curve.solve(s, ahead)
-            if found is None or rate == 0.0:
-                continue
-            move = largest(self.scales.distance(found.q, near.q))
-            off = largest(self.scales.distance(found.q, ahead))
-            turned = 2.0 * gap * largest((found.tangent.rate - near.tangent.rate - 2.0 * gap * bend) / self.scales.q)
-            if off <= OFF * move and turned <= TURNED * move and move <= 10.0 * size:
-                return found
-        return None
-
-    def _behind(self, here: Point, size: float) -> Point | None:
-        """The last point passed whose scaled distance is at least ``size``, brought to about that distance."""
-        for point in reversed(self.points):
-            distance = largest(self.scales.distance(here.q, point.q))
-            if distance >= size:
-                part = size / distance
-                s = here.s - part * (here.s - point.s)
-                guess = self.scales.move(here.q, part * self.scales.distance(point.q, here.q))
-                return self.curve.solve(s, guess) or point
-        return None

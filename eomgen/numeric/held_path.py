@@ -12,7 +12,8 @@ from ..limits.motions import DRIFTED, NULL
 from . import algebra
 from .closure import DAMPING, ClosureSystem, close, closed
 from .constraint_system import ConstraintSystem
-from .continuation import FEWEST, Continuation, Point, Tangent
+from .continuation import FEWEST, Continuation
+from .curves import Point, Tangent
 from .projection import largest
 from .scales import Array
 

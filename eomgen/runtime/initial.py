@@ -151,7 +151,8 @@ class Initial:
             if not soft:
                 raise
             found = self.system.close(start, given).q
-        self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
+        if len(self.compatible(start, (), given)) == len(given):  # else they stand still there, and it has no branch
+            self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
         return found
 
     def from_guess(self, guess: Mapping[str, float]) -> Array:

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, ProjectionError, UsageError
 from ..limits.motions import FOLLOWED
-from ..numeric.continuation import ASTRAY, Continuation, Point, Tangent
+from ..numeric.continuation import Continuation
+from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
@@ -137,7 +138,7 @@ class DependentMotion:
             farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
             while not way.blocked and way.points[-1].s <= farthest:
                 way.to(np.floor(way.points[-1].s) + 1.0)
-            guesses = way.between(np.abs(lengths[chosen]))
+            guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
             x = np.concatenate([targets[:, chosen], np.zeros((2, len(chosen))), guesses])
             found = self.kernel(x, t=0.0)[:n_q]
             for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):

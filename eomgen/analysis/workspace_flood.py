@@ -1,8 +1,8 @@
-"""Analysis: a grid of led values -> the positions at its points, walked to from neighbour to neighbour.
+"""Analysis: a grid of led values -> the positions at its points, followed from neighbour to neighbour.
 
-The walk begins at the grid point next to the initial position and floods the grid, so every position hangs together
+It begins at the grid point next to the initial position and floods the grid, so every position hangs together
 with it by a continuous motion: the assembly mode stays.  A step from one point to the next counts only if position and
-direction come out as foretold; else it is halved; near singular positions it is walked in the small steps of
+direction come out as foretold; else it is halved; near singular positions the small steps are those of
 :mod:`..numeric.continuation`, over change points too.
 """
 
@@ -29,7 +29,7 @@ from .workspace_grid import Grid, Index
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
-FINEST = 1 / 40  #: of the way between neighbours: smaller steps are left to a walk that looks for singular positions
+MOST = 40  #: steps between neighbours: more are left to what looks for singular positions
 TRIES = 64  #: grid points tried as the first one
 REACHED, LIMITED, OUT = "reached", "limits", "out of reach"
 
@@ -132,24 +132,15 @@ class Stage:
             moved = q.copy()
             moved[self.rows] = path.at(length)[1]
             return moved, []
-        walk = Continuation(path, q)
-        h = length
-        while walk.points[-1].tangent.quality > LOW and h > FINEST * length:
-            here = walk.points[-1]
-            whole = length - here.s <= 1.5 * h
-            walk.step = length - here.s if whole else h
-            found = walk.forward(here, walk.step, length if whole else here.s + h)
-            if found is None or found.tangent.sign != here.tangent.sign:
-                h *= 0.5
-                continue
-            walk.points.append(found)
-            if whole:
-                return found.q, []
-        here = walk.points[-1]  # near a singular position, or one is in between
-        rest = length - here.s
-        followed = FollowedPath(path.beyond(here.s), here.q, rest)
+        continuation = Continuation(path, q, fewest=1)
+        continuation.step = length
+        points = continuation.points
+        reached = continuation.to(length, steps=MOST) and not continuation.leaps
+        if reached and all(p.tangent.quality > LOW and p.tangent.sign == points[0].tangent.sign for p in points):
+            return points[-1].q, []
+        followed = FollowedPath(path, q, length)  # a singular position is near, or in between
         stop = [] if followed.stop is None else [followed.stop]
-        return (None if stop else followed.position(rest)), followed.singular + stop
+        return (None if stop else followed.position(length)), followed.singular + stop
 
     def allowed(self, q: Array, t: float) -> bool:
         """Whether all limits are kept."""
@@ -192,7 +183,7 @@ def flood(stage: Stage) -> Flood:
     status[first] = REACHED
     parents[first] = first
     inside, outside = deque([first]), deque[Index]()
-    while inside or outside:  # what limits block is walked last, to tell it from what is out of reach
+    while inside or outside:  # what limits block is followed last, to tell it from what is out of reach
         within = bool(inside)
         here = inside.popleft() if within else outside.popleft()
         for _, there in grid.neighbours(here):
