@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from ..graph.core import Expr
 from ..graph.evaluate import compile_evaluator
 from ..numeric import Assembly, Scales
-from ..numeric.assembly import RESTARTS
 from ..numeric.closure import close
-from ..numeric.constraint_system import ConstraintSystem, CutJoints
+from ..numeric.constraint_system import RESTARTS, ConstraintSystem, CutJoints
 from ..numeric.scales import Space
 from .kinematics import Kinematics
 from .row_scales import row_scales

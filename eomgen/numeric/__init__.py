@@ -11,7 +11,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
+    from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
+    from .constraint_system import Assembly, ConstraintSystem, CutJoints
     from .dependent import kinematics, solve_dependent
     from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
     from .held_path import follow
@@ -22,16 +23,17 @@ if TYPE_CHECKING:
 
 #: Where each name is defined; loaded on first use, because a module that only evaluates needs none of them.
 _HOMES = {
-    "Assembly": "assembly",
+    "Assembly": "constraint_system",
+    "ConstraintSystem": "constraint_system",
+    "CutJoints": "constraint_system",
     "Partition": "partitions",
     "Rank": "ranks",
-    "Rates": "assembly",
+    "Rates": "assembly_velocity",
     "Scales": "scales",
     "Terms": "embedded",
-    "VelocityEquations": "assembly",
+    "VelocityEquations": "assembly_velocity",
     "accelerate": "embedded",
-    "assemble": "assembly",
-    "assemble_velocity": "assembly",
+    "assemble_velocity": "assembly_velocity",
     "choose_independent": "ranks",
     "conditioning": "ranks",
     "correct_position": "projection",
@@ -54,6 +56,8 @@ _HOMES = {
 
 __all__ = [
     "Assembly",
+    "ConstraintSystem",
+    "CutJoints",
     "Partition",
     "Rank",
     "Rates",
@@ -61,7 +65,6 @@ __all__ = [
     "Terms",
     "VelocityEquations",
     "accelerate",
-    "assemble",
     "assemble_velocity",
     "choose_independent",
     "conditioning",

@@ -11,10 +11,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .assembly import RESTARTS, Assembly, assemble
-from .closure import ClosureSystem, WantedValues
+from ..errors import AssemblyError, UnavailableError
+from .closure import ClosureSystem, WantedValues, close, closed
+from .projection import largest
 from .scales import Array, Indices, Scales
 from .space import settle
+from .starts import starts
+
+RESTARTS = 24  #: further starts near the guess
+
+
+class Assembly(NamedTuple):
+    """An assembled position."""
+
+    q: Array  #: (n_q,)
+    residual: float  #: largest scaled residual
+    restarts: int  #: starts needed besides the guess
+    distance: float  #: largest scaled distance of a coordinate from the guess
 
 
 class CutJoints(NamedTuple):
@@ -100,20 +113,46 @@ class ConstraintSystem(NamedTuple):
         free[self.scales.velocities(self.indices(held))] = 0.0
         return ClosureSystem(self.position, self.scales, free, self.wanted(held))
 
+    @np.errstate(all="ignore")
     def close(self, guess: Array, held: Mapping[str, float], restarts: int = RESTARTS) -> Assembly:
-        """Close the loops from a guess with some values exact; see :func:`~.assembly.assemble`."""
-        alignment = self.alignment
-        return assemble(
-            self.position,
-            self.with_values(guess, held),
-            self.scales,
-            held=self.indices(held),
-            equations=self.wanted(held),
-            alignment=None if alignment is None else lambda q: alignment(q, self.t),
-            names=self.names,
-            labels=self.labels,
-            restarts=restarts,
-        )
+        """Close the loops.
+
+        Parameters
+        ----------
+        guess : (n_q,) array
+        held : mapping of str to float
+            Coordinates of the tree or of cut joints and their exact values.
+        restarts : int
+            Largest number of further starts, at fixed places around the guess.
+
+        Returns
+        -------
+        Assembly
+            The first closed position found without flipped axes; from a good guess the nearest one.
+
+        Raises
+        ------
+        AssemblyError
+            With the rows that stay open, what was held, and whether leaving the given values free helps.
+        """
+        system, guess = self.closure(held), self.with_values(guess, held)
+        best, least, flipped = guess, np.inf, False
+        for attempt, start in enumerate(starts(guess, system.free, self.scales, restarts)):
+            q, residual = close(system, start)
+            if not closed(residual):
+                if residual < least:
+                    best, least = q, residual
+            elif not self.aligned(q):
+                flipped = True
+            else:
+                return Assembly(q, residual, attempt, largest(self.scales.distance(q, guess)))
+        try:
+            from .assembly_failure import AssemblyFailure
+        except UnavailableError:
+            raise AssemblyError("the loops do not close with the given values; give others") from None
+        moved = self.scales.velocities(self.indices(held))
+        failure = AssemblyFailure(system, guess, moved, best, flipped, self.names, self.labels, restarts)
+        raise AssemblyError(failure.message(), [label for label, _ in failure.open_rows()])
 
     def gradients(self, q: Array, name: str) -> list[Array]:
         """Scaled gradients of a coordinate: three for e0, which stands for its rotation, none for e1 .. e3."""

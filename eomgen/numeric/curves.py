@@ -52,7 +52,7 @@ def predict(scales: Scales, here: Point, bend: Array, h: float) -> Array:
 
 
 def interpolate(points: Sequence[Point], scales: Scales, s: Array) -> Array:
-    """Positions (n_q, k) at parameters s (k,) between points of a curve, by cubics through them and their directions."""
+    """Positions (n_q, k) at parameters s (k,) between points of a curve, cubics through them and their directions."""
     if len(points) == 1:
         return np.repeat(points[0].q[:, None], len(s), axis=1)
     nodes = np.array([p.s for p in points])

@@ -1,4 +1,4 @@
-"""Stage numeric: points of a curve up to a singular position -> a point behind it that continues the motion smoothly."""
+"""Stage numeric: points of a curve up to a singular position -> one behind it that goes on smoothly."""
 
 from __future__ import annotations
 

@@ -17,8 +17,9 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly import RESTARTS, Rates, VelocityEquations, assemble_velocity
+from ..numeric.assembly_velocity import Rates, VelocityEquations, assemble_velocity
 from ..numeric.closure import close, closed
+from ..numeric.constraint_system import RESTARTS
 from ..numeric.held_path import follow
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
