@@ -123,8 +123,11 @@ class Initial:
         )
 
     @np.errstate(all="ignore")
-    def assembled(self, given: Mapping[str, float]) -> Array:
-        """Position with the given values exact, and the declared ones where they leave room."""
+    def assembled(self, given: Mapping[str, float], rough: bool = False) -> Array:
+        """Position with the given values exact, and the declared ones where they leave room.
+
+        Warns where that leaves the branch of the reference position, unless the values are a ``rough`` guess.
+        """
         layout = self.layout
         declared = self.sort(layout.initial).positions
         if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
@@ -152,7 +155,8 @@ class Initial:
             if not soft:
                 raise
             found = self.system.close(start, given).q
-        if len(self.compatible(start, (), given)) == len(given):  # else they stand still there, and it has no branch
+        # where they stand still at the reference, it is on no branch of theirs
+        if not rough and len(self.compatible(start, (), given)) == len(given):
             self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
         return found
 
@@ -160,12 +164,12 @@ class Initial:
         """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
         layout = self.layout
         if not layout.n_h:
-            return self.assembled(guess)
+            return self.assembled(guess, rough=True)
         favoured = [layout.velocity_labels[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
             try:
-                return self.assembled(guess)
+                return self.assembled(guess, rough=True)
             except AssemblyError:
                 pass
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
