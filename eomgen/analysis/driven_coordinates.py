@@ -8,7 +8,7 @@ singular positions, where the led coordinates do not determine the motion.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -188,4 +188,7 @@ class DrivenPath(NamedTuple):
         return None if q is None else Point(s, q, self.tangent(s, q))
 
 
-DrivenContinuation: TypeAlias = Continuation[DrivenPath]
+class DrivenContinuation(Continuation):
+    """A continuation along such a path."""
+
+    curve: DrivenPath

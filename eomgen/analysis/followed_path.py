@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.motions import ALIGNED, POOR, SAME
-from ..numeric.continuation import Continuation
 from ..numeric.curves import ASTRAY, Point, interpolate
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
-from .driven_coordinates import DrivenPath
+from .driven_coordinates import DrivenContinuation, DrivenPath
 from .singular import Singular, find_change_points, find_stop, name_singular
 
 
@@ -32,7 +31,7 @@ class FollowedPath:
     def __init__(self, path: DrivenPath, start: Array, end: float, known: float = 0.0, extent: float = 0.0) -> None:
         self.path, self.end = path, end
         self.driven = driven = path.driven
-        self.continuation = continuation = Continuation(path, start, extent)
+        self.continuation = continuation = DrivenContinuation(path, start, extent)
         whole = continuation.to(end, known)
         self.interpolants, self.singular = find_change_points(continuation)
         self.stop: Singular | None = None
@@ -126,7 +125,7 @@ class FollowedPath:
         if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
             return found
         before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
-        short = Continuation(self.path.beyond(before.s), before.q)
+        short = DrivenContinuation(self.path.beyond(before.s), before.q)
         short.to(s - before.s)
         return short.points[-1].q
 

@@ -15,10 +15,10 @@ import numpy as np
 from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
 from ..numeric.curves import Point, Tangent
 from ..numeric.projection import largest
+from ..numeric.roots import SECTIONS, carry_out, find_root, search_least
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant, build_interpolant
 from .driven_coordinates import DrivenContinuation, DrivenCoordinates
-from .roots import find_root
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
@@ -112,11 +112,9 @@ def _worst(continuation: DrivenContinuation, interpolant: ChangePointInterpolant
     def quality(s: float) -> float:
         return continuation.curve.tangent(s, interpolant.at(s)[0]).quality
 
-    part = 0.5 * (5.0**0.5 - 1.0)
-    for _ in range(60):
-        a, b = high - part * (high - low), low + part * (high - low)
-        low, high = (low, b) if quality(a) < quality(b) else (a, high)
-    return 0.5 * (low + high)
+    middle = 0.5 * (low + high)
+    width = (high - low) * 0.6**SECTIONS
+    return carry_out(search_least(low, middle, high, quality(middle), width), quality)[1]
 
 
 def find_stop(continuation: DrivenContinuation, last: Point) -> tuple[float, Point]:

@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..numeric import algebra
+from ..numeric.roots import find_root
 from ..numeric.scales import Array
-from .roots import find_root
 from .singular import SHARE, Singular
 from .workspace_flood import OUT, Flood, Stage
 from .workspace_grid import Index

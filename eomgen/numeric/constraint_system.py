@@ -92,20 +92,19 @@ class ConstraintSystem(NamedTuple):
                 y[k], y_q[k] = cut[0][j], cut[1][j]
         return y, y_q
 
-    def sizes(self, names: Sequence[str]) -> Array:
-        """The scales (k,) of coordinates of the tree or of cut joints."""
-        tree = {name: self.scales.q[self.scales.velocities([i])[0]] for i, name in enumerate(self.names)}
-        return np.array([(tree | dict(zip(self.cut.names, self.cut.scales, strict=True)))[name] for name in names])
-
     def wanted(self, values: Mapping[str, float], names: Sequence[str] | None = None) -> WantedValues | None:
         """Values as equations, of cut joints alone where no names are given; None if there are none."""
         if names is None:
             names = [name for name in values if name in self.cut.names]
         if not names:
             return None
-        angles = [name in self.cut.names and self.cut.kinds[self.cut.names.index(name)] == "angle" for name in names]
-        numbers = np.array([values[name] for name in names], dtype=float)
-        return WantedValues(partial(self.measure, names), numbers, self.sizes(names), angles, names)
+        sizes = {name: self.scales.q[self.scales.velocities([i])[0]] for i, name in enumerate(self.names)}
+        sizes |= dict(zip(self.cut.names, self.cut.scales, strict=True))
+        kinds = dict(zip(self.cut.names, self.cut.kinds, strict=True))
+        numbers, scales = np.array([values[name] for name in names]), np.array([sizes[name] for name in names])
+        return WantedValues(
+            partial(self.measure, names), numbers, scales, [kinds.get(n) == "angle" for n in names], names
+        )
 
     def closure(self, held: Mapping[str, float]) -> ClosureSystem:
         """The equations where these values are held."""

@@ -8,15 +8,18 @@ point behind it that continues the motion smoothly, if there is one.
 
 from __future__ import annotations
 
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import UnavailableError
 from ..limits.motions import BLOCKED, UNJUDGED
-from .curves import OFF, TURNED, Point, PositionCurve, predict
+from .curves import OFF, TURNED, Point, predict
 from .projection import largest
 from .scales import Array
+
+if TYPE_CHECKING:
+    from .curves import PositionCurve
 
 FIRST = 0.1  #: scaled motion in the first step
 LONG = 0.35  #: scaled motion aimed at in one step
@@ -25,10 +28,7 @@ FEWEST = 50  #: steps of a continuation over time
 STEPS = 200_000  #: of one continuation
 
 
-C = TypeVar("C", bound=PositionCurve)
-
-
-class Continuation(Generic[C]):
+class Continuation:
     """Follows one curve.
 
     Parameters
@@ -43,7 +43,7 @@ class Continuation(Generic[C]):
         Steps at least, however still it stands, so that short driver pulses are not skipped.
     """
 
-    def __init__(self, curve: C, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
+    def __init__(self, curve: PositionCurve, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
         self.curve, self.scales, self.extent, self.fewest = curve, curve.scales, extent, fewest
         self.points = [Point(0.0, start, curve.tangent(0.0, start))]
         self.leaps: list[tuple[Point, Point]] = []

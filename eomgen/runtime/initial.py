@@ -117,8 +117,7 @@ class Initial:
         """Warn that a position was found by closing the loops anew."""
         warnings.warn(
             f"{what} is not reached from the reference position without leaving its branch: {error}.  The loops are "
-            "closed from the nearest guess instead; branches() gives all positions found, assemble() the one near a "
-            "guess",
+            "closed from the nearest guess; branches() gives all positions found, assemble() the one near a guess",
             stacklevel=2,
         )
 

@@ -14,8 +14,8 @@ from ..analysis.followed_path import FollowedPath
 from ..analysis.kinematic import complete, follow_to_start, start_from
 from ..analysis.kinematic_motion import KinematicAnalysis, keep
 from ..analysis.open_joint import describe_gap
-from ..analysis.roots import find_root
 from ..errors import SimulationError, UsageError
+from ..numeric.roots import find_root
 from ..numeric.scales import Array
 from ..runtime.signals import Forcing
 from .events import UNWATCHED, Events, RunEvent
