@@ -173,7 +173,7 @@ class Derivation:
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html_text(str(self))}</pre>"
+        return f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
 
     def _repr_latex_(self) -> str | None:
         from .graph.sympy_raise import inlined_size

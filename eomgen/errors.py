@@ -27,6 +27,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -34,6 +36,9 @@ from .texts import shortened, visible
 
 #: Characters of each part of a problem that are shown: names and expressions may be as long as the file.
 SHOWN = 2000
+#: Files that users do not write: installed packages and eomgen's own.
+_HERE = re.escape(os.path.dirname(os.path.abspath(__file__)))
+_INSTALLED = re.compile(rf"[/\\](site|dist)-packages[/\\]|^{_HERE}|^<frozen")
 
 
 class EomgenError(Exception):
@@ -41,6 +46,27 @@ class EomgenError(Exception):
 
     def __str__(self) -> str:
         return visible(super().__str__())
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows: the lines of the user's own code that led here, not those of eomgen and NumPy.
+
+        ``%xmode Verbose`` shows all of them.
+        """
+        import sys
+        import traceback
+
+        shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+        if getattr(getattr(shell, "InteractiveTB", None), "mode", "") == "Verbose":
+            return "".join(traceback.format_exception(self)).splitlines()
+        naming = getattr(getattr(shell, "compile", None), "format_code_name", lambda _: None)
+        lines = []
+        for one in traceback.extract_tb(self.__traceback__):
+            if not _INSTALLED.search(one.filename):
+                cell = naming(one.filename)
+                place = " ".join(cell) if cell else f'File "{one.filename}"'
+                lines += [f"  {place}, line {one.lineno}, in {one.name}", f"    {one.line}"]
+        head = "Traceback of your own lines (%xmode Verbose, then %tb, shows all):"
+        return [*([head, *lines] if lines else []), f"{type(self).__name__}: {self}"]
 
 
 class Problem(NamedTuple):

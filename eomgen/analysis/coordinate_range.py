@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..runtime.given_start import Start
 from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number, read_numbers
@@ -59,7 +58,7 @@ def motion_range(
     module: BoundModel,
     /,
     name: str,
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Any = None,
     *,
@@ -100,7 +99,7 @@ def motion_range(
 def _follow_both_ways(
     module: BoundModel,
     name: str,
-    initial: Mapping[str, float] | ArrayLike | None,
+    initial: Start,
     t: float,
     within: tuple[float, float] | None,
 ) -> MotionRange:

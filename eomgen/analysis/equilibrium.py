@@ -13,7 +13,7 @@ from ..numeric.scales import Array
 from ..runtime.initial import Initial
 from ..runtime.near_names import read_names, unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_number, read_numbers
+from ..runtime.room import read_number, read_numbers, read_value
 from .balance_search import find_balance
 from .balanced import Equilibrium, describe, read_coordinates
 from .search import Search
@@ -73,7 +73,7 @@ def equilibrium(
     unknowns = read_names("unknowns", unknowns)
     by_name = isinstance(hold, Mapping)
     wanted: dict[str, float | None] = dict(hold) if by_name else dict.fromkeys(read_names("hold", hold))  # type: ignore[arg-type]
-    given = {name: read_number(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
+    given = {name: read_value(f"hold: {name}", value) for name, value in wanted.items() if value is not None}
     initial = Initial(module.kernels, time)
     if initial.sort(given).rates:
         raise UsageError(f"hold takes coordinates, not rates: {', '.join(initial.sort(given).rates)}")
@@ -99,7 +99,7 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
     """A closed position near the guess that has the held values."""
     initial = Initial(module.kernels, t)
     if guess is None or isinstance(guess, Mapping):
-        values = {name: read_number(name, value) for name, value in (guess or {}).items()}
+        values = {name: read_value(name, value) for name, value in (guess or {}).items()}
         if initial.sort(values).rates:
             raise UsageError("a guess is a position: name coordinates, not rates")
         loose = {name: value for name, value in values.items() if name not in held}

@@ -17,9 +17,10 @@ from ..limits.constraints import EXACT, UNMOVED
 from ..limits.motions import ALIGNED, SINGULAR
 from ..numeric.projection import largest
 from ..numeric.scales import Array
+from ..runtime.given_start import Start, last_state
 from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
-from ..runtime.room import read_flag, read_number, read_numbers, require_room
+from ..runtime.room import read_flag, read_numbers, read_value, require_room
 from ..texts import shown
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
@@ -98,7 +99,7 @@ def kinematic_analysis(
     module: BoundModel,
     /,
     t: ArrayLike | None = None,
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Any = None,
     *,
@@ -146,9 +147,7 @@ def kinematic_analysis(
     return analyse(module, asked, initial, partial)
 
 
-def analyse(
-    module: BoundModel, asked: Range, initial: Mapping[str, float] | ArrayLike | None, partial: bool
-) -> KinematicAnalysis:
+def analyse(module: BoundModel, asked: Range, initial: Start, partial: bool) -> KinematicAnalysis:
     """Follow the range from the initial position."""
     if module.layout.n_h < module.layout.n_c:
         module.layout.require_minimal_form()
@@ -183,7 +182,7 @@ def analyse(
     return follow_range(driven, asked, q, partial, led)
 
 
-def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | None, t0: float) -> tuple[float, Array]:
+def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Array]:
     """A closed position and its time: as given, or the declared one at t = 0."""
     from ..runtime.initial import Initial
 
@@ -198,11 +197,11 @@ def start_from(module: BoundModel, initial: Mapping[str, float] | ArrayLike | No
             return t0, Initial(module.kernels, t0).assembled({})
     here = Initial(module.kernels, t0)
     if isinstance(initial, Mapping):
-        given = here.sort({name: read_number(name, value) for name, value in initial.items()})
+        given = here.sort({name: read_value(name, value) for name, value in initial.items()})
         if given.rates:
             raise UsageError(f"initial tells positions only, not {', '.join(given.rates)}")
         return t0, here.assembled(given.positions)
-    q = np.array(read_numbers("initial", initial))
+    q = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if q.shape == (layout.n_x,):
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):

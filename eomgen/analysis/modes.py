@@ -8,18 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import UsageError
+from ..errors import EomgenError, UsageError
+from ..files.inline_pictures import image_html
+from ..limits.descriptions import SHOWN_COMPLEX
 from ..limits.statics import SYMMETRIC
 from ..numeric import algebra
 from ..numeric.definite import definite_factor
 from ..numeric.scales import Array
+from ..runtime.drawing import load_show
 from ..runtime.initial import Initial
 from ..runtime.room import read_numbers
+from ..texts import html_text
 from .equilibrium import equilibrium
 from .linear import linearize
 from .linearization import Linearization
@@ -28,6 +33,9 @@ from .tables import as_html, as_text, number
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
+
+
+SHAPES = 3  #: modes that a notebook shows
 
 
 class Damped(NamedTuple):
@@ -62,10 +70,10 @@ class Modes:
     linear : Linearization
     """
 
-    def __init__(self, linear: Linearization) -> None:
+    def __init__(self, linear: Linearization, module: BoundModel) -> None:
         assert linear.mass is not None
         assert linear.tangent is not None
-        self.linear, self.name = linear, linear.name
+        self.linear, self.name, self._module = linear, linear.name, module
         self.names, self.v_names = linear.velocity_names, linear.layout.v
         self.squares, self.shapes = _undamped(linear.mass, stiffness(linear))
         turned = np.abs(linear.A[: len(linear.position_names), len(linear.position_names) :])
@@ -103,14 +111,55 @@ class Modes:
                 what = "rigid body" if self._still[k] else f"diverges, {np.sqrt(-square):.6g} 1/s"
             lines.append((f"mode {k + 1}", f"{what}: {shape}"))
         for mode in self.damped:
-            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {mode.ratio:.4g}"))
+            shown = mode.ratio if abs(mode.ratio) > SHOWN_COMPLEX else 0.0
+            lines.append(("with damping", f"{number(mode.eigenvalue)}, ratio {shown:.4g}"))
         return lines
 
     def __repr__(self) -> str:
         return as_text(f"Modes of {self.name}", self.facts)
 
+    def animate(self, mode: int = 1, file: str | Path | None = None, **options: Any) -> Any:
+        """Show a mode shape as it swings, enlarged until it is well seen; loops stay closed.
+
+        Parameters
+        ----------
+        mode : int
+            From 1, the slowest, as they are listed.
+        file : str or Path, optional
+            ``.gif``, ``.mp4``, ``.html`` or a folder for frames, as of a trajectory; a k3d plot by default.
+        **options
+            ``names``, ``axes``, ``trace``, ``fps``, ``dpi`` as of :meth:`~..runtime.trajectory.Trajectory.animate`.
+
+        Raises
+        ------
+        UsageError
+            There is no such mode, or the model has no bodies.
+        MissingDependencyError
+        """
+        if isinstance(mode, bool) or not isinstance(mode, int) or not 1 <= mode <= len(self.squares):
+            raise UsageError(f"mode is one of 1 to {len(self.squares)}, not {mode!r}")
+        return self._show().animate_mode(self._module, self.linear.x, self._shown(mode - 1), file, **options)
+
+    def _show(self) -> Any:
+        return load_show("mode_shapes", "an animation")
+
+    def _shown(self, k: int) -> tuple[Array, str]:
+        """The displacements q' of a mode, and what is written above it."""
+        v, space = self.motions[:, k], self.linear.layout.space
+        found = v if space is None else space.rates(self.linear.x[: self.linear.layout.n_q], v)
+        return found, f"mode {k + 1}" + (f": {self.hertz[k]:.4g} Hz" if self.hertz[k] else "")
+
     def _repr_html_(self) -> str:
-        return as_html(f"Modes of {self.name}", self.facts)
+        table = as_html(f"Modes of {self.name}", self.facts)
+        if self._module.metadata.get("picture") is None or not len(self.squares):
+            return table
+        swinging = [k for k in range(len(self.squares)) if self.hertz[k]] or list(range(len(self.squares)))
+        shown = [self._shown(k) for k in swinging[:SHAPES]]
+        try:
+            data = self._show().swinging_gif(self._module, self.linear.x, shown)
+        except EomgenError as error:
+            return f"{table}<p><i>no picture: {html_text(str(error).partition(chr(10))[0])}</i></p>"
+        return table + image_html(data, "gif")
 
 
 def stiffness(linear: Linearization) -> Array:
@@ -198,4 +247,4 @@ def modes(
             f"modes are those about an equilibrium, and here {linear.states[k]} changes at a rate of "
             f"{linear.drift[k]:.6g}; find one with equilibrium(), or take the eigenvalues of linearize()"
         )
-    return Modes(linear)
+    return Modes(linear, module)

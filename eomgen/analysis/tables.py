@@ -11,6 +11,8 @@ from ..texts import html_table
 def number(value: complex, digits: int = 6) -> str:
     """A real or complex number as people read it."""
     value = complex(value)
+    if abs(value.real) <= SHOWN_COMPLEX * abs(value.imag):  # rounding
+        value = complex(0.0, value.imag)
     if abs(value.imag) <= SHOWN_COMPLEX * max(1.0, abs(value)):
         return f"{value.real:.{digits}g}"
     return f"{value.real:.{digits}g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.{digits}g}j"

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import UsageError
+from ..files.inline_pictures import picture_html
 from ..files.writing import whole_file
 from ..numeric import algebra
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
+from ..runtime.given_start import Start
 from ..runtime.near_names import require, unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number
@@ -225,7 +226,14 @@ class Workspace:
         return as_text(self.title, self.facts)
 
     def _repr_html_(self) -> str:
-        return as_html(self.title, self.facts)
+        return as_html(self.title, self.facts) + picture_html(self._figure)
+
+    def _figure(self) -> Any:
+        figure = require("matplotlib.figure", "matplotlib", "a picture").Figure(
+            figsize=(9.0, 3.9), layout="constrained"
+        )
+        self.plot(figure=figure)
+        return figure
 
     def __repr__(self) -> str:
         return f"<Workspace of {self.name}: {np.count_nonzero(self.reached)} of {self.reached.size} points reached>"
@@ -249,7 +257,7 @@ def workspace(
     /,
     over: Mapping[str, Any],
     of: str | Sequence[str],
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Any = None,
     *,

@@ -9,17 +9,16 @@ direction come out as foretold; else it is halved; near singular positions the s
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import AssemblyError, PartitionError
 from ..limits.motions import SLACK
 from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
 from ..numeric.scales import Array
+from ..runtime.given_start import Start
 from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic import complete, start_from
@@ -64,9 +63,7 @@ class Stage:
         Time (s), if it is not varied.
     """
 
-    def __init__(
-        self, module: BoundModel, grid: Grid, initial: Mapping[str, float] | ArrayLike | None, t: float
-    ) -> None:
+    def __init__(self, module: BoundModel, grid: Grid, initial: Start, t: float) -> None:
         self.module, self.grid = module, grid
         names = tuple(name for name in grid.names if name != "t")
         layout = module.layout

@@ -9,11 +9,16 @@ from typing import TYPE_CHECKING, Any
 from .. import pipeline
 from ..describe.builder import Builder
 from ..describe.sympy_face import name_of
+from ..errors import UsageError
+from ..files.inline_pictures import picture_html, side_by_side
 from .equations import Equations, derive
 
 if TYPE_CHECKING:
     from ..kinematics.report import MechanismReport
     from .module import Module
+
+
+SMALL = 30  #: bodies of a model that is drawn whenever a notebook shows it
 
 
 class Model(Builder):
@@ -68,6 +73,20 @@ class Model(Builder):
         >>> axes = model.draw({"theta": 0.3})  # doctest: +SKIP
         """
         return self.compile(target="numpy").draw(x, ax, **options)
+
+    def _repr_html_(self) -> str:
+        table = super()._repr_html_()
+        if not self.description.sections["bodies"]:
+            return table
+        return side_by_side(picture_html(self._small_figure), table)
+
+    def _small_figure(self) -> Any:
+        count = len(self.description.sections["bodies"])
+        if count > SMALL:
+            raise UsageError(f"{count} bodies take a while to draw; draw() does it")
+        from ..show.draw import small_figure
+
+        return small_figure(self.compile(target="numpy"))
 
     def derive(
         self,

@@ -12,9 +12,9 @@ from types import MethodType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import left_out
+from ..runtime.argument_names import both_names
 from ..runtime.bound_model import BoundModel
 from ..runtime.near_names import find_lacking
-from ..runtime.refusals import require_velocities
 
 if TYPE_CHECKING:
     from ..analysis.consistent import consistent as _consistent
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ..runtime.canonical import Canonical
     from ..runtime.drawing import draw as _draw
     from ..runtime.drawing import draw_branches as _draw_branches
+    from ..runtime.drawing import explore as _explore
     from ..runtime.minimal import Minimal
     from ..runtime.summary import report as _report
     from ..simulation.dae_solution import Dae
@@ -69,7 +70,35 @@ CALLS: dict[str, str | Callable[..., Any]] = {
     "report": "runtime.summary",
     "draw": "runtime.drawing",
     "draw_branches": "runtime.drawing",
+    "explore": "runtime.drawing",
 }
+
+
+#: Other form of the same equations -> the file of its class.
+FORMS = {
+    "minimal": "runtime.minimal",
+    "canonical": "runtime.canonical",
+    "dae": "simulation.dae_solution",
+}
+
+
+def find_function(file: str, name: str) -> Any:
+    """A function or class of another part of the package, which is loaded now.
+
+    Raises
+    ------
+    MissingDependencyError
+        A slim package was generated without it.
+    """
+    try:
+        found = getattr(import_module(f"..{file}", __package__), name, None)
+    except ModuleNotFoundError as error:
+        found = None
+        if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
+            raise  # something else that it needs
+    if found is None:
+        raise left_out(name.lower())
+    return found
 
 
 class LateMethod:
@@ -77,26 +106,14 @@ class LateMethod:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.function: Any = None
 
     def __get__(self, model: Any, kind: type[Any]) -> Any:
-        if self.function is None:
-            self.function = self._find()
         return self.function if model is None else MethodType(self.function, model)
 
-    def _find(self) -> Any:
+    @cached_property
+    def function(self) -> Any:
         found = CALLS[self.name]
-        if callable(found):
-            return found
-        try:
-            function = getattr(import_module(f"..{found}", __package__), self.name, None)
-        except ModuleNotFoundError as error:
-            if not str(error.name).startswith(f"{__package__.rpartition('.')[0]}."):
-                raise  # something else that it needs
-            function = None
-        if function is None:
-            raise left_out(self.name)
-        return function
+        return both_names(found if callable(found) else find_function(found, self.name))
 
 
 class Module(BoundModel):
@@ -150,6 +167,12 @@ class Module(BoundModel):
         ``project(x, t=0.0)`` -> the nearest x on the constraints.
     poses : callable
         ``poses(q)`` -> (n_bodies, 4, 4), body frames to ground.
+    minimal : Minimal
+        The strictly minimal form, ``x = [q_i; v_i]``, if the model has one.
+    canonical : Canonical
+        Hamilton's equations on [q; p], of a model derived by ``hamilton``.
+    dae : Dae
+        F(t, y, y') = 0 with multipliers, for differential-algebraic solvers.
     """
 
     if TYPE_CHECKING:  # what type checkers and editors read; at run time each is a Call
@@ -176,28 +199,10 @@ class Module(BoundModel):
         report = _report
         draw = _draw
         draw_branches = _draw_branches
-
-    @cached_property
-    def minimal(self) -> Minimal:
-        """The strictly minimal form, ``x = [q_i; v_i]``, if the model has one."""
-        from ..runtime.minimal import Minimal
-
-        return Minimal(self)
-
-    @cached_property
-    def canonical(self) -> Canonical:
-        """Hamilton's equations on [q; p], of a model derived by ``hamilton``."""
-        from ..runtime.canonical import Canonical
-
-        return Canonical(self)
-
-    @cached_property
-    def dae(self) -> Dae:
-        """F(t, y, y') = 0 with multipliers, for differential-algebraic solvers."""
-        from ..simulation.dae_solution import Dae
-
-        require_velocities(self.layout)
-        return Dae(self)
+        explore = _explore
+        minimal: Minimal
+        canonical: Canonical
+        dae: Dae
 
     def __getattr__(self, name: str) -> Any:
         if name in ("DOP853", "RK45", "RK23", "Radau", "Taylor"):
@@ -206,6 +211,9 @@ class Module(BoundModel):
             return find_solver(self, name)
         if name in CALLS:  # an analysis of a user's own
             return LateMethod(name).__get__(self, type(self))
+        if name in FORMS:
+            form = self.__dict__[name] = find_function(FORMS[name], name.capitalize())(self)
+            return form
         return find_lacking(self, "a Module", name)
 
     def __dir__(self) -> list[str]:
@@ -217,9 +225,9 @@ class Module(BoundModel):
         return line(self)
 
     def _repr_html_(self) -> str:
-        from ..runtime.summary import html
+        from ..runtime.notebook import module_html
 
-        return html(self)
+        return module_html(self)
 
 
 for _name in CALLS:

@@ -11,6 +11,7 @@ import click
 
 from ..runtime.origin import origin
 from .failures import reports_failures
+from .number_option import Number
 from .screen import stage
 from .shared_options import (
     blaming_option,
@@ -45,7 +46,7 @@ class Prepared(NamedTuple):
         return {"name": self.equations.name, "method": self.equations.method, "origin": origin(self.module), "t": t}
 
 
-time_option = click.option("--time", "t", type=float, default=0.0, show_default=True, metavar="T", help="Time in s.")
+time_option = click.option("--time", "t", type=Number(), default=0.0, show_default=True, metavar="T", help="Time in s.")
 
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (

@@ -18,6 +18,7 @@ from .failures import USAGE
 VERBS = {
     "run": "Derive, compile and simulate a model.",
     "ensemble": "Run a model many times, with values from a table or drawn at random.",
+    "view": "Show how a mechanism moves, in a browser or a file.",
     "kinematics": "Analyse the motion over a range of time or coordinates, without forces.",
     "check": "Report a model's topology, mobility and faults.",
     "derive": "Derive the equations of motion and count their operations.",

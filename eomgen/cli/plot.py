@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import click
 import numpy as np
 
 from ..errors import MissingDependencyError, UsageError
 from ..files.writing import save_figure
+from .shared_options import split_names
 
 if TYPE_CHECKING:
     from ..describe.mechanism import Mechanism
     from ..runtime import Trajectory
-
-BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
-BELOW: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "fontsize": "small", "frameon": False}
-POINTS = 2000  #: of a smooth curve, from the dense output
 
 
 def require_plotting(file: Path, option: str = "--plot") -> None:
@@ -51,44 +51,96 @@ def find_paths(mechanism: Mechanism) -> list[tuple[str, str]]:
     return [(first, second) for first, second in pairs]
 
 
-def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, file: Path) -> None:
-    """Draw a run and write the picture; the suffix of ``file`` says its format.
+class Picture(NamedTuple):
+    """What is to be drawn of a run: columns, over what, and of which kind."""
+
+    columns: tuple[str, ...] = ()
+    against: str | None = None
+    kind: str = "time"
+
+
+def check_picture(file: Path | None, picture: Picture) -> None:
+    """Fail before the work if nothing can be drawn, or if it is said what to draw and not where.
+
+    Raises
+    ------
+    MissingDependencyError, UsageError
+    """
+    if file is not None:
+        require_plotting(file)
+    elif picture != Picture():
+        raise UsageError("--columns, --against and --plot-as say what --plot FILE draws; give it too")
+
+
+def picture_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """``--columns``, ``--against`` and ``--plot-as``, handed to the verb as one ``picture``."""
+
+    @functools.wraps(verb)
+    def wrapped(*args: Any, columns: tuple[str, ...], against: str | None, plot_as: str, **kwargs: Any) -> Any:
+        return verb(*args, picture=Picture(columns, against, plot_as), **kwargs)
+
+    for option in reversed(_PICTURE):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+_PICTURE = (
+    click.option(
+        "--columns",
+        multiple=True,
+        callback=split_names,
+        metavar="NAME",
+        help="Columns that --plot draws, separated by commas; all coordinates by default.",
+    ),
+    click.option("--against", metavar="NAME", help="The column they are drawn over, instead of time."),
+    click.option(
+        "--plot-as",
+        type=click.Choice(["time", "phase", "energy", "residuals", "spectrum"]),
+        default="time",
+        help="What --plot draws: columns over time, phase portraits, energy, residuals or a spectrum.",
+    ),
+)
+
+
+def plot_run(trajectory: Trajectory, paths: list[tuple[str, str]], title: str, file: Path, picture: Picture) -> None:
+    """Draw a run or a kinematic analysis and write the picture; the suffix of ``file`` says its format.
 
     Parameters
     ----------
     trajectory : Trajectory
-        With dense output.
     paths : list of (str, str)
-        Pairs of columns to draw against each other.
+        Pairs of columns to draw against each other, beside the coordinates over time.
     title : str
     file : Path
         Its folder is made if need be.
+    picture : Picture
+        What was asked for; without wishes all coordinates and the paths are drawn.
     """
     from matplotlib.figure import Figure
 
-    smooth = trajectory.at(np.linspace(trajectory.t[0], trajectory.t[-1], POINTS))
-    names = [*trajectory.metadata["q_names"], *trajectory.metadata["loop_names"]]
-    groups = {label: [n for n in names if (trajectory.units.get(n) == "m") == (label == "m")] for label in ("rad", "m")}
-    panels = {label: group for label, group in groups.items() if group}
-    figure = Figure(figsize=(7.0 + 4.0 * bool(paths), 1.2 + 2.6 * len(panels)), layout="constrained", dpi=120)
-    grid = figure.add_gridspec(len(panels), 2 if paths else 1, width_ratios=[1.6, 1.0] if paths else [1.0])
-    axes = None
-    for row, (label, group) in enumerate(panels.items()):
-        axes = figure.add_subplot(grid[row, 0], sharex=axes)
-        for name in group:
-            axes.plot(smooth.t, smooth[name], label=name, linewidth=1.2)
-        axes.set_ylabel(label)
-        axes.grid(alpha=0.3)
-        axes.legend(**BESIDE)
-    if axes is not None:
-        axes.set_xlabel("t (s)")
+    from ..runtime.plotting import Curves, choose, draw_panel, height, stack
+    from ..runtime.refined import refined
+
+    led = trajectory.metadata.get("led", ())
+    own = picture == Picture()
+    over = led[0] if own and led and not np.ptp(trajectory.t) else picture.against
+    names = picture.columns
+    if own:
+        names = tuple(n for n in (*trajectory.metadata["q_names"], *trajectory.metadata["loop_names"]) if n != over)
+    panels, across = choose(trajectory, names, over, None, picture.kind)
+    paths = paths if own else []
+    size = (8.2 + 4.4 * bool(paths), max(3.2, sum(map(height, panels)) + 0.9))
+    figure = Figure(figsize=size, layout="constrained", dpi=120)
+    grid = figure.add_gridspec(1, 2 if paths else 1, width_ratios=[1.6, 1.0] if paths else [1.0])
+    for ax in stack(figure, grid[0], panels, across):
+        for singular in getattr(trajectory, "singular", ()):
+            if over is None or over in singular.values:
+                ax.axvline(singular.t if over is None else singular.values[over], color="0.6", ls=":", lw=1)
     if paths:
-        plane = figure.add_subplot(grid[:, 1])
-        for first, second in paths:
-            plane.plot(smooth[first], smooth[second], label=f"({first}, {second})", linewidth=1.2)
-        plane.set_aspect("equal", adjustable="datalim")
+        plane = figure.add_subplot(grid[1])
+        _, columns = refined(trajectory, tuple(dict.fromkeys(name for pair in paths for name in pair)))
+        curves = [(f"({a}, {b})", columns[a], columns[b]) for a, b in paths]
+        draw_panel(plane, Curves("", curves, equal=True), below=True)
         plane.set_title("paths (m)", fontsize="medium")
-        plane.grid(alpha=0.3)
-        plane.legend(**BELOW)
-    figure.suptitle(title)
+    figure.suptitle(title, parse_math=False)
     save_figure(figure, file)

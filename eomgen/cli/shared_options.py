@@ -16,6 +16,7 @@ from ..files.reading import kind_of
 from ..files.writing import refuse_link
 from ..suggestions import closest
 from ..targets import TARGETS
+from .number_option import NumberRange
 
 if TYPE_CHECKING:
     from ..api.model import Model
@@ -62,7 +63,7 @@ def _find_solver(ctx: click.Context, param: click.Parameter, value: str | None) 
     raise click.BadParameter(f"no integrator {value!r}; there are {', '.join(SOLVERS)} (derivation: --method)")
 
 
-_TOLERANCE = click.FloatRange(min=0, min_open=True)
+_TOLERANCE = NumberRange(min=0, min_open=True)
 _SOLVER = (
     click.option(
         "--solver",
@@ -101,14 +102,15 @@ def target_option(*targets: str) -> Callable[[Callable[..., Any]], Callable[...,
     )
 
 
-def _split(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+def split_names(ctx: click.Context, param: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """Names that are given one by one or separated by commas."""
     return tuple(name.strip() for words in value for name in words.split(",") if name.strip())
 
 
 independent_option = click.option(
     "--independent",
     multiple=True,
-    callback=_split,
+    callback=split_names,
     metavar="NAME",
     help="Independent coordinate of a mechanism with loops; several: repeat it, or separate by commas.",
 )
@@ -151,7 +153,7 @@ _ROBOT = (
     click.option("--actuate", is_flag=True, help="Robots: an input tau_<joint> on every joint of one degree."),
     click.option(
         "--friction",
-        type=click.FloatRange(min=0, min_open=True),
+        type=NumberRange(min=0, min_open=True),
         metavar="VELOCITY",
         help="Robots: dry friction of joints acts, smoothed below this velocity (rad/s or m/s).",
     ),

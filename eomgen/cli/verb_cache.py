@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .failures import reports_failures
+from .number_option import NumberRange
 from .screen import print_json, print_table, readable_size, say
 from .shared_options import json_option
 
@@ -62,8 +63,8 @@ def show(as_json: bool) -> None:
 
 
 @cache.command()
-@click.option("--older-than", type=click.FloatRange(min=0), metavar="DAYS", help="Remove what was not used so long.")
-@click.option("--max-size", type=click.FloatRange(min=0), metavar="MB", help="Remove the oldest until so much is left.")
+@click.option("--older-than", type=NumberRange(min=0), metavar="DAYS", help="Remove what was not used so long.")
+@click.option("--max-size", type=NumberRange(min=0), metavar="MB", help="Remove the oldest until so much is left.")
 @json_option
 @reports_failures
 def prune(older_than: float | None, max_size: float | None, as_json: bool) -> None:

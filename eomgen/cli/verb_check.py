@@ -14,7 +14,7 @@ from .screen import print_json, say
 from .shared_options import json_option, load_model, model_argument, native_option, robot_options
 
 if TYPE_CHECKING:
-    from ..api.model import Model
+    pass
 
 
 def _print_schema(context: click.Context) -> None:
@@ -64,7 +64,9 @@ def check(
     if graph is not None:
         report.draw(graph)
     if draw is not None:
-        save_figure(draw_position(described), draw)
+        from ..show.draw import figure_at
+
+        save_figure(figure_at(described.compile(target="numpy")), draw)
     if as_json:
         print_json(report.to_dict())
     else:
@@ -73,17 +75,3 @@ def check(
             say(f"wrote {graph}")
         if draw is not None:
             say(f"wrote {draw}")
-
-
-def draw_position(described: Model) -> Any:
-    """A figure of a model at its initial position."""
-    from matplotlib.figure import Figure
-
-    from ..show.build_scene import build_scene
-    from ..show.draw import draw_scene, figure_of
-
-    module = described.compile(target="numpy")
-    scene = build_scene(module, module.x0()[: module.n_q, None])
-    figure: Figure = figure_of(scene)
-    draw_scene(scene, figure.axes[0])
-    return figure

@@ -16,6 +16,7 @@ from ..files.writing import save_figure, write_whole
 from ..runtime.near_names import require
 from ..runtime.room import require_room
 from .analysis import Prepared, analysis_options
+from .number_option import Number, NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .shared_options import require_folder
 
@@ -37,13 +38,13 @@ MOST_WORKERS = 4096  #: processes of a local cluster
 @click.option("--vary", multiple=True, metavar="NAME=LOW:HIGH", help="Draw a value evenly between both for each run.")
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="Number of runs to draw.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the numbers drawn.")
-@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option("--samples", type=click.IntRange(min=2), metavar="M", help="Keep the states at M times.")
 @click.option("--statistics", is_flag=True, help="Keep mean, deviation, least and greatest only.")
 @click.option("--solver", metavar="NAME", help="Integrator; that of the file by default.")
-@click.option("--step", type=float, metavar="H", help="Size of the steps of RK4 in s.")
-@click.option("--rtol", type=float, metavar="X", help="Relative tolerance.")
-@click.option("--atol", type=float, metavar="X", help="Absolute tolerance.")
+@click.option("--step", type=Number(), metavar="H", help="Size of the steps of RK4 in s.")
+@click.option("--rtol", type=Number(), metavar="X", help="Relative tolerance.")
+@click.option("--atol", type=Number(), metavar="X", help="Absolute tolerance.")
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Runs at a time; all processors by default.")
 @click.option("--cluster", metavar="N|ADDRESS", help="Run on N dask workers here, or on those of a scheduler.")
 @click.option(

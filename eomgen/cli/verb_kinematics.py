@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .failures import reports_failures
+from .plot import Picture, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
 from .shared_options import (
     blaming_option,
@@ -60,6 +61,7 @@ SHOWN = 9  #: of them on the screen
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Value of a parameter, or start position.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write all columns to FILE.npz or .csv.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw them, e.g. to FILE.png.")
+@picture_options
 @json_option
 @reports_failures
 def kinematics(
@@ -76,6 +78,7 @@ def kinematics(
     settings: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    picture: Picture,
     as_json: bool,
 ) -> None:
     """Analyse the motion of a model over a range of time or coordinates, without forces.
@@ -88,10 +91,7 @@ def kinematics(
     grid = read_grid(over, of, within_limits, bool(ranges))
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: the motion is written as {' or '.join(TABLES)}")
-    if plot is not None:
-        from .plot import require_plotting
-
-        require_plotting(plot)
+    check_picture(plot, picture)
     require_folder("--out", out)
     require_folder("--plot", plot)
 
@@ -102,7 +102,7 @@ def kinematics(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
-    named = _values(module, asked) if asked or not (limits or grid) else {}
+    named = range_values(module, asked) if asked or not (limits or grid) else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()
     with stage("kinematics"):
@@ -115,10 +115,7 @@ def kinematics(
         motion.save(out)
         files.append(str(out))
     if motion is not None and plot is not None:
-        from .plot import find_paths
-        from .plot_motion import plot_motion
-
-        plot_motion(motion, find_paths(equations.kinematics.mechanism), plot)
+        plot_run(motion, find_paths(equations.kinematics.mechanism), motion.name, plot, picture)
         files.append(str(plot))
     if space is not None:
         files += write_workspace(space, out, plot)
@@ -174,7 +171,8 @@ def _count(text: str) -> int:
         raise UsageError(f"the count is a whole number of points, 1 to 10000000, not {text!r}") from None
 
 
-def _values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+def range_values(module: Module, asked: list[tuple[str, float, float, int | None]]) -> dict[str, Any]:
+    """Arrays over the ranges asked for, by name; of the time where drivers leave nothing free."""
     if not asked:
         if module.n_dof:
             free = ", ".join(module.layout.velocity_labels[i] for i in module.layout.independent)

@@ -12,6 +12,7 @@ from ..errors import UsageError
 from ..files.writing import whole_file
 from ..limits.descriptions import SHOWN_FORCE
 from .analysis import Prepared, analysis_options, time_option
+from .number_option import Number
 from .screen import print_heading, print_json, print_table, say, stage
 from .shared_options import require_folder
 
@@ -22,7 +23,7 @@ COMPONENTS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 @analysis_options
 @time_option
 @click.option(
-    "--end", type=float, metavar="T", help="Simulate to T and give the largest values; else the initial state."
+    "--end", type=Number(), metavar="T", help="Simulate to T and give the largest values; else the initial state."
 )
 @click.option(
     "--out", type=click.Path(path_type=Path), metavar="FILE", help="With --end: histories to FILE.csv or .npz."

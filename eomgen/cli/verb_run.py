@@ -11,6 +11,8 @@ import click
 
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
+from .number_option import NumberRange
+from .plot import Picture, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 from .shared_options import (
     baumgarte_option,
@@ -49,7 +51,7 @@ POINTS = 5  #: change points listed
 @baumgarte_option
 @independent_option
 @target_option("cython", "numpy")
-@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option(
     "--set",
     "settings",
@@ -70,7 +72,7 @@ POINTS = 5  #: change points listed
 )
 @click.option(
     "--checkpoint-every",
-    type=click.FloatRange(min=0),
+    type=NumberRange(min=0),
     metavar="SECONDS",
     help="Write that file so often; 60 s by default.",
 )
@@ -79,6 +81,7 @@ POINTS = 5  #: change points listed
     default=None,
     help="The checkpoint must be there / begin anew; by default go on if it is there.",
 )
+@picture_options
 @json_option
 @solver_options
 @robot_options
@@ -94,6 +97,7 @@ def run(
     settings: tuple[str, ...],
     out: Path | None,
     plot: Path | None,
+    picture: Picture,
     animate: Path | None,
     checkpoint: Path | None,
     checkpoint_every: float | None,
@@ -109,12 +113,9 @@ def run(
     chosen = parse_settings(settings)
     if out is not None and out.suffix not in TABLES:
         raise UsageError(f"--out {out}: a run is written as {' or '.join(TABLES)}")
-    if plot is not None:
-        from .plot import require_plotting
-
-        require_plotting(plot)
+    check_picture(plot, picture)
     if animate is not None:
-        from ..show.animate import require_kind
+        from ..show.writers import require_kind
 
         require_kind(animate)
     require_folder("--out", out)
@@ -152,7 +153,7 @@ def run(
     seconds = {**equations.seconds, "simulate": perf_counter() - start}
     with after_integration():
         energy = balance_energy(equations, trajectory)
-        files = _write(equations, trajectory, out, plot)
+        files = _write(equations, trajectory, out, plot, picture)
         if animate is not None:
             with stage("animate"):
                 files.append(str(trajectory.animate(animate)))
@@ -190,13 +191,13 @@ def sort_settings(
     return initial, parameters, inputs
 
 
-def _write(equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None) -> list[str]:
+def _write(
+    equations: Equations, trajectory: Trajectory, out: Path | None, plot: Path | None, picture: Picture
+) -> list[str]:
     if out is not None:
         trajectory.save(out)
     if plot is not None:
-        from .plot import find_paths, plot_run
-
-        plot_run(trajectory, find_paths(equations.kinematics.mechanism), trajectory.name, plot)
+        plot_run(trajectory, find_paths(equations.kinematics.mechanism), trajectory.name, plot, picture)
     return [str(file) for file in (out, plot) if file is not None]
 
 

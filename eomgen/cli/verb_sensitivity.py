@@ -8,6 +8,7 @@ import click
 
 from ..errors import UsageError
 from .analysis import Prepared, analysis_options
+from .number_option import NumberRange
 from .screen import finite, print_heading, print_json, print_table, say, stage
 from .shared_options import require_folder
 
@@ -15,7 +16,7 @@ from .shared_options import require_folder
 @click.command()
 @analysis_options
 @click.option("--by", multiple=True, metavar="NAME", help="Parameter, input or initial value; all parameters if none.")
-@click.option("--end", type=click.FloatRange(min=0, min_open=True), metavar="T", help="End time in s.")
+@click.option("--end", type=NumberRange(min=0, min_open=True), metavar="T", help="End time in s.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="Write them to FILE.npz or FILE.csv.")
 def sensitivity(work: Prepared, by: tuple[str, ...], end: float | None, out: Path | None, as_json: bool) -> None:
     """Integrate a model together with its derivatives, and report those at the end."""

@@ -8,6 +8,7 @@ import click
 
 from .analysis import Prepared, analysis_options
 from .failures import BREACH
+from .number_option import NumberRange
 from .screen import print_json, say, stage
 
 
@@ -17,7 +18,7 @@ from .screen import print_json, say, stage
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random states.")
 @click.option(
     "--seconds",
-    type=click.FloatRange(min=0.0),
+    type=NumberRange(min=0.0),
     default=12.0,
     show_default=True,
     help="For all of it; variants have what is left.",

@@ -15,7 +15,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..elements.looks import Contour, Seen, Wheel
+from ..elements.looks import Contour, LiftCurve, Seen, Wheel
 from ..frames import Frame, Marker
 from ..graph.core import Expr, atan2, cos, sin, sqrt
 from ..records import dataclass
@@ -43,6 +43,9 @@ class CamLift(Constraint):
     lift: Profile
     phase: Expr
     kind: str
+
+    def drawn(self) -> list[Seen]:
+        return [LiftCurve(self.cam, self.follower, self.lift.expression, self.lift.local, self.phase)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("lift", self.follower - self.lift.at(self.cam - self.phase), self.kind)]

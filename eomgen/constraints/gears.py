@@ -7,7 +7,7 @@ from typing import ClassVar
 from ..elements.element_type import ElementType, table
 from ..elements.entry import Entry
 from ..elements.field import Field
-from ..elements.looks import PitchCircles, Seen
+from ..elements.looks import PitchCircles, RackAndPinion, Seen
 from ..graph.core import Expr, sin
 from ..records import dataclass
 from .constraint import Condition, Constraint, ConstraintView
@@ -62,6 +62,9 @@ class Rack(Constraint):
     rack: Expr
     radius: Expr
     offset: Expr
+
+    def drawn(self) -> list[Seen]:
+        return [RackAndPinion(self.pinion, self.rack, self.radius)]
 
     def conditions(self, view: ConstraintView) -> list[Condition]:
         return [Condition("travel", self.rack - self.radius * self.pinion - self.offset, "length")]

@@ -9,6 +9,8 @@ from ..graph.shown import shown
 from ..texts import html_text
 from .description import DescribedEntry, Description, items, label_of, text_of
 
+LONG = 40  #: rows of a table more than which it is folded up
+
 
 def reference_text(value: Any) -> str:
     """A body, marker or joint as it is shown."""
@@ -56,4 +58,8 @@ def model_html(description: Description) -> str:
                 f"<tr><td>{first}</td><td>{html_text(shown(entry.name))}</td>"
                 f"<td style='text-align:left'>{html_text(_summary(entry))}</td></tr>"
             )
-    return f"<table>{''.join(rows)}</table>"
+    table = f"<table>{''.join(rows)}</table>"
+    if len(rows) <= LONG:
+        return table
+    counts = ", ".join(f"{len(entries)} {section}" for section, entries in description.sections.items() if entries)
+    return f"<details><summary>{html_text(name)}: {counts}</summary>{table}</details>"

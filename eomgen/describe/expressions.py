@@ -266,6 +266,13 @@ class _Walker:
         if declared is not None:
             zeros = (0,) * declared.arity
             return Expr(self.graph, self.graph.call(declared, zeros, [x.id for x in arguments]))
+        if name == "deg":  # an angle in degrees
+            return self.apply(
+                node,
+                "div",
+                self.apply(node, "mul", *arguments, self.graph.constant(math.pi)),
+                self.graph.constant(180.0),
+            )
         if name == "heaviside":  # 0, 1/2 at 0, 1
             return 0.5 * (1.0 + self.apply(node, "sign", *arguments))
         row = next(row for row in OPERATIONS.values() if row.word == name)

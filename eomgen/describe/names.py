@@ -19,7 +19,7 @@ def function_words() -> dict[str, tuple[int, int]]:
     """Functions an expression may call, with the least and the greatest number of arguments."""
     rows = [row for row in OPERATIONS.values() if row.word]
     found = {row.word: (row.arity, MOST if row.many else row.arity) for row in rows}
-    return {**found, "heaviside": (1, 1), "diff": (2, 17)}
+    return {**found, "heaviside": (1, 1), "deg": (1, 1), "diff": (2, 17)}
 
 
 #: Motion of a marker in ground axes: name -> (level 0 position, 1 velocity, 2 acceleration; axis).

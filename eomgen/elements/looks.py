@@ -106,7 +106,25 @@ class Contour(NamedTuple):
     high: float
 
 
-Seen = Drawn | Wheel | PitchCircles | Contour
+class RackAndPinion(NamedTuple):
+    """A pinion of a radius (m, signed) at the joint of one angle, and a rack at the joint of one length."""
+
+    pinion: Expr
+    rack: Expr
+    radius: Expr
+
+
+class LiftCurve(NamedTuple):
+    """The curve that a follower that slides describes on its cam: its coordinate over the cam's angle less a phase."""
+
+    cam: Expr
+    follower: Expr
+    lift: Expr
+    parameter: Expr
+    phase: Expr
+
+
+Seen = Drawn | Wheel | PitchCircles | Contour | RackAndPinion | LiftCurve
 
 
 def _arc(radius: float, start: float, end: float, steps: int) -> Points:

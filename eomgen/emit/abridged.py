@@ -9,7 +9,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Sequence
+from textwrap import fill
+from textwrap import indent as indented
 
+from ..texts import WIDTH
 from .selection import Selection
 from .uses import Import, SourceText, assigned, is_text, is_typing
 
@@ -50,6 +53,8 @@ class _AbridgedText:
             for inner in ast.walk(node):
                 if isinstance(inner, ast.FunctionDef | ast.ClassDef):
                     self._shorten(inner)
+                if isinstance(inner, ast.FunctionDef) and self.lines[inner.lineno - 1] is not None:
+                    self._fill(inner)
         elif names := list(assigned(node)):
             if not any((source.name, name) in selection.kept for name in names):
                 self._cut(node)
@@ -76,12 +81,13 @@ class _AbridgedText:
     def _attributes(self, block: ast.If) -> None:
         """What a class says to type checkers: an attribute whose type is not there goes."""
         for node in block.body:
-            if isinstance(node, ast.Assign) and isinstance(node.value, ast.Name):
-                one = self.source.types.get(node.value.id)
+            kind = node.value if isinstance(node, ast.Assign) else getattr(node, "annotation", None)
+            if isinstance(kind, ast.Name):
+                one = self.source.types.get(kind.id)
                 if one is not None and not self.selection.defined(one):
                     self._cut(node)
                 else:
-                    self.selection.annotated.add((self.source.name, node.value.id))
+                    self.selection.annotated.add((self.source.name, kind.id))
 
     def _types(self, block: ast.If) -> None:
         """What only type checkers read: a name that is not there is Any to them."""
@@ -109,6 +115,19 @@ class _AbridgedText:
             first -= 1
         for k in range(first, node.end_lineno or node.lineno):
             self.lines[k] = None
+
+    def _fill(self, node: ast.FunctionDef) -> None:
+        """Write a signature that has an argument on each line in as few lines as hold it."""
+        first, end = node.lineno - 1, node.body[0].lineno - 1
+        if end - first < 4 or not (self.lines[end - 1] or "").lstrip().startswith(")"):
+            return
+        indent = " " * node.col_offset
+        returns = f" -> {ast.unparse(node.returns)}" if node.returns is not None else ""
+        whole = re.sub("(?<!,) ", "\xa0", ast.unparse(node.args))  # lines end after a comma
+        lines = fill(whole, WIDTH - len(indent), break_on_hyphens=False, break_long_words=False)
+        arguments = indented(lines.replace("\xa0", " "), "    ")
+        text = f"def {node.name}(\n{arguments}\n){returns}:"
+        self.lines[first:end] = [indented(text, indent), *[None] * (end - first - 1)]
 
     def _shorten(self, node: ast.Module | ast.ClassDef | ast.FunctionDef) -> None:
         """Keep the first paragraph of a docstring."""

@@ -1,6 +1,7 @@
 """Stage emit: generated files of a package -> the files of eomgen that they can import, so that it stands alone.
 
-Imports are read from the text, those in functions too; tables that name files as text (``CALLS``) count as imports.
+Imports are read from the text, those in functions too; tables that name files as text (``CALLS``, ``FORMS``) count as
+imports.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ ALONE = ("errors", "kernel_table", "suggestions", "texts", "analysis", "api", "e
 
 _TYPES = re.compile(r"^if TYPE_CHECKING:.*\n(?:(?: {4}.*)?\n)+", re.M)
 _IMPORT = re.compile(r"^( *)from (\.+)([\w.]*) import (?:\(([^)]*)\)|(.*))$", re.M)
-_TABLE = re.compile(r"^CALLS\b.* = \{\n((?:    .*\n)+)\}", re.M)
+_TABLE = re.compile(r"^(?:CALLS|FORMS)\b.* = \{\n((?:    .*\n)+)\}", re.M)
 _ROW = re.compile(r'^    "\w+": "([\w.]+)",$', re.M)
 
 
@@ -74,8 +75,7 @@ def _names() -> frozenset[str]:
 def _reached(name: str) -> tuple[tuple[str, bool], ...]:
     """What a file of eomgen imports, and whether it does so as it is loaded."""
     text = _text(name)
-    table = _TABLE.search(text)
-    named = _ROW.findall(table[1]) if table else []
+    named = [home for table in _TABLE.findall(text) for home in _ROW.findall(table)]
     return (*_imports(name, _TYPES.sub("\n", text)), *((home.replace(".", "/"), False) for home in named))
 
 

@@ -252,3 +252,8 @@ class Ensemble:
         failed = int((~self.ok).sum())
         lost = f", {failed} failed" if failed else ""
         return f"<Ensemble of {self._module.name}: {self.count} runs to t = {self._plan.span[1]:.6g} s{lost}>"
+
+    def _repr_html_(self) -> str:
+        from .ensemble_display import ensemble_html
+
+        return ensemble_html(self)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import EomgenError, UsageError
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
+from ..runtime.given_start import last_state
 from ..runtime.near_names import check_names
 from ..runtime.room import read_numbers, require_room
 from ..simulation.run_arguments import find_state
@@ -108,7 +109,7 @@ def collect_cases(
         known = (*module.x_names, *module.loop_names, *module.layout.loop_rates)
         check_names("coordinate or rate", values, known)
     elif initial is not None:
-        states = _columns("initial", initial, module.x_names, lengths)
+        states = _columns("initial", last_state(initial, module.x_names), module.x_names, lengths)
     _require_one_length(lengths)
     k = next(iter(lengths.values()), 1)
     require_room(f"simulate_many with {k} runs", float(k) * module.n_x, "give fewer runs")

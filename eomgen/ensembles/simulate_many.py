@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import UsageError
 from ..numeric.counts import read_count
+from ..runtime.given_start import Span
 from ..runtime.near_names import check_names
 from ..runtime.room import require_room, require_steps
 from ..runtime.signal_rates import fill_rates, rate_pairs
@@ -40,7 +41,7 @@ OPTIONS = ("rtol", "atol", "max_step", "first_step")
 def simulate_many(
     module: BoundModel,
     /,
-    span: float | tuple[float, float] | None = None,
+    span: Span = None,
     initial: Mapping[str, Any] | ArrayLike | None = None,
     parameters: Mapping[str, Any] | ArrayLike | None = None,
     inputs: Mapping[str, Any] | ArrayLike | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -68,18 +69,40 @@ def place(report: Counted) -> Places:
 
 def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any:
     """Draw it; see :meth:`.report.MechanismReport.draw`."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependencyError('the picture needs matplotlib: pip install "eomgen[plot]"') from error
-    places = place(report)
-    if ax is None:
-        size = (min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0))
-        ax = Figure(figsize=size, layout="constrained").add_subplot()
+    if ax is None and file is None:  # one that a notebook or a window shows
+        ax = _part("pyplot").figure(figsize=_size(place(report)), layout="constrained").add_subplot()
+    elif ax is None:
+        ax = _part("figure").Figure(figsize=_size(place(report)), layout="constrained").add_subplot()
     if file is not None:
         known = ax.figure.canvas.get_supported_filetypes()
         if as_path("file", file).suffix[1:].lower() not in known:
             raise UsageError(f"{file}: the ending says what kind of picture; there are .{', .'.join(sorted(known))}")
+    _fill(report, ax)
+    if file is not None:
+        save_figure(ax.figure, file)
+    return ax
+
+
+def new_figure(report: Counted) -> Any:
+    """A figure of it without a window."""
+    figure = _part("figure").Figure(figsize=_size(place(report)), layout="constrained")
+    _fill(report, figure.add_subplot())
+    return figure
+
+
+def _part(name: str) -> Any:
+    try:
+        return import_module(f"matplotlib.{name}")
+    except ImportError as error:
+        raise MissingDependencyError('the picture needs matplotlib: pip install "eomgen[plot]"') from error
+
+
+def _size(places: Places) -> tuple[float, float]:
+    return min(1.0 + WIDE * max(places.columns, 3), 40.0), min(1.3 + HIGH * (places.layers + 1), 40.0)
+
+
+def _fill(report: Counted, ax: Any) -> None:
+    places = place(report)
     font = max(SMALLEST, min(LARGEST, 10.0 * 40.0 / WIDE / max(places.columns, 27)))
     tree = {branch["joint"] for branch in report.tree}
     ends = [_Line(j["name"], j["type"], j["bodies"][0], j["bodies"][1], j["name"] in tree) for j in report.joints]
@@ -97,9 +120,6 @@ def draw(report: Counted, file: str | Path | None = None, ax: Any = None) -> Any
     for body, (x, y) in places.bodies.items():
         ax.annotate(body, (x, y), ha="center", va="center", fontsize=font, bbox=box, zorder=4)
     _finish(ax, report, middle, half, places.layers)
-    if file is not None:
-        save_figure(ax.figure, file)
-    return ax
 
 
 class _Line(NamedTuple):

@@ -8,6 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
+from ..files.inline_pictures import picture_html, side_by_side
 from ..frames import Frame, Marker
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -17,6 +18,7 @@ from ..texts import html_text
 from .kinematics import Kinematics
 from .mobility import Mobility
 from .notes import find_notes
+from .picture import draw, new_figure
 
 WIDTH = 110  #: of the lines of a report
 WHOLE_WORDS: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
@@ -86,7 +88,7 @@ class MechanismReport:
         file : str or Path, optional
             Where to write the picture; its ending says the format (svg, png, pdf).
         ax : matplotlib Axes, optional
-            Where to draw; by default a figure of its own.
+            Where to draw; by default a new figure, which a notebook shows.
 
         Returns
         -------
@@ -99,8 +101,6 @@ class MechanismReport:
         UsageError
             A file name whose ending is no kind of picture.
         """
-        from .picture import draw
-
         return draw(self, file, ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -154,7 +154,8 @@ class MechanismReport:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html_text(str(self))}</pre>"
+        text = f"<pre style='font-family:monospace'>{html_text(str(self))}</pre>"
+        return side_by_side(picture_html(lambda: new_figure(self)), text) if self.bodies else text
 
 
 def _list(names: list[str], limit: int = 12) -> str:

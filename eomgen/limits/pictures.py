@@ -2,6 +2,12 @@
 
 #: Relative distance of points, directions and moments that count as one: rounding of poses, far below a line's width.
 SAME = 1e-9
+#: Relative difference of a coordinate from what a slider asks for that counts as none: far below a step of it.
+HELD = 1e-6
+#: Relative step of coordinates for the displacements of points in a mode: about the cube root of rounding.
+STEP = 1e-5
+#: Amplitudes that a spectrum shows at least, of the greatest.
+FAINT = 1e-9
 #: Relative size of rounding in numbers of order 1 that have gone through a few operations.
 ROUNDED = 1e-12
 #: Divisors below it are zero: the smallest numbers without subnormal ones.

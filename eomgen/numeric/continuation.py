@@ -102,9 +102,9 @@ class Continuation:
         off = largest(self.scales.distance(found.q, ahead))
         move = largest(self.scales.distance(found.q, here.q))
         turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
-        if not (off <= max(OFF * move, UNJUDGED) and turned <= max(TURNED * move, UNJUDGED) and move <= JUMP):
+        worst = largest(np.array([off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED)]))
+        if not (worst <= 1.0 and move <= JUMP):
             return None
-        worst = max(off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED))
         if h >= 0.999 * self.step:
             self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
         return found
@@ -119,7 +119,6 @@ class Continuation:
 
     def _bend(self, here: Point) -> Array:
         """Second derivative along s, from the point before."""
-        if len(self.points) < 2 or self.points[-2].s >= here.s:
-            return np.zeros_like(here.tangent.rate)
-        before = self.points[-2]
-        return (here.tangent.rate - before.tangent.rate) / (here.s - before.s)
+        before = self.points[max(len(self.points) - 2, 0)]
+        change, gap = here.tangent.rate - before.tangent.rate, here.s - before.s
+        return change / gap if gap > 0.0 else np.zeros_like(change)

@@ -6,20 +6,25 @@ module is drawn with the values it is bound to, without the description it was m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..describe.mechanism import JointSpec, Mechanism
-from ..elements.looks import Contour, Drawn, PitchCircles, Seen, Wheel
+from ..elements.looks import Contour, Drawn, LiftCurve, PitchCircles, RackAndPinion, Seen, Wheel
 from ..errors import UsageError
 from ..frames import Frame, Marker, WrapCylinder
 from ..graph.core import Expr
 from ..graph.evaluate import evaluate
 from ..graph.substitute import substitute, symbols_of
 from ..graph.tape import record_tape
+from ..numeric.user_functions import Curve
 
 #: Symbols that stand for the parameters of a curve or a surface.
 RUNNING = ("$0", "$1")
+SAMPLES = 361  #: points of a curve that calls a table
 
 
 class _Numbers:
@@ -51,15 +56,38 @@ class _Numbers:
         """Whether they depend on nothing but parameters."""
         return symbols_of(several) <= self.places.keys()
 
-    def runs(self, point: Sequence[Expr]) -> bool:
-        """Whether a tape can follow a curve: it depends on parameters and on what runs, and calls no table."""
+    def curve(self, point: Sequence[Expr], low: float | None = None, high: float | None = None) -> list[Any] | None:
+        """Numbers of a point that runs along a curve; None where it depends on more than parameters.
+
+        Where it calls a table, which a tape does not know, ``{"samples": ...}``: its coordinates over even values of
+        what runs, from low to high, with the declared parameters.
+        """
         if not self.known(point):
-            return False
+            return None
         try:
             record_tape(list(point), self.places.__getitem__)
         except UsageError:
-            return False
-        return True
+            return self._sampled(point, low, high)
+        return self.numbers(point)
+
+    def _sampled(self, point: Sequence[Expr], low: float | None, high: float | None) -> list[Any] | None:
+        if RUNNING[1] in symbols_of(point):
+            return None  # a surface
+        if low is None or high is None:
+            tables = [f.evaluator for f, _ in self.graph.calls.values() if isinstance(f.evaluator, Curve)]
+            spans = [(table.knots[0], table.knots[-1]) for table in tables]
+            if not spans:
+                return None
+            low, high = max(a for a, _ in spans), min(b for _, b in spans)
+        s = np.linspace(low, high, SAMPLES)
+        try:
+            rows = evaluate(point, self.declared | {RUNNING[0]: s})
+        except UsageError:  # C code without a twin in Python
+            return None
+        values = [np.broadcast_to(np.asarray(row, dtype=float), s.shape) for row in rows]
+        if not np.isfinite(values).all():
+            return None
+        return [{"samples": row.tolist(), "low": float(low), "high": float(high)} for row in values]
 
     def frame(self, frame: Frame) -> dict[str, Any]:
         """A placement: rotation (3, 3) by rows, and position."""
@@ -123,8 +151,9 @@ def _joint(n: _Numbers, spec: JointSpec) -> dict[str, Any]:
     if shape is not None:
         running = {s: n.graph.symbol(name) for s, name in zip(shape.parameters, RUNNING, strict=False)}
         point = substitute(list(shape.point), running)
-        if n.runs(point):
-            found["guide"] = {"point": n.numbers(point), "running": len(shape.parameters)}
+        curve = n.curve(point)
+        if curve is not None:
+            found["guide"] = {"point": curve, "running": len(shape.parameters)}
     return found
 
 
@@ -142,12 +171,23 @@ def _element(n: _Numbers, seen: Seen, owners: Mapping[str, int]) -> dict[str, An
             return None
         joints = {"a": a, "b": b, "beside": beside}
         return {"kind": "circles", **joints, "ratio": n.number(seen.ratio), "belt": seen.belt}
+    if isinstance(seen, RackAndPinion):
+        pinion, rack = _owner(seen.pinion, owners), _owner(seen.rack, owners)
+        if pinion is None or rack is None or not n.known([seen.radius]):
+            return None
+        return {"kind": "rack", "a": pinion, "b": rack, "radius": n.number(seen.radius)}
+    if isinstance(seen, LiftCurve):
+        cam, follower = _owner(seen.cam, owners), _owner(seen.follower, owners)
+        lift = n.curve(substitute([seen.lift], {seen.parameter: n.graph.symbol(RUNNING[0])}), 0.0, 2.0 * math.pi)
+        if cam is None or follower is None or lift is None or not n.known([seen.phase]):
+            return None
+        return {"kind": "lift", "a": cam, "b": follower, "phase": n.number(seen.phase), "point": [*lift, 0.0, 0.0]}
     assert isinstance(seen, Contour)
     point = substitute(list(seen.point), {seen.parameter: n.graph.symbol(RUNNING[0])})
-    if not n.runs(point):
+    curve = n.curve(point, seen.low, seen.high)
+    if curve is None:
         return None
-    span = {"low": seen.low, "high": seen.high}
-    return {"kind": "contour", "marker": n.marker(seen.marker), "point": n.numbers(point), **span}
+    return {"kind": "contour", "marker": n.marker(seen.marker), "point": curve, "low": seen.low, "high": seen.high}
 
 
 def _owner(x: Expr | None, owners: Mapping[str, int]) -> int | None:

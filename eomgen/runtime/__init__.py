@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
+    from .loaded import load_trajectory
     from .minimal import Minimal
     from .numpy_core import NumpyCore
     from .protocols import Core
     from .signals import Signal
-    from .trajectory import Trajectory, load_trajectory
+    from .trajectory import Trajectory
 
 _HOMES = {
     "BoundModel": "bound_model",
@@ -23,7 +24,7 @@ _HOMES = {
     "NumpyCore": "numpy_core",
     "Signal": "signals",
     "Trajectory": "trajectory",
-    "load_trajectory": "trajectory",
+    "load_trajectory": "loaded",
 }
 
 __all__ = ["BoundModel", "Core", "Minimal", "NumpyCore", "Signal", "Trajectory", "load_trajectory"]

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.constraints import CHOSEN
 from ..numeric.scales import Array
+from .argument_names import both_names
 from .initial import Initial
 from .kernels import Kernels
 from .layout import Layout
 from .near_names import require_mapping
-from .room import read_number, read_numbers
+from .room import read_number, read_numbers, read_value
 
 
 class Assembled:
@@ -32,16 +33,17 @@ class Assembled:
         def bind(self, p: Any = None, u: Any = None) -> Self:
             """See :meth:`~.bound_model.BoundModel.bind`."""
 
+    @both_names
     @np.errstate(all="ignore")
     def x0(
         self,
-        values: Mapping[str, float] | None = None,
+        values: Mapping[str, float | str] | None = None,
         /,
         *,
         t: float = 0.0,
         p: Any = None,
         u: Any = None,
-        **named: float,
+        **named: float | str,
     ) -> Array:
         """An assembled state.
 
@@ -78,16 +80,17 @@ class Assembled:
         v = initial.velocities(q, given.rates if given.positions or given.rates else None)
         return np.concatenate([q, v])
 
+    @both_names
     @np.errstate(all="ignore")
     def assemble(
         self,
-        guess: Mapping[str, float] | None = None,
+        guess: Mapping[str, float | str] | None = None,
         /,
         *,
         t: float = 0.0,
         p: Any = None,
         u: Any = None,
-        **named: float,
+        **named: float | str,
     ) -> Array:
         """Close the loops from a guess.
 
@@ -115,16 +118,17 @@ class Assembled:
             raise UsageError(f"assemble takes positions only, not {', '.join(given.rates)}; x0 takes rates too")
         return initial.from_guess(given.positions) if values else initial.assembled({})
 
+    @both_names
     @np.errstate(all="ignore")
     def branches(
         self,
-        values: Mapping[str, float] | None = None,
+        values: Mapping[str, float | str] | None = None,
         /,
         *,
         t: float = 0.0,
         p: Any = None,
         u: Any = None,
-        **named: float,
+        **named: float | str,
     ) -> list[Array]:
         """All positions (n_q,) found that hold the given values, that of :meth:`x0` first.
 
@@ -135,6 +139,7 @@ class Assembled:
         first = initial.assembled(given, rough=True)
         return initial.branches(given or initial.sort(self.layout.initial).positions, first)
 
+    @both_names
     @np.errstate(all="ignore")
     def branch(self, x: ArrayLike, t: float = 0.0) -> int:
         """Which side of the dead centres a state or position lies on.
@@ -176,8 +181,8 @@ class Assembled:
         return Initial((self if p is None and u is None else self.bind(p, u)).kernels, read_number("t", t))
 
 
-def _numbers(values: Mapping[str, float] | None, named: Mapping[str, float]) -> dict[str, float]:
+def _numbers(values: Mapping[str, float | str] | None, named: Mapping[str, float | str]) -> dict[str, float]:
     if values is not None:
         require_mapping("initial values", values)
     merged = {**(values or {}), **named}
-    return {name: read_number(name, value) for name, value in merged.items()}
+    return {name: read_value(name, value) for name, value in merged.items()}

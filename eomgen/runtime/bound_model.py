@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..numeric.scales import Array
+from .argument_names import both_names
 from .assembled import Assembled
 from .kernels import Kernels, Projection, Rows
 from .layout import Layout
@@ -100,6 +101,7 @@ class BoundModel(Assembled, Momenta):
         """A copy of the inputs bound, (n_u,)."""
         return np.array(self.kernels.context.u)
 
+    @both_names
     def bind(self, p: Any = None, u: Any = None) -> Self:
         """The same model with other parameters and inputs.
 
@@ -170,6 +172,7 @@ class BoundModel(Assembled, Momenta):
 
         return DependentMotion(self.kernels), lru_cache(lambda t: self._initial(t, None, None).reference())
 
+    @both_names
     def kinematics(
         self,
         q_i: ArrayLike,

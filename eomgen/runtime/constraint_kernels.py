@@ -15,23 +15,19 @@ def constraint_system(kernels: Kernels, t: float = 0.0) -> ConstraintSystem:
     C = kernels.state("constraints", nan=True)
     slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
     C_q = kernels.state(slopes, nan=True)
-    zero = np.zeros(layout.n_v)
-    cut = CutJoints((), (), np.empty(0), lambda q, t: (np.empty(0), np.empty((0, layout.n_v))))
-    if layout.n_loop_coordinates:
-        y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
+    y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
+    alignment, zero = kernels.state("alignment", nan=True), np.zeros(layout.n_v)
 
-        def evaluate(q: Array, t: float) -> tuple[Array, Array]:
-            return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
+    def cut(q: Array, t: float) -> tuple[Array, Array]:
+        return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
 
-        cut = CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, evaluate)
-    alignment = kernels.state("alignment", nan=True) if layout.n_alignments else None
     return ConstraintSystem(
         lambda q, t: (C(q, t=t), C_q(q, t=t)),
         layout.place_scales,
         layout.q,
         layout.coordinate_kinds,
         layout.constraint_labels,
-        cut,
-        None if alignment is None else lambda q, t: alignment(q, t=t),
+        CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut),
+        (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None,
         t,
     )

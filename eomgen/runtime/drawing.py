@@ -79,6 +79,32 @@ def draw(
     return load_show("draw", "draw").draw(model, x, ax, t=t, names=names, axes=axes)
 
 
+def explore(model: BoundModel, /, x: Any = None) -> Any:
+    """Show the mechanism in a notebook with sliders for its independent coordinates and its lengths.
+
+    The loops are closed anew at each position, near the one before; where that cannot be done, a line says so.
+
+    Parameters
+    ----------
+    x : array (n_x,) or (n_q,), or mapping of str to float, optional
+        Where to begin, as for :func:`draw`.
+
+    Returns
+    -------
+    Explorer
+        A notebook shows it; ``q`` is the position, ``module`` has the parameters of the sliders.
+
+    Raises
+    ------
+    MissingDependencyError
+        k3d or ipywidgets is not installed.
+    UsageError
+        The model has no bodies, or x does not fit.
+    """
+    start = load_show("draw", "explore").position(model, x, 0.0)
+    return load_show("explore", "explore").explore(model, start)
+
+
 def draw_branches(
     model: BoundModel, /, values: Mapping[str, float] | None = None, *, t: float = 0.0, names: bool | None = None
 ) -> Any:

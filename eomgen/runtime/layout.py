@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
 from .near_names import check_names
-from .room import read_number, read_numbers
+from .room import read_numbers, read_value
 
 ABI = 1  #: layout of the metadata this file reads
 
@@ -189,7 +189,7 @@ class Layout:
             check_names(what, given, names)
             result = np.array(current, dtype=float)
             for name, value in given.items():
-                result[names.index(name)] = read_number(f"{what} {name}", value)
+                result[names.index(name)] = read_value(f"{what} {name}", value)
             self._check_masses(what, names, result)
             return result
         result = read_numbers(f"the {what}s", given)

@@ -11,6 +11,7 @@ from ..errors import UsageError
 from ..numeric.scales import Array
 from .drawing import load_show
 from .near_names import unknown
+from .refined import states_at
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -65,5 +66,5 @@ def position(trajectory: Any, name: str, model: BoundModel | None = None) -> Arr
 def animate(trajectory: Any, file: Path | str | None, model: BoundModel | None, options: dict[str, Any]) -> Any:
     """See :meth:`.trajectory.Trajectory.animate`."""
     module = module_of(trajectory, model, "an animation")
-    slopes = getattr(trajectory.columns, "slopes", None) if not trajectory.has_dense_output else None
-    return load_show("animate", "an animation").animate(trajectory, module, file, slopes=slopes, **options)
+    show = load_show("animate", "an animation")
+    return show.animate(trajectory, module, file, states=lambda t: states_at(trajectory, module, t), **options)

@@ -1,49 +1,310 @@
-"""Stage runtime: columns of a Trajectory -> axes of matplotlib, labelled with units."""
+"""Stage runtime: columns of a Trajectory -> axes of matplotlib: over time, against each other, phases, spectra."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from ..errors import UsageError
+from ..limits.pictures import FAINT
+from ..numeric.scales import Array
 from ..texts import visible
-from .near_names import require
+from .near_names import read_names, require, unknown
+from .refined import FINE, refined, states_at
 
 if TYPE_CHECKING:
     from .protocols import TrajectoryLike
 
+ROW = 0.165  #: height of a line of a legend (inch)
+LOWEST = 1.9  #: height of a panel (inch)
+DASHES = ("-", "--", ":", "-.")
+ALIKE = 20.0  #: ratio of the extents of a path of a point, at most
+COLOURS = 10  #: of matplotlib's cycle
+IN_A_COLUMN = 20  #: names of a legend
 
-def plot(trajectory: TrajectoryLike, names: Sequence[str], ax: Any = None) -> Any:
-    """Draw columns over time; see :meth:`.trajectory.Trajectory.plot`."""
-    rows = {name: trajectory[name] for name in names}  # unknown names fail before a figure opens
+
+class Curves(NamedTuple):
+    """One panel: curves of one unit.
+
+    Attributes
+    ----------
+    label : str
+        Of the vertical axis.
+    curves : list of (str, x, y)
+        The name of each and its points.
+    points : list of (float, float)
+        Places to be marked by a dot, such as where curves begin.
+    """
+
+    label: str
+    curves: list[tuple[str, Array, Array]]
+    points: Sequence[tuple[float, float]] = ()
+    logarithmic: bool = False
+    equal: bool = False  #: one scale for both axes
+    across: str = ""  #: label of a horizontal axis of its own
+
+
+def plot(
+    trajectory: TrajectoryLike,
+    names: Sequence[str],
+    ax: Any = None,
+    x: str | None = None,
+    y: str | Sequence[str] | None = None,
+    kind: str = "time",
+) -> Any:
+    """Draw columns; see :meth:`.trajectory.Trajectory.plot`."""
+    return _show(*choose(trajectory, names, x, y, kind), ax)
+
+
+def choose(
+    trajectory: TrajectoryLike, names: Sequence[str], x: str | None, y: str | Sequence[str] | None, kind: str
+) -> tuple[list[Curves], str]:
+    """Panels of what is asked for, and the label of their horizontal axis.
+
+    Raises
+    ------
+    UsageError
+        Unknown names, or wishes that do not go together.
+    """
+    names = (*names, *(() if y is None else read_names("y", y)))
+    known = ("t", *trajectory.names)
+    for name in (*names, *(() if x is None else (x,))):  # unknown names fail before a figure opens
+        if name not in known:
+            raise unknown("column", name, known)
+    if kind not in KINDS:
+        raise unknown("kind of plot", kind, KINDS)
+    if y is not None and x is None:
+        raise UsageError("y= goes with x=, for example plot(x='x', y='y'); columns over time are given as they are")
+    if x is not None and kind != "time":
+        raise UsageError(f"x= and kind={kind!r} do not go together; leave one out")
+    if x is not None and not names:
+        raise UsageError(f"plot(x={x!r}) has nothing to draw over it; give y= or names of columns")
+    panels, across = KINDS[kind](trajectory, tuple(dict.fromkeys(names)), x)
+    if not panels:
+        raise UsageError(f"there is nothing to plot of kind {kind!r}: the run has no coordinates")
+    return panels, across
+
+
+def _show(panels: list[Curves], across: str, ax: Any) -> Any:
     pyplot = require("matplotlib.pyplot", "matplotlib", "plot")
-    by_unit: dict[str, list[str]] = {}
-    for name in names:
-        by_unit.setdefault(trajectory.units.get(name, ""), []).append(name)
     if ax is None:
-        _, panels = pyplot.subplots(
-            len(by_unit), 1, sharex=True, squeeze=False, figsize=(7.0, 1.0 + 2.4 * len(by_unit)), layout="constrained"
-        )
-        axes = panels[:, 0]
+        figure = pyplot.figure(figsize=(8.2, sum(map(height, panels)) + 0.6), layout="constrained")
+        axes = stack(figure, None, panels, across)
+        return axes[0] if len(axes) == 1 else np.array(axes, dtype=object)
+    names = [name for panel in panels for name, _, _ in panel.curves]
+    for panel in panels:
+        draw_panel(ax, panel._replace(curves=[]))
+        for name, x, y in panel.curves:
+            ax.plot(x, y, label=name if len(names) > 1 else None, linewidth=1.2)
+    labels = [panel.label for panel in panels if panel.label]
+    units = list(dict.fromkeys(label for label in labels))
+    ax.set_ylabel(labels[0] if len(names) == 1 and labels else ", ".join(units), parse_math=False)
+    ax.set_xlabel(across, parse_math=False)
+    if len(names) > 1:
+        ax.legend(fontsize="small")
+    return ax
+
+
+def height(panel: Curves) -> float:
+    """Height that a panel wants, with room for its legend (inch)."""
+    if panel.equal:
+        return 5.0
+    return max(LOWEST, ROW * min(len(panel.curves), IN_A_COLUMN) + 0.3)
+
+
+def stack(figure: Any, grid: Any, panels: Sequence[Curves], across: str) -> list[Any]:
+    """Panels one above the other, sharing their horizontal axis.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    grid : matplotlib SubplotSpec or None
+        The part of the figure they share; all of it by default.
+    panels : sequence of Curves
+    across : str
+        Label of the horizontal axis.
+    """
+    heights = [height(panel) for panel in panels]
+    if grid is None:
+        cells = figure.add_gridspec(len(panels), 1, height_ratios=heights)
     else:
-        axes = [ax] * len(by_unit)
-    for panel, (unit, group) in zip(axes, by_unit.items(), strict=True):
-        for name in group:
-            panel.plot(trajectory.t, rows[name], label=name if len(group) > 1 or ax is not None else None)
-        if ax is None:
-            panel.set_ylabel(_label(group[0] if len(group) == 1 else "", unit), parse_math=False)
-            panel.grid(alpha=0.3)
-            if len(group) > 1:
-                panel.legend()
-    if ax is not None:
-        labels = [_label(name, trajectory.units.get(name, "")) for name in names]
-        units = ", ".join(dict.fromkeys(visible(unit, lines=False) for unit in by_unit if unit))
-        ax.set_ylabel(labels[0] if len(labels) == 1 else units, parse_math=False)
-        if len(names) > 1:
-            ax.legend()
-    axes[-1].set_xlabel("t (s)")
-    return axes if ax is None and len(by_unit) > 1 else axes[0]
+        cells = grid.subgridspec(len(panels), 1, height_ratios=heights)
+    axes: list[Any] = []
+    for k, panel in enumerate(panels):
+        own = panel.across or k == 0
+        ax = figure.add_subplot(cells[k], sharex=None if own else axes[0])
+        draw_panel(ax, panel)
+        axes.append(ax)
+        if panel.across or k + 1 == len(panels):
+            ax.set_xlabel(panel.across or across, parse_math=False)
+        else:
+            ax.tick_params(labelbottom=False)
+    figure.align_ylabels(axes)
+    return axes
 
 
-def _label(name: str, unit: str) -> str:
+def draw_panel(ax: Any, panel: Curves, below: bool = False) -> None:
+    """Draw one panel, its names outside: on the right, or below."""
+    several = len(panel.curves) > 1
+    for k, (name, x, y) in enumerate(panel.curves):
+        dash = DASHES[k // COLOURS % len(DASHES)]
+        ax.plot(x, y, dash, color=f"C{k % COLOURS}", linewidth=1.2, label=name if several else None)
+    for k, point in enumerate(panel.points):
+        ax.plot([point[0]], [point[1]], "o", markersize=4, color=f"C{k % COLOURS}")
+    if panel.logarithmic:
+        ax.set_yscale("log")
+    if panel.equal:
+        ax.set_aspect("equal", adjustable="datalim")
+    ax.set_ylabel(panel.label, parse_math=False)
+    ax.grid(alpha=0.3)
+    if several:
+        columns = min(3, len(panel.curves)) if below else -(-len(panel.curves) // IN_A_COLUMN)
+        place = ("upper center", (0.5, -0.08)) if below else ("upper left", (1.005, 1.03))
+        look = {"fontsize": 7.5, "frameon": False, "labelspacing": 0.25, "handlelength": 1.8, "columnspacing": 1.0}
+        legend = ax.legend(ncols=columns, loc=place[0], bbox_to_anchor=place[1], **look)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+
+
+def label(name: str, unit: str) -> str:
+    """A name with its unit, or either alone."""
     unit = visible(unit, lines=False)
     return f"{name} ({unit})" if name and unit else name or unit
+
+
+def by_unit(trajectory: TrajectoryLike, names: Sequence[str]) -> list[list[str]]:
+    """Names in groups of one unit, in the order in which they come."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(trajectory.units.get(name, ""), []).append(name)
+    return list(groups.values())
+
+
+def _grouped(trajectory: TrajectoryLike, names: Sequence[str], x: Array, columns: dict[str, Array]) -> list[Curves]:
+    return [
+        Curves(
+            label(group[0] if len(group) == 1 else "", trajectory.units.get(group[0], "")),
+            [(name, x, columns[name]) for name in group],
+        )
+        for group in by_unit(trajectory, names)
+    ]
+
+
+def over_time(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None = None) -> tuple[list[Curves], str]:
+    """Columns over time or over another column; all coordinates by default."""
+    names = names or tuple(trajectory.metadata["q_names"])
+    t, columns = refined(trajectory, (*names, *(() if x is None else (x,))))
+    if x is None:
+        return _grouped(trajectory, names, t, columns), "t (s)"
+    panels = _grouped(trajectory, names, columns[x], columns)
+    unit = trajectory.units.get(x, "")
+    alike = [_one_scale(columns[x], unit, p, trajectory.units.get(p.curves[0][0], "")) for p in panels]
+    return [panel._replace(equal=same) for panel, same in zip(panels, alike, strict=True)], label(x, unit)
+
+
+def _one_scale(x: Array, unit: str, panel: Curves, other: str) -> bool:
+    """Whether both axes are lengths, or may be: one has no unit, and both run over about as much."""
+    if unit == other == "m":
+        return True
+    y = np.concatenate([values for _, _, values in panel.curves])
+    wide, high = float(np.ptp(x)), float(np.ptp(y))
+    return {unit, other} <= {"m", ""} and max(wide, high) <= ALIKE * min(wide, high)
+
+
+def _phases(trajectory: TrajectoryLike, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:
+    """Rates over coordinates, with a dot where each begins; two panels where angles and lengths are drawn."""
+    chosen = names or tuple(n for n in trajectory.metadata["q_names"] if f"{n}_dot" in trajectory.names)
+    for name in chosen:
+        if f"{name}_dot" not in trajectory.names:
+            raise UsageError(f"{name!r} has no rate among the columns, so there is no phase portrait of it")
+    columns = refined(trajectory, (*chosen, *(f"{name}_dot" for name in chosen)))[1]
+    panels = []
+    for group in by_unit(trajectory, chosen):
+        rates = [f"{name}_dot" for name in group]
+        curves = [(name, columns[name], columns[rate]) for name, rate in zip(group, rates, strict=True)]
+        starts = [(float(x[0]), float(y[0])) for _, x, y in curves]
+        rate = label(rates[0] if len(group) == 1 else "rate", trajectory.units.get(rates[0], ""))
+        across = label(group[0] if len(group) == 1 else "coordinate", trajectory.units.get(group[0], ""))
+        panels.append(Curves(rate, curves, starts, across=across))
+    return panels, panels[0].across if panels else ""
+
+
+def _energy(trajectory: TrajectoryLike, names: tuple[str, ...], x: str | None) -> tuple[list[Curves], str]:
+    """Kinetic, potential and total energy, and the change of the total."""
+    t, (T, V, E) = trajectory.t, trajectory.energies
+    parts = [("kinetic", t, T), ("potential", t, V), ("total", t, E)]
+    return [Curves("energy (J)", parts), Curves("change of total (J)", [("total", t, E - E[0])])], "t (s)"
+
+
+def _residuals(trajectory: Any, _: tuple[str, ...], __: str | None) -> tuple[list[Curves], str]:
+    """Largest violation of the constraints over time, of the stored states, and the raw one's largest."""
+    module = getattr(trajectory.columns, "module", None)
+    if module is None:
+        raise UsageError("residuals over time need the model: plot the trajectory that simulate gave, unsaved")
+    if not module.n_rows:
+        raise UsageError(f"model {module.name!r} has no constraints, so there are no residuals")
+    t, x = trajectory.t, trajectory.x
+    u = trajectory.to_numpy(*module.u_names) if module.u_names else None
+    position = np.abs(module.constraints.every(x[: module.n_q], t=t, u=u)).max(axis=0, initial=0.0)
+    velocity = np.abs(module.kernels.state("velocity_constraints")(x, t=t, u=u)).max(axis=0, initial=0.0)
+    panels = []
+    for name, found, raw in (
+        ("residual (m, rad)", position, trajectory.residuals.raw_position),
+        ("of velocities (m/s, rad/s)", velocity, trajectory.residuals.raw_velocity),
+    ):
+        shown = np.maximum(found, np.finfo(float).eps)  # a logarithm has no 0
+        curves = [("stored states", t, shown)]
+        if raw > 0.0:
+            curves.append(("raw, largest", t, np.full(len(t), raw)))
+        panels.append(Curves(name, curves, logarithmic=True))
+    return panels, "t (s)"
+
+
+def _spectrum(trajectory: Any, names: tuple[str, ...], _: str | None) -> tuple[list[Curves], str]:
+    """Amplitudes over frequency: a Hann window over even times, the mean taken away first.
+
+    Of a sine whose period goes into the run without remainder the peak is its amplitude.
+    """
+    names = names or tuple(trajectory.metadata["q_names"])
+    t = trajectory.t
+    span = float(t[-1] - t[0]) if len(t) else 0.0
+    if len(t) < 8 or span <= 0.0:
+        raise UsageError("a spectrum needs a run forward in time of at least 8 points")
+    count = max(FINE, len(t))
+    times = t[0] + span * np.arange(count) / count
+    module = getattr(trajectory.columns, "module", None)
+    if module is not None and type(trajectory.columns).__name__ == "Columns":
+        from .columns import Columns
+
+        states, u = states_at(trajectory, module, times)
+        columns: Any = Columns(module, times, states, np.empty((0, count)) if u is None else u)
+        values = [columns[name] for name in names]
+    else:
+        keep = np.append(True, np.diff(t) > 0.0)
+        values = [np.interp(times, t[keep], trajectory[name][keep]) for name in names]
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)
+    frequencies = np.arange(count // 2 + 1) / span
+    rows = {}
+    for name, value in zip(names, values, strict=True):
+        amplitude = np.abs(np.fft.rfft(window * (value - value.mean()))) * 2.0 / window.sum()
+        rows[name] = np.maximum(amplitude, np.finfo(float).tiny)[1:]
+    panels = []
+    for panel in _grouped(trajectory, names, frequencies[1:], rows):
+        top = max(float(y.max()) for _, _, y in panel.curves)
+        curves = [(name, f, np.maximum(y, top * FAINT)) for name, f, y in panel.curves]
+        panels.append(panel._replace(curves=curves, logarithmic=True))
+    return panels, "frequency (Hz)"
+
+
+Panels = Callable[[Any, tuple[str, ...], str | None], tuple[list[Curves], str]]
+
+#: What can be plotted of a run.
+KINDS: dict[str, Panels] = {
+    "time": over_time,
+    "phase": _phases,
+    "energy": _energy,
+    "residuals": _residuals,
+    "spectrum": _spectrum,
+}

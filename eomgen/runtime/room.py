@@ -148,6 +148,23 @@ def read_number(what: str, given: Any) -> float:
     return result
 
 
+def read_value(what: str, given: Any) -> float:
+    """One finite real number, or an expression of numbers as text: ``"10*pi/180"``.
+
+    Raises
+    ------
+    UsageError
+        Texts are read where eomgen is: a generated package has no parser.
+    """
+    if not isinstance(given, str):
+        return read_number(what, given)
+    try:
+        from .constant_texts import constant
+    except ImportError:
+        raise UsageError(f"{what} must be a number, not {given!r}; texts are read by eomgen alone") from None
+    return read_number(what, constant(given, what))
+
+
 def read_flag(what: str, given: Any) -> bool:
     """True or False.
 

@@ -1,11 +1,11 @@
-"""Stage runtime: a module -> a short description of it, as text and as HTML."""
+"""Stage runtime: a module, a trajectory -> a short description of it, as text and in labels and values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ..texts import html_table, visible
+from ..texts import visible
 
 if TYPE_CHECKING:
     from .bound_model import BoundModel
@@ -67,6 +67,25 @@ def report(module: BoundModel, /) -> str:
     return "\n".join([head, *(f"  {label:<{width}}  {value}" for label, value in lines)])
 
 
-def html(module: BoundModel) -> str:
-    """A small table for notebooks."""
-    return html_table(module.name, facts(module), module.doc)
+def trajectory_facts(trajectory: Any) -> tuple[str, list[tuple[str, str]]]:
+    """A title, and label and value of each line, of what a run came to."""
+    header, n = trajectory.metadata, len(trajectory)
+    lines = [("points", str(n))]
+    if n:
+        over = f"of {', '.join(header['led'])}" if header.get("led") else ""
+        span = f"{trajectory.t[0]:.6g} .. {trajectory.t[-1]:.6g} s"
+        lines.append(("range", over) if over and trajectory.t[0] == trajectory.t[-1] else ("time", span))
+    method = str(header.get("method"))
+    if header.get("rtol") is not None:
+        method += f", rtol {header['rtol']:.3g}, atol {header['atol']:.3g}, {trajectory.nfev} calls"
+    lines.append(("method", method))
+    if header.get("loop_names") or trajectory.residuals.raw_position:
+        kept = trajectory.residuals
+        lines.append(("loop residual", f"{kept.raw_position:.1e} raw, {kept.position:.1e} stored (m, rad)"))
+    counts = [(name, len(times)) for name, times in zip(trajectory.t_events.names, trajectory.t_events, strict=True)]
+    if counts:
+        lines.append(("events", listed([f"{name}: {count}" for name, count in counts])))
+    if trajectory.status:
+        lines.append(("ended", visible(trajectory.message)))
+    lines.append(("columns", listed(trajectory.names)))
+    return f"{type(trajectory).__name__} of {trajectory.name}", lines

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -11,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import UsageError
-from ..files.path_names import as_path
 from ..numeric.scales import Array
-from .arrays import BROKEN, read_arrays
 from .near_names import find_lacking, require, unknown
 from .room import read_numbers
 from .run_parts import Named, Residuals
@@ -147,6 +144,11 @@ class Trajectory:
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} .. {self.t[-1]:.6g} s, " if len(self.t) else ""
         return f"<Trajectory of {self.name}: {len(self.t)} points, {span}{self.metadata.get('method')}>"
+
+    def _repr_html_(self) -> str:
+        from .notebook import trajectory_html
+
+        return trajectory_html(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles (and copies) hold every column, evaluated, and no dense output; the module is not needed to read."""
@@ -291,7 +293,8 @@ class Trajectory:
         ----------
         file : str or Path, optional
             ``.gif`` and ``.mp4`` are pictures by matplotlib; ``.html`` is one page with a time slider that can be
-            turned and zoomed and needs no network (k3d).  Without a file a widget for notebooks comes back.
+            turned and zoomed and needs no network (k3d); a name without an ending is a folder for PNG frames.
+            Without a file a page comes back that a notebook shows.
         model : Module, optional
             Of a trajectory that was read from a file: the module it was made with.
         fps : float
@@ -301,7 +304,9 @@ class Trajectory:
         trace : str or sequence of str
             Markers (``"rod.tip"``) or bodies whose ways are drawn.
         plot : str or sequence of str
-            Columns to draw over time under the mechanism (.gif, .mp4).
+            Columns to draw over time under the mechanism, with a line where it is.
+        forces : bool, str or sequence of str
+            Arrows of the forces that all joints, or those named, exert on their successors.
         names, axes : bool
             As for ``module.draw``.
         dpi : float
@@ -309,7 +314,7 @@ class Trajectory:
 
         Returns
         -------
-        Path of the file, or a k3d plot
+        Path of the file, or the page, whose text ``str`` gives
 
         Raises
         ------
@@ -322,15 +327,21 @@ class Trajectory:
 
         return animate(self, file, model, options)
 
-    def plot(self, *names: str, ax: Any = None) -> Any:
-        """Plot columns over time.
+    def plot(self, *names: str, x: str | None = None, y: Any = None, kind: str = "time", ax: Any = None) -> Any:
+        """Plot columns over time, or against each other; columns of one unit share a panel.
 
         Parameters
         ----------
         *names : str
             Columns; all coordinates by default.
+        x : str
+        y : str or sequence of str
+            A column to draw others against: ``plot(x="tip_x", y="tip_y")`` is the path of a point.
+        kind : {'time', 'phase', 'energy', 'residuals', 'spectrum'}
+            ``phase``: rates over coordinates; ``energy``: kinetic, potential, total and its change; ``residuals`` of
+            the constraints; ``spectrum``: amplitudes over frequency.
         ax : matplotlib Axes, optional
-            Where to draw; by default a new figure with one panel for each unit.
+            Where to draw; by default a new figure.
 
         Returns
         -------
@@ -340,54 +351,9 @@ class Trajectory:
         ------
         MissingDependencyError
             matplotlib is not installed.
+        UsageError
+            An unknown column or kind, or a run of which this cannot be drawn.
         """
         from .plotting import plot
 
-        return plot(self, names or tuple(self.metadata["q_names"]), ax)
-
-
-def load_trajectory(path: str | Path) -> Trajectory:
-    """Read a trajectory that :meth:`Trajectory.save` wrote to an .npz file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Trajectory
-        With all columns and ``metadata``; without dense output.
-
-    Raises
-    ------
-    UsageError
-        The file holds something else.
-    FileNotFoundError
-    """
-    from .storage import FORMAT, Stored
-
-    source = as_path("path", path)
-    if not source.suffix and not source.exists():
-        source = source.with_suffix(".npz")
-    try:
-        arrays = read_arrays(source)
-        header = json.loads(str(arrays["header"]))
-        if header.pop("format") != FORMAT:
-            raise ValueError("another format")
-        names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
-        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
-            raise ValueError("columns that do not fit each other")
-        Residuals(**header["residuals"])
-    except FileNotFoundError:
-        raise
-    except (*BROKEN, RecursionError) as error:
-        raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
-    count = sum(key.startswith("t_events_") for key in arrays)
-    return Trajectory(
-        arrays["t"],
-        arrays["x"],
-        Stored(names, arrays["columns"], arrays.get("energies")),
-        header,
-        [arrays[f"t_events_{k}"] for k in range(count)],
-        [arrays[f"x_events_{k}"] for k in range(count)],
-    )
+        return plot(self, names, ax, x, y, kind)

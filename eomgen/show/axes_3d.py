@@ -70,7 +70,7 @@ class Axes3DPicture:
         """Move everything to a frame."""
         poses = self.scene.frames[frame]
         for item, artist, faces in self.artists:
-            points = item.at(poses)
+            points = item.at(poses, frame)
             if faces is not None:
                 artist.set_verts(points[faces])
             elif item.role == "trace" and frame:

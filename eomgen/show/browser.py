@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..limits.pictures import ROUNDED
 from .colors import color_of, style_of
 from .data import Array
 from .optional import k3d
+from .player import player_html, player_script
 from .scene import Item, Scene
 from .shown_motion import ShownMotion
 
@@ -39,23 +41,9 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
         camera_fov=35.0,
         axes=["x", "y", "z"],
     )
-    times = [0.0] if motion is None else [float(t - motion.t[0]) / motion.speed for t in motion.t]
-    for item in scene.items:
-        plot += _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
-    for label in scene.labels:
-        places = [
-            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
-            for k in range(len(times))
-        ]
-        plot += viewer.text(
-            escape(label.text),
-            is_html=True,  # else underscores would be read as TeX
-            position=_over_time(times, places),
-            color=_number("#444444" if label.role == "joint" else color_of(label)),
-            size=0.7,
-            label_box=False,
-            name=f"name {label.text}",
-        )
+    times = [0.0] if motion is None else motion.clock.tolist()
+    for one in _objects(viewer, scene, times):
+        plot += one
     middle = 0.5 * (scene.low + scene.high)
     if scene.view is not None:
         middle, toward, up = middle @ scene.view, scene.view[2], scene.view[1]
@@ -71,6 +59,47 @@ def scene_plot(scene: Scene, motion: ShownMotion | None = None, height: int = 60
     if motion is not None:
         plot.fps = motion.fps
     return plot
+
+
+def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
+    """What k3d shows of a scene: items, then names."""
+    found = [
+        _solid(viewer, scene, item, times) if item.faces is not None else _line(viewer, scene, item, times)
+        for item in scene.items
+    ]
+    for label in scene.labels:
+        places = [
+            scene.frames[k, label.body, :3, :3] @ label.point + scene.frames[k, label.body, :3, 3]
+            for k in range(len(times))
+        ]
+        found.append(
+            viewer.text(
+                escape(label.text),
+                is_html=True,  # else underscores would be read as TeX
+                position=_over_time(times, places),
+                color=_number("#444444" if label.role == "joint" else color_of(label)),
+                size=0.7,
+                label_box=False,
+                name=f"name {label.text}",
+            )
+        )
+    return found
+
+
+def move_objects(plot: Any, scene: Scene) -> None:
+    """Show another position of a scene on a plot that shows one; what has changed is sent, and no more."""
+    made = _objects(k3d("a picture in a browser"), scene, [0.0])
+    if [one.name for one in made] != [one.name for one in plot.objects]:
+        for one in plot.objects:
+            plot -= one
+        for one in made:
+            plot += one
+        return
+    for old, new in zip(plot.objects, made, strict=True):
+        for trait in ("vertices", "indices", "model_matrix", "position"):
+            value = getattr(new, trait, None)
+            if value is not None and not np.array_equal(getattr(old, trait), value, equal_nan=True):
+                setattr(old, trait, value)
 
 
 def _over_time(times: list[float], values: list[Array]) -> Any:
@@ -104,8 +133,8 @@ def _line(viewer: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     places = np.cumsum(there) - 1
     pairs = [(places[k], places[k + 1]) for k in range(len(item.points) - 1) if there[k] and there[k + 1]]
     look |= {"indices": np.array(pairs, dtype=np.uint32), "indices_type": "segment"}
-    if item.follow is not None:
-        points = [item.follow(scene.frames[k])[there] for k in range(len(times))]
+    if item.follow is not None or item.path is not None:
+        points = [item.at(scene.frames[k], k)[there] for k in range(len(times))]
         return viewer.lines(_over_time(times, points), **look)
     return _carried(viewer.lines(item.points[there].astype(np.float32), **look), scene, item, times)
 
@@ -116,10 +145,11 @@ def _carried(shape: Any, scene: Scene, item: Item, times: list[float]) -> Any:
     return shape
 
 
-def page(scene: Scene, motion: ShownMotion | None) -> str:
+def page(scene: Scene, motion: ShownMotion, curves: Sequence[Any] = ()) -> str:
     """One HTML page that holds all it needs; it asks nothing of a network."""
     plot = scene_plot(scene, motion)
-    plot.snapshot_type = "full"
-    play = "" if motion is None else "K3DInstance.startAutoPlay();"
-    text: str = plot.get_snapshot(9, additional_js_code=play)
+    plot.snapshot_type, plot.menu_visibility = "full", False
+    text: str = plot.get_snapshot(9, additional_js_code=player_script(motion))
+    title = f"{scene.name}   {scene.note}" if scene.note else scene.name
+    text = text.replace("<body>", f"<body>{player_html(motion, curves, title)}", 1)
     return re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(scene.name)}</title>", text, count=1)

@@ -110,9 +110,10 @@ def _labels(data: PictureData, points: list[Array]) -> list[Label]:
     labels: list[Label] = []
     at: dict[tuple[Any, ...], list[str]] = {}
     for joint in data.joints:
-        if joint.pieces:
-            frame = joint.S if joint.P.body == GROUND else joint.P
-            at.setdefault((frame.body, *np.round(frame.position, 9).tolist()), []).append(joint.name)
+        if joint.pieces:  # joints on one pin are named together
+            frames = [frame for frame in (joint.P, joint.S) if frame.body != GROUND]
+            keys = [(frame.body, *np.round(frame.position, 9).tolist()) for frame in frames]
+            at.setdefault(next((key for key in keys if key in at), keys[0]), []).append(joint.name)
     labels += [Label(", ".join(names), key[0], np.array(key[1:]), "joint") for key, names in at.items()]
     for k, name in enumerate(data.bodies):
         if k in data.hidden:

@@ -34,6 +34,7 @@ STYLES = {
     "joint": Style(DARK, "white", DARK, 1.3),
     "frame": Style(None, width=1.2),
     "trace": Style("#999999", width=1.2),
+    "arrow": Style("#7B1FA2", width=1.8),
 }
 AXES = {"x": "#D62728", "y": "#2CA02C", "z": "#1F77B4"}
 

@@ -98,7 +98,10 @@ def read_picture(metadata: Mapping[str, Any], p: Sequence[float]) -> PictureData
         def points(s0: Array, s1: Array | float = 0.0) -> Array:
             found = np.empty((len(s0), 3))
             for axis, x in enumerate(point):
-                if isinstance(x, dict):
+                if isinstance(x, dict) and "samples" in x:
+                    at = np.linspace(x["low"], x["high"], len(x["samples"]))
+                    found[:, axis] = np.interp(s0, at, x["samples"])
+                elif isinstance(x, dict):
                     evaluate = compile_evaluator([nodes[out[x["at"]]]], names)
                     found[:, axis] = evaluate([*map(float, p), s0, s1])[0]
                 else:

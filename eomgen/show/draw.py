@@ -14,6 +14,8 @@ from .data import Array
 from .optional import matplotlib
 from .scene import Scene
 
+SMALL = 4.6  #: longer edge of a picture in a notebook (inch)
+
 
 def position(module: Any, x: Any, t: float) -> Array:
     """Coordinates (n_q,) of a state, a position or values by name; the declared initial ones without any."""
@@ -43,7 +45,7 @@ def draw(
 
 def draw_scene(scene: Scene, ax: Any = None, title: str | None = None) -> Any:
     """Draw the first frame of a scene; returns the axes."""
-    pyplot = matplotlib("pyplot", "draw")
+    pyplot = matplotlib("pyplot", "draw") if ax is None else None
     artist = new_artist(scene, pyplot, ax)
     artist.show(0)
     artist.ax.set_title(scene.name if title is None else title, fontsize=10, parse_math=False)
@@ -62,6 +64,21 @@ def figure_of(scene: Scene) -> Any:
     made = figure(figsize=figure_size(scene), layout="constrained")
     made.add_subplot()
     return made
+
+
+def figure_at(module: Any) -> Any:
+    """A figure without a window, of the declared initial position."""
+    scene = build_scene(module, position(module, None, 0.0)[:, None])
+    figure = figure_of(scene)
+    draw_scene(scene, figure.axes[0])
+    return figure
+
+
+def small_figure(module: Any) -> Any:
+    """The same in the size that suits a notebook."""
+    figure = figure_at(module)
+    figure.set_size_inches(SMALL * figure.get_size_inches() / figure.get_size_inches().max())
+    return figure
 
 
 def new_artist(scene: Scene, pyplot: Any, ax: Any = None) -> Any:

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..limits.pictures import NOTHING, ROUNDED
+from ..limits.pictures import NOTHING, ROUNDED, SAME
 from .data import GROUND, Array, PictureData, PlacedFrame
 from .joints import GAP, move_frame
 from .scene import Item, attached, disc, placed
 
+TEETH = 24  #: of a pinion
+RACK = 14  #: those of its rack that are drawn
 BESIDE = 2.4  #: distance of elements between the same points, in sizes of a symbol
 
 
@@ -34,6 +36,10 @@ def element_items(data: PictureData, view: Array | None, symbol: float, poses: A
             items += _wheel(name, element["marker"], float(element["radius"]), symbol)
         elif kind == "circles":
             items += _circles(data, element, symbol, poses)
+        elif kind == "rack":
+            items += _rack(data, element, symbol, poses)
+        elif kind == "lift":
+            items += _lift(data, element, poses)
         elif kind == "contour":
             s = np.linspace(element["low"], element["high"], 145)
             points = move_frame(element["marker"], element["points"](s))
@@ -200,6 +206,41 @@ def _circles(data: PictureData, element: dict[str, Any], symbol: float, poses: A
         follow = _belt(a.P, b.P, r_a, r_b, ratio < 0.0)
         items.append(Item("force", element["name"], GROUND, follow(poses), None, follow))
     return items
+
+
+def _rack(data: PictureData, element: dict[str, Any], symbol: float, poses: Array) -> list[Item]:
+    """A pinion with its pitch circle, and a rack whose pitch line touches it where both move alike."""
+    a, b, radius = data.joints[element["a"]], data.joints[element["b"]], float(element["radius"])
+    (turn, center), (guide, _) = placed(poses, a.P), placed(poses, b.P)
+    n, d = turn[:, 2], guide[:, 2]
+    if radius == 0.0 or abs(float(n @ d)) > SAME or a.P.body != b.P.body:
+        return []
+    # n x e = d of the unit vector e to the pitch point, where the pinion's speed is radius times its rate along d
+    out = np.sign(radius) * np.cross(d, n)
+    tooth = 2.0 * np.pi * abs(radius) / TEETH
+    steps = np.arange(-RACK // 2, RACK // 2 + 1)
+    heights = np.where(steps % 2 == 0, 0.25, -0.25) * tooth
+    line = center + abs(radius) * out + np.outer(steps * tooth, d) + np.outer(heights, out)
+    back = center + (abs(radius) + tooth) * out + np.outer(steps[[-1, 0, 0]] * tooth, d)
+    back[-1] = line[0]
+    pose = poses[b.S.body]
+    points = (np.vstack([line, back]) - pose[:3, 3]) @ pose[:3, :3]
+    rack = Item("wheel", element["name"], b.S.body, points)
+    return [*_wheel(element["name"], a.S, radius, symbol), rack]
+
+
+def _lift(data: PictureData, element: dict[str, Any], poses: Array) -> list[Item]:
+    """The curve that the origin of a follower that slides describes on the cam in one turn."""
+    a, b = data.joints[element["a"]], data.joints[element["b"]]
+    if a.slides or not b.slides or a.P.body != b.P.body:
+        return []
+    theta = np.linspace(0.0, 2.0 * np.pi, 361)
+    (turn, center), (guide, start) = placed(poses, a.P), placed(poses, b.P)
+    ways = (start + np.outer(element["points"](theta)[:, 0], guide[:, 2]) - center) @ turn  # in axes of the cam's P
+    back = -(theta + float(element["phase"]))
+    c, s = np.cos(back), np.sin(back)
+    points = np.column_stack([c * ways[:, 0] - s * ways[:, 1], s * ways[:, 0] + c * ways[:, 1], ways[:, 2]])
+    return [Item("wheel", element["name"], a.S.body, move_frame(a.S, points))]
 
 
 def _belt(first: PlacedFrame, second: PlacedFrame, r_a: float, r_b: float, opened: bool) -> Callable[[Array], Array]:

@@ -83,7 +83,7 @@ class Flat:
         """Move everything to a frame."""
         poses = self.scene.frames[frame]
         for item, artist in self.artists:
-            points = self.page(item.at(poses))
+            points = self.page(item.at(poses, frame))
             if item.faces is not None:
                 artist.set_xy(outline(points))
             elif item.role == "trace":

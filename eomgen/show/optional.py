@@ -1,4 +1,4 @@
-"""Stage show, optional libraries: matplotlib and k3d, imported where something is drawn."""
+"""Stage show, optional libraries: matplotlib, k3d and ipywidgets, imported where something is drawn."""
 
 from __future__ import annotations
 
@@ -34,6 +34,16 @@ def k3d(purpose: str) -> Any:
             f'{purpose} needs k3d 3.2 or later, not {found.__version__}: pip install "k3d>=3.2"'
         )
     return found
+
+
+def ipywidgets(purpose: str) -> Any:
+    """Sliders and buttons of notebooks.
+
+    Raises
+    ------
+    MissingDependencyError
+    """
+    return _load("ipywidgets", "ipywidgets>=8.1", purpose)
 
 
 def _load(module: str, package: str, purpose: str) -> Any:

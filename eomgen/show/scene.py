@@ -21,7 +21,7 @@ OFF = 0.3  #: of a link's length: a centre of mass so far beside it belongs to i
 NEAR = SAME  #: of the extent: points that are one
 
 #: Order in which roles lie over each other.
-ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace")
+ROLES = ("hatch", "rail", "wheel", "shape", "link", "force", "block", "com", "joint", "frame", "trace", "arrow")
 
 
 class Item(NamedTuple):
@@ -41,6 +41,8 @@ class Item(NamedTuple):
         Triangles; None for a line through the points, broken at NaN.
     follow : callable or None
         Poses (n_bodies + 1, 4, 4) -> points (n, 3) in ground axes, of what is fixed to no body.
+    path : (k, n, 3) array or None
+        Or its points in ground axes at each frame.
     """
 
     role: str
@@ -49,9 +51,13 @@ class Item(NamedTuple):
     points: Array
     faces: Triangles | None = None
     follow: Callable[[Array], Array] | None = None
+    path: Array | None = None
 
-    def at(self, poses: Array) -> Array:
-        """Points in ground axes (n, 3) at poses (n_bodies + 1, 4, 4), the last of which is ground's."""
+    def at(self, poses: Array, frame: int = 0) -> Array:
+        """Points in ground axes (n, 3) at poses (n_bodies + 1, 4, 4) of a frame, the last of which is ground's."""
+        if self.path is not None:
+            there: Array = self.path[frame]
+            return there
         if self.follow is not None:
             return self.follow(poses)
         return move(poses[self.body], self.points)
@@ -82,6 +88,8 @@ class Scene(NamedTuple):
         Poses; the last body is ground.
     low, high : (3,) arrays
         Corners of the box that holds it all over the frames; of a planar one in axes of the page.
+    note : str
+        What is written beside the title.
     """
 
     name: str
@@ -93,6 +101,7 @@ class Scene(NamedTuple):
     frames: Array
     low: Array
     high: Array
+    note: str = ""
 
 
 def move(pose: Array, points: Array) -> Array:
@@ -225,6 +234,9 @@ def link_items(data: PictureData, points: list[Array], symbol: float, extent: fl
     hidden = data.hidden
     blocks = {joint.S.body for joint in data.joints if joint.pieces and joint.slides and _is_block(data, joint, symbol)}
     wheels = {element["marker"].body for element in data.elements if element["kind"] in ("wheel", "contour")}
+    for element in data.elements:  # those that its circles, its rack or its law of lift show
+        ends = {"circles": ("a", "b", "beside"), "rack": ("a",), "lift": ("a",)}.get(element["kind"], ())
+        wheels |= {data.joints[element[end]].S.body for end in ends if element[end] is not None}
     rods = {frame.body for joint in data.joints if joint.slides and joint.pieces for frame in (joint.P, joint.S)}
     for k, name in enumerate(data.bodies):
         if k in shaped or k in hidden:

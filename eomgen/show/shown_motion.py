@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..errors import UsageError
+from ..limits.pictures import NOTHING, ROUNDED, SAME
 from .build_scene import build_scene
-from .data import Array
-from .scene import Scene
+from .data import GROUND, Array, read_picture
+from .scene import Item, Scene, placed
 
 LONGEST = 12.0  #: seconds that an animation lasts, unless a speed is given
 SHORTEST = 3.0
 FRAMES = 1500  #: at most
+ARROW = 0.2  #: length of the longest arrow, of the picture's diagonal
+HEAD = 0.22  #: of an arrow's length
+BEFORE = 3.0  #: distance of arrows in front of a planar mechanism, in sizes of a symbol
+
+#: Times (k,) -> states (n_x, k) and inputs (n_u, k) or None.
+States = Callable[[Array], tuple[Array, Array | None]]
 
 
 class ShownMotion(NamedTuple):
-    """Times (k,) of the run at the frames (s), states (n_x, k), inputs (n_u, k) or None, and how fast time goes."""
+    """Frames of a motion.
+
+    Attributes
+    ----------
+    t : (k,) array
+        Times of the run (s).
+    x, u : (n_x, k), (n_u, k) arrays
+        States, inputs (None without any).
+    speed : float
+        Seconds of the run in one of the animation.
+    fps : float
+    words : list of str
+        What is written above each frame.
+    over : (k,) array
+        Time, or the coordinate that is led where time stands still.
+    """
 
     t: Array
     x: Array
     u: Array | None
     speed: float
     fps: float
+    words: list[str]
+    over: Array
+
+    @property
+    def clock(self) -> Array:
+        """Seconds of the animation at each frame."""
+        return np.arange(len(self.t)) / self.fps if self.t[0] == self.t[-1] else np.abs(self.t - self.t[0]) / self.speed
 
 
-def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed: float | None) -> ShownMotion:
-    """Frames of a trajectory at even times.
-
-    Between the steps of the run the dense output serves where it was kept, else a cubic through states and slopes,
-    projected onto the constraints.
+def sample(trajectory: Any, states: States, fps: float, speed: float | None) -> ShownMotion:
+    """Frames of a trajectory at even times, of the states that the runtime gives there.
 
     Raises
     ------
@@ -45,7 +71,10 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
     if len(t) < 2:
         raise UsageError("the run has one point only; draw its state with module.draw(x)")
     if t[0] == t[-1]:  # a range of coordinates at one time
-        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST))
+        led = trajectory.metadata.get("led") or trajectory.x_names[:1]
+        over, unit = trajectory[led[0]], trajectory.units.get(led[0], "")
+        said = [f"{led[0]} = {value:.3f} {unit}" for value in over]
+        return ShownMotion(t, trajectory.x, None, 1.0, max(fps, len(t) / LONGEST), said, over)
     start, end = float(t[0]), float(t[-1])
     span = abs(end - start)
     if speed is None:
@@ -57,31 +86,58 @@ def sample(trajectory: Any, module: Any, slopes: Array | None, fps: float, speed
             "more, a lower fps, or a shorter run"
         )
     times = np.linspace(start, end, max(count, 2))
-    return ShownMotion(times, *_states(trajectory, module, slopes, times), speed, fps)
-
-
-def _states(trajectory: Any, module: Any, slopes: Array | None, times: Array) -> tuple[Array, Array | None]:
-    names = module.layout.u
-    if trajectory.has_dense_output:
-        dense = trajectory.at(times)
-        return dense.x, dense.to_numpy(*names) if names else None
-    forward = trajectory.t[-1] > trajectory.t[0]
-    order = slice(None) if forward else slice(None, None, -1)
-    t, x = trajectory.t[order], trajectory.x[:, order]
-    keep = np.concatenate([[True], np.diff(t) > 0.0])
-    given = trajectory.to_numpy(*names)[:, order] if names else None
-    u = None if given is None else np.array([np.interp(times, t, row) for row in given])
-    if slopes is not None:
-        from scipy.interpolate import CubicHermiteSpline
-
-        states = CubicHermiteSpline(t[keep], x[:, keep], slopes[:, order][:, keep], axis=1)(times)
-    else:
-        states = np.array([np.interp(times, t[keep], row[keep]) for row in x])
-    if module.n_rows or module.layout.space:
-        states = module.project(states, t=times, u=u)
-    return states, u
+    slow = "" if abs(speed - 1.0) < ROUNDED else f"  x{speed:.2g}"
+    digits = max(2, 2 - int(np.floor(np.log10(span))))
+    return ShownMotion(times, *states(times), speed, fps, [f"t = {now:.{digits}f} s{slow}" for now in times], times)
 
 
 def moving_scene(module: Any, motion: ShownMotion, names: bool | None, axes: bool, trace: Sequence[str]) -> Scene:
     """The scene over all frames."""
     return build_scene(module, motion.x[: module.n_q], motion.t, motion.u, names, axes, trace)
+
+
+def with_arrows(scene: Scene, module: Any, motion: ShownMotion, joints: Sequence[str] | bool) -> Scene:
+    """The scene with an arrow at each joint: the force that it exerts on its successor, over the frames.
+
+    Raises
+    ------
+    UsageError
+        An unknown joint, or a model without joints.
+    """
+    known = module.joint_names
+    if not isinstance(joints, bool):
+        for name in joints:
+            if name not in known:
+                raise UsageError(f"no joint {name!r} whose force is to be shown; there are {', '.join(known)}")
+    chosen = [k for k, name in enumerate(known) if joints is True or (joints and name in joints)]
+    forces = module.reactions(motion.t, motion.x, u=motion.u)[chosen, :3]
+    forces = np.where(np.isfinite(forces), forces, 0.0)
+    longest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    if longest == 0.0:
+        return scene
+    reach = ARROW * float(np.linalg.norm(scene.high - scene.low))
+    data = read_picture(module.metadata, module.p)
+    frames = {joint.name: joint.S for joint in data.joints}
+    items, paths = list(scene.items), []
+    for force, k in zip(forces, chosen, strict=True):
+        tails = np.array([placed(poses, frames[known[k]])[1] for poses in scene.frames])
+        lines = arrows(tails, force.T * reach / longest, scene.view)
+        if scene.view is not None:  # in front of the links
+            lines = lines + BEFORE * scene.symbol * scene.view[2]
+        paths.append(lines.reshape(-1, 3))
+        items.append(Item("arrow", known[k], GROUND, lines[0], path=lines))
+    every = np.concatenate(paths)
+    every = every if scene.view is None else every @ scene.view.T
+    low, high = np.minimum(scene.low, every.min(axis=0)), np.maximum(scene.high, every.max(axis=0))
+    return scene._replace(items=items, low=low, high=high, note=f"longest arrow {longest:.4g} N")
+
+
+def arrows(tails: Array, ways: Array, view: Array | None) -> Array:
+    """Lines (k, 5, 3) that look like arrows from tails (k, 3) along ways (k, 3)."""
+    across = np.cross(ways, np.eye(3)[0] if view is None else view[2])
+    length = np.linalg.norm(ways, axis=1, keepdims=True)
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    across = np.where(size > SAME * length, across * length / np.maximum(size, NOTHING), np.roll(ways, 1, axis=1))
+    tips = tails + ways
+    left, right = (tips - HEAD * (ways + side * 0.6 * across) for side in (1.0, -1.0))
+    return np.stack([tails, tips, left, tips, right], axis=1)

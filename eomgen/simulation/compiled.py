@@ -149,7 +149,7 @@ def integrate_compiled(
         checkpoint.save(journey.frozen(status))
     times, states, notes = journey.results()
     if events is not None and journey.raised is None:
-        warn_of_unknown([events.names[i] for i in journey.unknown()], 2)
+        warn_of_unknown([events.names[i] for i in journey.unknown()])
     if status == ZENO and events is not None:
         raise events.crowded(journey.t, journey.resets)
     t_events, x_events = [], []

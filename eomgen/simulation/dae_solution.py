@@ -11,12 +11,12 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..errors import SimulationError, UsageError
 from ..limits.runs import ATOL, ENDLESS, ENOUGH, RTOL
 from ..numeric.scales import Array
 from ..runtime.dae import DaeForm
+from ..runtime.given_start import Span, Start
 from ..runtime.near_names import require
 from ..runtime.room import require_steps
 from ..runtime.signals import Forcing
@@ -42,8 +42,8 @@ class Dae(DaeForm):
 
     def solve(
         self,
-        span: float | tuple[float, float] | None = None,
-        initial: Mapping[str, float] | ArrayLike | None = None,
+        span: Span = None,
+        initial: Start = None,
         parameters: Any = None,
         inputs: Mapping[str, Any] | None = None,
         *,
@@ -90,8 +90,8 @@ class Dae(DaeForm):
 
 def integrate_dae(
     module: BoundModel,
-    span: float | tuple[float, float] | None,
-    initial: Mapping[str, float] | ArrayLike | None,
+    span: Span,
+    initial: Start,
     parameters: Any,
     inputs: Mapping[str, Any] | None,
     t_eval: Any,
@@ -117,7 +117,7 @@ def integrate_dae(
         require_steps("max_step", check_step("max_step", options["max_step"]), start, end)
     run = _DaeRun(bound, forcing, watched, (start, end), times, partial(ida.IDA, **tolerances), options)
     run.travel(x0)
-    warn_of_unknown([event.name for event in run.listed if not event.known], 2)
+    warn_of_unknown([event.name for event in run.listed if not event.known])
     solution = run.solution()
     require_end(solution, end)
     return record(bound, forcing, solution, "IDA", dict(tolerances), watched.names)

@@ -17,6 +17,7 @@ from ..analysis.open_joint import describe_gap
 from ..errors import SimulationError, UsageError
 from ..numeric.roots import find_root
 from ..numeric.scales import Array
+from ..runtime.given_start import Span, Start
 from ..runtime.signals import Forcing
 from .events import UNWATCHED, Events, RunEvent
 from .run_arguments import find_span, ordered_times
@@ -35,8 +36,8 @@ def is_driven(module: BoundModel) -> bool:
 
 def follow_drivers(
     module: BoundModel,
-    span: float | tuple[float, float] | None,
-    initial: Mapping[str, float] | ArrayLike | None,
+    span: Span,
+    initial: Start,
     parameters: Any,
     inputs: Mapping[str, Any] | None,
     t_eval: ArrayLike | None,
@@ -86,7 +87,7 @@ def _led_by_inputs(module: BoundModel, inputs: Mapping[str, Any] | None, method:
 def simulate_driven(
     module: BoundModel,
     span: tuple[float, float],
-    initial: Mapping[str, float] | ArrayLike | None,
+    initial: Start,
     forcing: Forcing,
     t_eval: Array | None,
     events: Sequence[RunEvent],

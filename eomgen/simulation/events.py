@@ -6,11 +6,13 @@ for a run are its names, expressions as text, or functions f(t, x) with SciPy's 
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from math import isfinite, nan
+from types import FrameType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -275,14 +277,23 @@ def told_by_the_caller() -> Iterator[None]:
         _SILENT.reset(token)
 
 
-def warn_of_unknown(names: Sequence[str], depth: int = 1) -> None:
-    """Tell of events that were no number throughout a run, `depth` calls below that of the user."""
+def warn_of_unknown(names: Sequence[str]) -> None:
+    """Tell the line of the user's that called of events that were no number throughout a run."""
     if names and not _SILENT.get():
         warnings.warn(
             f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
             "found; look for a logarithm, root or quotient outside its domain",
-            stacklevel=depth + 2,
+            stacklevel=_calls_within() + 1,
         )
+
+
+def _calls_within() -> int:
+    """How many calls, this one's caller first, lie within the package."""
+    package, calls = __name__.rpartition("simulation")[0], 0
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith(package):
+        frame, calls = frame.f_back, calls + 1
+    return calls
 
 
 def _of_kernel(kernel: Any, forcing: Forcing) -> Together:

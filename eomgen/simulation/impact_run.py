@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..analysis.impact import Impact, strike_run
 from ..analysis.impact_gaps import Gaps, allowance, check_gaps
@@ -16,6 +16,7 @@ from ..limits.runs import INSTANT
 from ..numeric.counts import read_count
 from ..numeric.scales import Array
 from ..runtime.columns import Columns, describe, units_of
+from ..runtime.given_start import Span, Start
 from ..runtime.run_parts import Residuals
 from ..runtime.signals import Forcing
 from ..runtime.trajectory import Trajectory
@@ -33,9 +34,9 @@ IDLE = 50  #: closings in a row that bring neither an impact nor time
 def simulate_impacts(
     module: BoundModel,
     /,
-    span: float | tuple[float, float] | None,
+    span: Span,
     gaps: Mapping[str, float],
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Mapping[str, Any] | None = None,
     *,

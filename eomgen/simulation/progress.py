@@ -1,4 +1,4 @@
-"""Simulation: times an integrator visits -> a progress line on stderr."""
+"""Simulation: times an integrator visits -> a progress line on stderr, or a bar in a notebook."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ class Progress:
         self.calls = 0
         self.bar: Any = None
         self.task: Any = None
+        self.page: Any = None
         self.plain = False
 
     def __call__(self, t: float) -> None:
@@ -48,23 +49,31 @@ class Progress:
             return
         self.next = now + EVERY
         part = min(max((t - self.start) / self.length, 0.0), 1.0) if self.length else 1.0
-        if self.bar is None and not self.plain:
+        if self.bar is None and self.page is None and not self.plain:
             self._open()
         if self.plain:
             sys.stderr.write(f"\rsimulating: {100 * part:3.0f} %  {self.words.format(t)} ")
             sys.stderr.flush()
+        elif self.page is not None:
+            self.page.update(_Bar(part, self.words.format(t)))
         else:
             self.bar.update(self.task, completed=part, description=self.words.format(t))
 
     def close(self) -> None:
         """Clean up."""
-        if self.bar is not None:
+        if self.page is not None:
+            self.page.update(_Bar(None, ""))
+        elif self.bar is not None:
             self.bar.stop()
         elif self.plain:
             sys.stderr.write("\r" + " " * 40 + "\r")
             sys.stderr.flush()
 
     def _open(self) -> None:
+        if in_notebook():
+            self.page = sys.modules["IPython"].display.display(_Bar(0.0, ""), display_id=True)
+            if self.page is not None:
+                return
         try:
             from rich.console import Console
             from rich.progress import Progress as Bar
@@ -76,6 +85,27 @@ class Progress:
         self.bar.start()
 
 
+class _Bar:
+    """A bar as notebooks show it; nothing without a part."""
+
+    def __init__(self, part: float | None, words: str) -> None:
+        self.part, self.words = part, words
+
+    def __repr__(self) -> str:
+        return "" if self.part is None else f"simulating: {100 * self.part:3.0f} %  {self.words}"
+
+    def _repr_html_(self) -> str:
+        if self.part is None:
+            return ""
+        return f"simulating <progress value='{self.part:.4f}' max='1'></progress> {100 * self.part:.0f} % {self.words}"
+
+
+def in_notebook() -> bool:
+    """Whether this runs in the kernel of a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return getattr(shell, "kernel", None) is not None
+
+
 def wanted(progress: bool | None) -> bool:
-    """Whether to watch a run: as asked, or when stderr is a terminal."""
-    return sys.stderr.isatty() if progress is None else read_flag("progress", progress)
+    """Whether to watch a run: as asked, or when stderr is a terminal or this is a notebook."""
+    return sys.stderr.isatty() or in_notebook() if progress is None else read_flag("progress", progress)

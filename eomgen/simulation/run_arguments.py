@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,8 @@ from numpy.typing import ArrayLike
 from ..errors import UsageError
 from ..limits.runs import ATOL, RTOL
 from ..numeric.scales import Array
-from ..runtime.room import as_real, read_number, read_numbers, read_times
+from ..runtime.given_start import Span, Start, last_state
+from ..runtime.room import as_real, read_numbers, read_times, read_value
 from ..runtime.signals import Forcing
 from ..texts import shown
 from .tolerances import check_step
@@ -23,16 +23,18 @@ if TYPE_CHECKING:
 DEFAULTS = {"method": "DOP853", "rtol": RTOL, "atol": ATOL, "end": 10.0}
 
 
-def find_span(span: float | tuple[float, float] | None, declared: float) -> tuple[float, float]:
+def find_span(span: Span, declared: float) -> tuple[float, float]:
     """Start and end (s) of what a user gives as the span of a run."""
     if span is None:
         return 0.0, declared
-    plain = type(span) is tuple and len(span) == 2 and all(type(end) in (int, float) for end in span)
-    if plain and isfinite(span[0]) and isfinite(span[1]):  # type: ignore[index]
-        return float(span[0]), float(span[1])  # type: ignore[index]
+    if isinstance(span, (tuple, list)):
+        span = [
+            read_value("span must be (start, end) in seconds: an end", end) if isinstance(end, str) else end
+            for end in span
+        ]
     pair = as_real(span)
-    if pair is not None and not pair.ndim:
-        return 0.0, read_number("the end of the span", span)
+    if isinstance(span, str) or (pair is not None and not pair.ndim):
+        return 0.0, read_value("the end of the span", span)
     if pair is None or pair.shape != (2,) or not np.isfinite(pair).all():
         raise UsageError(f"span must be (start, end) in seconds, not {shown(span)}")
     return float(pair[0]), float(pair[1])
@@ -74,10 +76,8 @@ def ordered_times(t_eval: ArrayLike, start: float, end: float, n: int = 1) -> Ar
     return times
 
 
-def find_state(
-    module: BoundModel, initial: Mapping[str, float] | ArrayLike | None, t: float, forcing: Forcing | None = None
-) -> Array:
-    """The state (n_x,) of what a user gives as initial: named values, or a state, which is projected.
+def find_state(module: BoundModel, initial: Start, t: float, forcing: Forcing | None = None) -> Array:
+    """The state (n_x,) of what a user gives as initial: named values, or a state (a run: its last), which is projected.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def find_state(
         return module.x0(t=t)
     if isinstance(initial, Mapping):
         return module.x0(initial, t=t)
-    x = np.array(read_numbers("initial", initial))
+    x = np.array(read_numbers("initial", last_state(initial, module.x_names)))
     if x.shape != (module.n_x,):
         names = ", ".join(module.x_names)
         raise UsageError(f"initial must name values or have shape ({module.n_x},) [{names}], not {x.shape}")

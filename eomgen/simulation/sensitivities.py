@@ -18,9 +18,10 @@ from ..limits.runs import SENSITIVITY_ATOL, SENSITIVITY_RTOL
 from ..numeric.scales import Array, Indices
 from ..runtime.change_points import singular_values
 from ..runtime.failure import place
+from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names, read_names, unknown
 from ..runtime.refusals import require_projection, require_velocities
-from ..runtime.room import require_steps
+from ..runtime.room import read_value, require_steps
 from ..runtime.signals import Forcing
 from .events import Events, told_by_the_caller, warn_of_unknown
 from .input_slopes import SlopesNow
@@ -48,8 +49,8 @@ def sensitivities(
     module: BoundModel,
     /,
     names: Sequence[str],
-    span: float | tuple[float, float] | None = None,
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    span: Span = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Mapping[str, Any] | None = None,
     *,
@@ -106,7 +107,7 @@ def sensitivities(
     forcing.enter(*nodes[:2])
     x0 = find_state(bound, initial, start, forcing)
     here = bound.bind(u=forcing(start, x0))
-    given = initial if isinstance(initial, Mapping) else None
+    given = {n: read_value(n, x) for n, x in initial.items()} if isinstance(initial, Mapping) else None
     held = held_names(here, start, x0, given) if hold is None else _checked(bound, hold)
     columns = split_columns(layout, read_names("names", names), held)
     run = Variational(bound, forcing, columns)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, SimulationError, SimulationInterrupted, UsageError
+from ..runtime.given_start import Span, Start
 from ..runtime.near_names import check_names
 from ..runtime.room import read_flag, require_room, require_steps
 from ..runtime.signals import Forcing
@@ -36,8 +37,8 @@ OPTIONS = (
 def simulate(
     module: BoundModel,
     /,
-    span: float | tuple[float, float] | None = None,
-    initial: Mapping[str, float] | ArrayLike | None = None,
+    span: Span = None,
+    initial: Start = None,
     parameters: Any = None,
     inputs: Mapping[str, Any] | None = None,
     *,
@@ -62,8 +63,9 @@ def simulate(
     ----------
     span : (float, float) or float, optional
         Start and end (s); the end alone for a start at 0; the model's own end by default.
-    initial : mapping of str to float, or (n_x,) array, optional
-        Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints.
+    initial : mapping of str to float, (n_x,) array, or Trajectory, optional
+        Named values as for ``Module.x0``, held exactly, or a state, which is projected onto the constraints; of a
+        run, its last state.  Here, in `span` and in `parameters` a text is an expression of numbers: ``"deg(30)"``.
     parameters : mapping of str to float, or (n_p,) array, optional
         Those not named keep their bound values.
     inputs : mapping of str to number, (times, values), Signal, expression or callable f(t, x), optional

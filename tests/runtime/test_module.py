@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eomgen.api.module import CALLS, Module
+from eomgen.api.module import CALLS, FORMS, Module
 from eomgen.errors import (
     AssemblyError,
     NonFiniteError,
@@ -341,5 +341,6 @@ def test_type_checkers_read_the_same_table() -> None:
     }
     (own,) = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == "Module"]
     (block,) = [node for node in own.body if isinstance(node, ast.If)]
-    assert [ast.unparse(line) for line in block.body] == [f"{name} = _{name}" for name in CALLS]
+    methods = [f"{name} = _{name}" for name in CALLS]
+    assert [ast.unparse(line) for line in block.body] == [*methods, *(f"{name}: {name.capitalize()}" for name in FORMS)]
     assert homes == CALLS

@@ -102,6 +102,8 @@ DOORS: dict[str, Callable[[Any, Any], Any]] = {
 }  # fmt: skip
 
 
+#: Doors of one number that a user writes, which may be an expression of numbers as text.
+WRITTEN = ("named", "named parameter", "initial", "end", "guess")
 LOOPS = ("state", "constraints", "independent", "minimal", "reactions", "late kernel")
 PLACES = [("pendulum", door) for door in DOORS] + [("four_bar", door) for door in LOOPS]
 
@@ -111,13 +113,14 @@ def test_real_numbers_of_any_kind_are_taken(modules: dict[str, Any], name: str, 
     for target in TARGETS:
         mod = modules[f"{name} {target}"]
         expected = DOORS[door](mod, 0.5)
-        for kind, value in NUMBERS.items():
+        texts = {"text": "0.5", "expression": "deg(90)/pi"} if door in WRITTEN else {}
+        for kind, value in (NUMBERS | texts).items():
             np.testing.assert_array_equal(DOORS[door](mod, value), expected, err_msg=f"{kind}, {target}")
 
 
 @pytest.mark.parametrize(("name", "door"), PLACES)
 def test_what_is_no_real_number_is_named(modules: dict[str, Any], name: str, door: str) -> None:
-    for kind, value in UNREAL.items():
+    for kind, value in (UNREAL | ({"text": "one half"} if door in WRITTEN else {})).items():
         told = []
         for target in TARGETS:
             with pytest.raises(eg.UsageError) as caught:

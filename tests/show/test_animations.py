@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
+import matplotlib.animation
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 from click.testing import CliRunner
 from PIL import Image
 
 import eomgen as eg
 from eomgen.cli.command import eomgen
-from eomgen.errors import UsageError
+from eomgen.errors import MissingDependencyError, UsageError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -97,27 +100,91 @@ def test_a_page_holds_all_it_needs(run: Any, tmp_path: Path) -> None:
     assert "<title>slider_crank</title>" in text
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
-def test_a_page_shows_the_mechanism_without_a_network(run: Any, tmp_path: Path) -> None:
-    pytest.importorskip("k3d")
-    page = run.animate(tmp_path / "run.html", fps=10)
-    shot = tmp_path / "shot.png"
-    words = ["chromium", "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
-    words += ["--enable-unsafe-swiftshader", "--enable-logging=stderr", "--v=0", "--window-size=900,600"]
-    words += [
-        "--virtual-time-budget=20000",
-        "--run-all-compositor-stages-before-draw",
-        f"--user-data-dir={tmp_path / 'profile'}",
-    ]
-    words += ["--host-resolver-rules=MAP * ~NOTFOUND", f"--screenshot={shot}", page.as_uri()]
-    for _ in range(4):  # a loaded machine may take the picture before WebGL has drawn
-        done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
-        console = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "Uncaught" in line]
-        assert console == []
-        assert "ERR_NAME_NOT_RESOLVED" not in done.stderr
-        with Image.open(shot) as image:
-            pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
-        colours = {tuple(c) for c in (pixels // 32)}
-        if len(colours) > 8:
-            break
-    assert len(colours) > 8  # links of several colours, not an empty canvas
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
+def test_a_page_plays_and_its_slider_moves_it_without_a_network(run: Any, tmp_path: Path) -> None:
+    page = run.animate(tmp_path / "run.html", fps=10, trace="rod.tip", plot=["theta", "energy"], forces=True)
+    with Browser(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.wait_for("document.getElementById('words') !== null")
+        time = "+document.getElementById('time').value"
+        browser.wait_for(f"{time} > 0.2")  # it plays of itself
+        browser.click("#play")
+        here = browser.evaluate(time)
+        pixels = browser.picture()
+        assert len(np.unique(pixels.reshape(-1, 3) // 32, axis=0)) > 8  # links of several colours, not an empty canvas
+        assert browser.evaluate(time) == here  # it stands still
+        browser.click("#time", across=0.6)
+        browser.wait_for(f"{time} > 1.0")  # the run of 1 s is shown over 3 s
+        there = browser.evaluate(time)
+        browser.wait_for("document.getElementById('words').textContent.startsWith('t = 0.6')")
+        moved = browser.picture()
+        above = slice(40, int(browser.place("#canvasTarget")["h"]) - 20)
+        assert (pixels[above] != moved[above]).any(axis=2).mean() > 0.005
+        cursor = browser.place("#cursor")["x"]
+        browser.click("#play")
+        browser.wait_for(f"{time} > {there}")
+        browser.wait_for(f"document.querySelector('#cursor').getBoundingClientRect().x > {cursor}")
+        shown = "[...document.querySelectorAll('div')].find(e => !e.children.length && e.textContent == 'rod')"
+        assert browser.evaluate(f"{shown}.getBoundingClientRect().x") > 0  # names stand in the picture
+        assert browser.complaints == []
+        assert browser.requests == []
+
+
+def hanging(angle: float = 0.0) -> Any:
+    m = eg.Model("hanging", gravity=(0, -9.81, 0))
+    bob = m.body("bob", mass=2.0, com=(0, -1, 0))
+    m.revolute("hinge", m.ground, bob, coordinate="theta")
+    return m.compile(target="numpy").simulate(0.2, initial={"theta": angle})
+
+
+def test_arrows_are_the_forces_of_joints() -> None:
+    """At rest the hinge holds 2 kg; let go at a right angle it holds nothing at first, and pulls inwards later."""
+    from eomgen.show.shown_motion import moving_scene, sample, with_arrows
+
+    for angle, force in ((0.0, np.array([0.0, 2 * 9.81])), (np.pi / 2, None)):
+        traj = hanging(angle)
+        module = traj.columns.module
+        motion = sample(
+            traj, lambda t, traj=traj: (np.array([np.interp(t, traj.t, row) for row in traj.x]), None), 10.0, 1.0
+        )
+        scene = with_arrows(moving_scene(module, motion, False, False, ()), module, motion, True)
+        (arrow,) = [item for item in scene.items if item.role == "arrow"]
+        assert arrow.path is not None
+        ways = (arrow.path[:, 1] - arrow.path[:, 0])[:, :2]
+        if force is not None:
+            assert scene.note == f"longest arrow {force[1]:.4g} N"
+            assert ways / np.linalg.norm(ways, axis=1)[:, None] == pytest.approx(np.tile(force / force[1], (3, 1)))
+        else:  # m l w^2 along the rod, as w^2 = 2 g sin(fall) / l, and m g cos of the fall across: closed form
+            w, q = motion.x[1], motion.x[0]
+            inwards, along = np.array([-np.sin(q), np.cos(q)]), 2.0 * (w**2 + 9.81 * np.cos(q))
+            expected = (inwards * along).T
+            longest = np.linalg.norm(expected, axis=1).max()
+            assert ways / np.linalg.norm(ways, axis=1).max() == pytest.approx(expected / longest, abs=1e-6)
+    with pytest.raises(UsageError, match="no joint 'hing'"):
+        with_arrows(scene, module, motion, ("hing",))
+
+
+def test_frames_and_films(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from eomgen.show import writers
+
+    folder = run.animate(tmp_path / "frames", fps=2, speed=0.5, dpi=40)
+    assert [file.name for file in sorted(folder.iterdir())] == [f"frame_{k}.png" for k in range(5)]
+    with Image.open(folder / "frame_3.png") as image:
+        assert np.ptp(np.asarray(image.convert("L"))) > 100
+    with pytest.raises(UsageError, match="a new or an empty folder"):
+        run.animate(folder)
+    if importlib.util.find_spec("imageio_ffmpeg") or shutil.which("ffmpeg"):
+        film = run.animate(tmp_path / "run.mp4", fps=5, dpi=40).read_bytes()
+        assert film[4:8] == b"ftyp"
+    monkeypatch.setattr(matplotlib.animation.writers, "is_available", lambda name: False)
+    monkeypatch.setattr(writers, "import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+    with pytest.raises(MissingDependencyError, match=r"needs ffmpeg: pip install imageio-ffmpeg.*\.html need"):
+        run.animate(tmp_path / "other.mp4")
+
+
+def test_a_range_at_one_time_moves_in_a_page_too(module: Any, tmp_path: Path) -> None:
+    motion = module.kinematic_analysis(theta=np.linspace(0.0, 1.0, 5))
+    text = motion.animate(tmp_path / "range.html", plot="s").read_text()
+    assert '"words": ["theta = 0.000 rad", "theta = 0.250 rad"' in text
+    clock = json.loads(re.search(r'"clock": (\[[^]]*\])', text)[1])  # type: ignore[index]
+    assert len(set(clock)) == 5

@@ -132,11 +132,12 @@ def test_an_outline_is_the_convex_hull() -> None:
 
 
 def test_pitch_circles_touch() -> None:
-    """30, 30 and 90 teeth on a carrier of 60 mm: radii 30, 30 and 90 mm."""
+    """30, 30 and 90 teeth on a carrier of 60 mm: radii 30, 30 and 90 mm; the drum of the rope has 40 mm."""
     scene = scene_of(compiled("planetary_gear.yaml"))
     wheels = [item for item in scene.items if item.role == "wheel" and item.faces is not None]
-    radii = sorted(float(np.ptp(item.points[:, 0]) / 2) for item in wheels)
-    assert radii == pytest.approx([0.03, 0.03, 0.03, 0.09], rel=1e-6)
+    for name, expected in (("gears", [0.03, 0.03, 0.03, 0.09]), ("rope", [0.04])):
+        radii = sorted(float(np.ptp(item.points[:, 0]) / 2) for item in wheels if item.name == name)
+        assert radii == pytest.approx(expected, rel=1e-6)
 
 
 def test_bad_input_is_refused_by_name(module: Any) -> None:

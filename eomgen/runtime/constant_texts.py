@@ -1,0 +1,30 @@
+"""Stage runtime: an expression of numbers as text -> its value; read like those of model files, never executed.
+
+A generated package has no parser and is without this file.
+"""
+
+from __future__ import annotations
+
+from ..describe.expressions import parse
+from ..errors import ExpressionError, UsageError
+from ..graph.core import Expr, Graph
+
+
+def constant(text: str, what: str) -> float:
+    """The value of an expression of numbers; names have none.
+
+    Raises
+    ------
+    UsageError
+    """
+
+    def resolve(name: str) -> Expr:
+        raise ExpressionError(f"{name!r} is no number", remedy="write numbers, pi and functions of them")
+
+    try:
+        value = parse(text, Graph(), resolve).value
+    except ExpressionError as error:
+        raise UsageError(f"{what} must be a number, not {text!r}: {error}") from None
+    if value is None:
+        raise UsageError(f"{what} must be a number, not {text!r}")
+    return float(value)

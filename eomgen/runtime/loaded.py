@@ -1,0 +1,58 @@
+"""Stage runtime: a file that Trajectory.save wrote -> Trajectory."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ..errors import UsageError
+from ..files.path_names import as_path
+from .arrays import BROKEN, read_arrays
+from .run_parts import Residuals
+from .storage import FORMAT, Stored
+from .trajectory import Trajectory
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """Read a trajectory that :meth:`Trajectory.save` wrote to an .npz file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Trajectory
+        With all columns and ``metadata``; without dense output.
+
+    Raises
+    ------
+    UsageError
+        The file holds something else.
+    FileNotFoundError
+    """
+    source = as_path("path", path)
+    if not source.suffix and not source.exists():
+        source = source.with_suffix(".npz")
+    try:
+        arrays = read_arrays(source)
+        header = json.loads(str(arrays["header"]))
+        if header.pop("format") != FORMAT:
+            raise ValueError("another format")
+        names, x, t = tuple(header.pop("names")), arrays["x"], arrays["t"]
+        if x.shape != (len(header["x_names"]), *t.shape) or arrays["columns"].shape != (len(names), *t.shape):
+            raise ValueError("columns that do not fit each other")
+        Residuals(**header["residuals"])
+    except FileNotFoundError:
+        raise
+    except (*BROKEN, RecursionError) as error:
+        raise UsageError(f"{source} is not a trajectory saved by eomgen: {error}") from None
+    count = sum(key.startswith("t_events_") for key in arrays)
+    return Trajectory(
+        arrays["t"],
+        arrays["x"],
+        Stored(names, arrays["columns"], arrays.get("energies")),
+        header,
+        [arrays[f"t_events_{k}"] for k in range(count)],
+        [arrays[f"x_events_{k}"] for k in range(count)],
+    )

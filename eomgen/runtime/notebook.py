@@ -1,0 +1,91 @@
+"""Stage runtime, notebooks: a module, a trajectory -> HTML with a picture, and what can be called."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any
+
+from ..files.inline_pictures import picture_html, side_by_side
+from ..kernel_table import KERNELS
+from ..texts import html_table, html_text
+from .drawing import load_show
+from .near_names import require
+from .plotting import choose, height, stack
+from .summary import facts, trajectory_facts
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+CURVES = 12  #: columns of the small plot of a run
+LEFT = "style='text-align:left'"
+
+
+def module_html(module: BoundModel) -> str:
+    """The mechanism, what the module is made of, and what can be called."""
+    table = html_table(module.name, facts(module), module.doc)
+    return side_by_side(mechanism_html(module), table + _calls(module))
+
+
+def mechanism_html(module: BoundModel) -> str:
+    """A small picture of the mechanism at its declared initial position; nothing without bodies."""
+    if module.metadata.get("picture") is None:
+        return ""
+    return picture_html(lambda: load_show("draw", "a picture").small_figure(module))
+
+
+def _calls(module: BoundModel) -> str:
+    """Signatures of the calls that can be made, folded up."""
+    rows = []
+    for kernel in KERNELS:
+        call = getattr(type(module), kernel.name, None) or getattr(module, kernel.name, None)
+        if kernel.late or call is None or kernel.name not in module.core.names:
+            continue
+        shape = module.layout.shape(kernel.name)
+        size = " x ".join(map(str, shape))
+        rows.append((f"{kernel.name}({_arguments(kernel.name, kernel.inputs)})", size, kernel.result))
+    cells = "".join(
+        f"<tr><td {LEFT}><code>{html_text(call)}</code></td><td>{html_text(size)}</td>"
+        f"<td {LEFT}>{html_text(result)}</td></tr>"
+        for call, size, result in rows
+    )
+    head = f"<tr><th {LEFT}>call</th><th>shape</th><th {LEFT}>result</th></tr>"
+    own = [name for name in dir(type(module)) if not name.startswith("_") and name not in {k.name for k in KERNELS}]
+    methods = ", ".join(f"<code>{html_text(n)}</code>" for n in own if _is_call(type(module), n))
+    return (
+        f"<details><summary>what can be called</summary><table>{head}{cells}</table>"
+        f"<p {LEFT}>and {methods}; <code>help(mod.simulate)</code> and the like say more.</p></details>"
+    )
+
+
+def _is_call(kind: type, name: str) -> bool:
+    found = inspect.getattr_static(kind, name)
+    return not isinstance(found, property) and (hasattr(found, "__get__") or callable(found))
+
+
+def _arguments(name: str, inputs: tuple[str, ...]) -> str:
+    """The arguments as they are written in a call."""
+    if name == "kinematics":
+        return "q_i, v_i, a_i"
+    if inputs == ("q", "v"):
+        return "t, x" if name in _TIMED else "x"
+    return ", ".join(inputs)
+
+
+_TIMED = ("rhs", "jacobian", "bias", "outputs", "input_jacobian", "parameter_jacobian")
+
+
+def trajectory_html(trajectory: Any) -> str:
+    """A small plot of the coordinates and what the run came to."""
+    return side_by_side(picture_html(lambda: small_plot(trajectory)), html_table(*trajectory_facts(trajectory)))
+
+
+def small_plot(trajectory: Any) -> Any:
+    """A figure of the coordinates, of the first ones where they are many."""
+    figures = require("matplotlib.figure", "matplotlib", "a picture")
+    led = trajectory.metadata.get("led", ())
+    over = led[0] if led and len(trajectory) and trajectory.t[0] == trajectory.t[-1] else None
+    names = [name for name in trajectory.metadata["q_names"] if name != over][:CURVES]
+    panels, across = choose(trajectory, names, over, None, "time")
+    figure = figures.Figure(figsize=(6.6, max(2.6, 0.75 * sum(map(height, panels)) + 0.5)), layout="constrained")
+    stack(figure, None, panels, across)
+    return figure

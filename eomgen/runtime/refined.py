@@ -1,0 +1,78 @@
+"""Stage runtime: steps of a run -> states between them, for curves and animations that look smooth."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..numeric.scales import Array
+
+if TYPE_CHECKING:
+    from .bound_model import BoundModel
+
+FINE = 1000  #: points of a smooth curve, about
+
+
+def cubic_between(t: Array, x: Array, slopes: Array | None, times: Array) -> Array:
+    """States (n, k) at times (k,) within a run: cubics through the states and slopes of its steps.
+
+    Without slopes straight lines.  Where a time stands twice, as at an event that resets the state, the second state
+    begins the next piece.
+
+    Parameters
+    ----------
+    t : (m,) array
+        Ascending or descending.
+    x, slopes : (n, m) arrays
+    times : (k,) array
+    """
+    way = 1.0 if t[-1] >= t[0] else -1.0
+    k = np.clip(np.searchsorted(way * t, way * times, side="right") - 1, 0, len(t) - 2)
+    h = t[k + 1] - t[k]
+    s = np.where(h == 0.0, 1.0, (times - t[k]) / np.where(h == 0.0, 1.0, h))
+    if slopes is None:
+        straight: Array = x[:, k] + s * (x[:, k + 1] - x[:, k])
+        return straight
+    # Hermite's basis on [0, 1]
+    start, end = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * s * (3.0 - 2.0 * s)
+    cubic: Array = start * x[:, k] + end * x[:, k + 1]
+    return cubic + h * (s * (1.0 - s) ** 2 * slopes[:, k] - s * s * (1.0 - s) * slopes[:, k + 1])
+
+
+def states_at(trajectory: Any, module: BoundModel, times: Array) -> tuple[Array, Array | None]:
+    """States (n_x, k) of a run at times within it, on the constraints, and inputs (n_u, k) or None without any.
+
+    The dense output of the run serves where it was kept.
+    """
+    names = module.u_names
+    if trajectory.has_dense_output:
+        dense = trajectory.at(times)
+        return dense.x, dense.to_numpy(*names) if names else None
+    slopes = getattr(trajectory.columns, "slopes", None)
+    u = cubic_between(trajectory.t, trajectory.to_numpy(*names), None, times) if names else None
+    states = cubic_between(trajectory.t, trajectory.x, slopes, times)
+    if module.n_rows or module.layout.space:
+        states = module.project(states, t=times, u=u)
+    return states, u
+
+
+def refined(trajectory: Any, names: tuple[str, ...]) -> tuple[Array, dict[str, Array]]:
+    """Times and columns of a run, with points between its steps where they are few and the model is at hand."""
+    from ..errors import EvaluationError
+    from .columns import Columns
+
+    t = trajectory.t
+    parts = -(-FINE // max(1, len(t) - 1))
+    module = getattr(trajectory.columns, "module", None)
+    if module is not None and type(trajectory.columns) is Columns and parts > 1 and len(t) > 1 and t[0] != t[-1]:
+        steps = np.arange(parts) / parts
+        times = np.append((t[:-1, None] + np.diff(t)[:, None] * steps).ravel(), t[-1])
+        times = times[np.append(True, np.diff(times) != 0.0)]
+        try:
+            states, u = states_at(trajectory, module, times)
+            columns = Columns(module, times, states, np.empty((0, len(times))) if u is None else u)
+            return times, {name: columns[name] if name != "t" else times for name in names}
+        except EvaluationError:  # the cubic left what the model allows: its steps are drawn
+            pass
+    return t, {name: trajectory[name] for name in names}

@@ -1,0 +1,99 @@
+"""Stage show, frames: scenes over time -> pictures of one figure, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .draw import new_artist
+from .flat import figure_size
+from .optional import matplotlib
+from .scene import Scene
+from .shown_motion import ShownMotion
+
+DPI = 80  #: of the frames
+BELOW = 1.7  #: height of the plot below (inch)
+SPACE = (6.4, 5.6)  #: of a spatial mechanism (inch)
+
+
+class Frames:
+    """Pictures over time on one figure.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    motion : ShownMotion
+    """
+
+    def __init__(self, figure: Any, motion: ShownMotion) -> None:
+        agg = matplotlib("backends.backend_agg", "an animation")
+        self.figure, self.motion = figure, motion
+        self.canvas = agg.FigureCanvasAgg(figure)
+        self.updates: list[Callable[[int], None]] = []
+
+    @classmethod
+    def of(cls, scene: Scene, motion: ShownMotion, curves: Sequence[Any] = (), dpi: float = DPI) -> Frames:
+        """One scene, and curves below it."""
+        width, height = figure_size(scene) if scene.view is not None else SPACE
+        below = BELOW if curves else 0.0
+        figure = matplotlib("figure", "an animation").Figure((width, height + below), dpi=dpi, layout="constrained")
+        grid = figure.add_gridspec(2 if curves else 1, 1, height_ratios=[height, below] if curves else [1])
+        spatial = {} if scene.view is not None else {"projection": "3d"}
+        frames = cls(figure, motion)
+        note = f"   {scene.note}" if scene.note else ""
+        frames.add_scene(scene, figure.add_subplot(grid[0], **spatial), f"{scene.name}  {{}}{note}")
+        if curves:
+            frames.add_curves(figure.add_subplot(grid[1]), curves)
+        frames.settle()
+        return frames
+
+    def add_scene(self, scene: Scene, ax: Any, title: str) -> None:
+        """Draw a scene on axes; ``{}`` in the title is what is said of the frame."""
+        artist = new_artist(scene, None, ax)
+        above = ax.set_title("", fontsize=10, parse_math=False, family="monospace")
+
+        def update(k: int) -> None:
+            artist.show(k)
+            above.set_text(title.replace("{}", self.motion.words[k]))
+
+        self.updates.append(update)
+
+    def add_curves(self, ax: Any, curves: Sequence[Any]) -> None:
+        """Draw curves, with a line where the frame is."""
+        draw_curves(ax, curves, self.motion)
+        cursor = ax.axvline(self.motion.over[0], color="0.3", linewidth=1.0)
+        self.updates.append(lambda k: cursor.set_xdata([self.motion.over[k]] * 2))
+
+    def settle(self) -> None:
+        """Find the places of all axes, which then stay where they are."""
+        self.show(0)
+        self.canvas.draw()
+        self.figure.set_layout_engine("none")
+
+    def __len__(self) -> int:
+        return len(self.motion.t)
+
+    def show(self, k: int) -> None:
+        """Move everything to frame k."""
+        for update in self.updates:
+            update(k)
+
+    def image(self, k: int) -> Any:
+        """Frame k as an array (height, width, 3) of bytes."""
+        self.show(k)
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+
+def draw_curves(ax: Any, curves: Sequence[Any], motion: ShownMotion) -> None:
+    """Columns of a run over time, or over what is led."""
+    for curve in curves:
+        ax.plot(curve.over, curve.values, linewidth=1.1, label=curve.label)
+    beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.05), "frameon": False}
+    for text in ax.legend(fontsize=7, **beside).get_texts():
+        text.set_parse_math(False)
+    ax.set_xlabel("t (s)" if motion.over is motion.t else motion.words[0].partition(" = ")[0], fontsize=8)
+    ax.tick_params(labelsize=7)
+    ax.grid(alpha=0.3)

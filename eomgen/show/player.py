@@ -1,0 +1,123 @@
+"""Stage show, player: a bar with play, time and speed for pages, and curves with a line that follows the time."""
+
+from __future__ import annotations
+
+import io
+import json
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from .film_frames import draw_curves
+from .optional import matplotlib
+from .shown_motion import ShownMotion
+
+BAR = 40  #: height of the bar (dots)
+PLOT = 190  #: of the curves above it
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+class InlinePage:
+    """A page that a notebook shows in a frame; ``str`` of it is the page."""
+
+    def __init__(self, text: str, height: int = 620) -> None:
+        self.text, self.height = text, height
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<InlinePage of {len(self.text) / 1e6:.1f} MB>"
+
+    def _repr_html_(self) -> str:
+        style = f"width:100%;height:{self.height}px;border:0"
+        return f'<iframe style="{style}" srcdoc="{escape(self.text, quote=True)}"></iframe>'
+
+
+def curves_html(motion: ShownMotion, curves: Sequence[Any]) -> str:
+    """The curves as one picture, with a line over it; the ends of its axes stand in its data."""
+    figure = matplotlib("figure", "curves beside an animation").Figure((9.0, PLOT / 100), dpi=200, layout="constrained")
+    ax = figure.add_subplot()
+    draw_curves(ax, curves, motion)
+    ax.set_xlim(float(motion.over.min()), float(motion.over.max()))
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png")
+    box = ax.get_position()
+    data = b64encode(buffer.getvalue()).decode()
+    return (
+        f'<div id="curves" data-left="{box.x0:.5f}" data-right="{box.x1:.5f}" data-low="{float(motion.over.min())!r}" '
+        f'data-high="{float(motion.over.max())!r}"><img alt="curves" src="data:image/png;base64,{data}">'
+        '<div id="cursor"></div></div>'
+    )
+
+
+def player_html(motion: ShownMotion, curves: Sequence[Any], title: str) -> str:
+    """Style and elements, to stand at the beginning of a page's body."""
+    plot = curves_html(motion, curves) if curves else ""
+    below = BAR + (PLOT if curves else 0)
+    speeds = "".join(f'<option value="{s}"{" selected" if s == 1.0 else ""}>x{s:g}</option>' for s in SPEEDS)
+    clock = motion.clock
+    return f"""<style>
+#canvasTarget {{ height: calc(100% - {below}px) !important; top: 0; }}
+#player {{ position: fixed; left: 0; right: 0; bottom: 0; height: {BAR}px; display: flex; gap: 10px; padding: 0 14px;
+  align-items: center; background: #fff; font: 14px sans-serif; box-sizing: border-box; border-top: 1px solid #ddd; }}
+#player button {{ width: 34px; height: 28px; }} #player input {{ flex: 1; }} #words {{ min-width: 9em; }}
+#curves {{ position: fixed; bottom: {BAR}px; height: {PLOT}px; left: 50%; transform: translateX(-50%); }}
+#curves img {{ height: 100%; }}
+#cursor {{ position: absolute; top: 2%; bottom: 20%; width: 1px; background: #333; }}
+#title {{ position: fixed; left: 14px; top: 10px; font: 15px sans-serif; z-index: 5; pointer-events: none; }}
+</style>
+<div id="title">{escape(title)}</div>{plot}
+<div id="player"><button id="play" title="play or pause">&#10074;&#10074;</button>
+<input id="time" type="range" min="0" max="{float(clock[-1])!r}" step="any" value="0" aria-label="time">
+<span id="words"></span><select id="speed" title="speed">{speeds}</select></div>
+"""
+
+
+def player_script(motion: ShownMotion) -> str:
+    """What moves a page; ``K3DInstance`` is k3d's."""
+    data = {"clock": motion.clock.tolist(), "over": motion.over.tolist(), "words": motion.words}
+    return _SCRIPT.replace("DATA", json.dumps(data).replace("<", "\\u003c"))
+
+
+_SCRIPT = """(function (k3d) {
+  const data = DATA, end = data.clock[data.clock.length - 1];
+  const get = (id) => document.getElementById(id);
+  const slider = get("time"), button = get("play"), words = get("words"), speed = get("speed");
+  const curves = get("curves"), cursor = get("cursor");
+  let now = 0, playing = true, last = null;
+  function show(t) {
+    now = t;
+    slider.value = t;
+    let k = 0;
+    while (k + 1 < data.clock.length && data.clock[k + 1] <= t) k += 1;
+    words.textContent = data.words[k];
+    if (curves) {
+      const part = (data.over[k] - curves.dataset.low) / (curves.dataset.high - curves.dataset.low || 1);
+      cursor.style.left = 100 * (+curves.dataset.left + part * (curves.dataset.right - curves.dataset.left)) + "%";
+    }
+    k3d.setTime(t);
+  }
+  function play(on) {
+    playing = on;
+    last = null;
+    button.textContent = on ? "\\u275a\\u275a" : "\\u25b6";
+  }
+  function step(stamp) {
+    if (playing) {
+      if (last !== null) {
+        const t = now + (stamp - last) / 1000 * speed.value;
+        show(t > end ? 0 : t);
+      }
+      last = stamp;
+    }
+    requestAnimationFrame(step);
+  }
+  button.onclick = () => play(!playing);
+  slider.oninput = () => { play(false); show(+slider.value); };
+  window.onresize = () => k3d.resizeHelper && k3d.resizeHelper();
+  show(0);
+  k3d.setCamera(k3d.parameters.camera);  // or k3d believes that all names are out of sight
+  requestAnimationFrame(step);
+})(K3DInstance);"""

@@ -1,0 +1,126 @@
+"""Stage show, writers: Frames -> GIF, MP4, or PNG files in a folder."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ..errors import MissingDependencyError, UsageError
+from ..files.writing import refuse_link, whole_file
+from .film_frames import Frames
+from .optional import k3d, matplotlib
+
+COLORS = 64  #: of a GIF
+PALETTE_OF = 4  #: frames from which these are taken
+FOLDER = "a folder for PNG frames"
+
+
+def kind_of(path: Path) -> str:
+    """The ending of a file; a name without one is a folder."""
+    return path.suffix.lower() if path.suffix and not path.is_dir() else FOLDER
+
+
+def require_kind(path: Path) -> None:
+    """Refuse an ending that says no kind of animation, and a kind whose library is missing, before any work.
+
+    Raises
+    ------
+    UsageError, MissingDependencyError
+    """
+    kind = kind_of(path)
+    if kind not in (*WRITERS, ".html"):
+        raise UsageError(
+            f"{path}: the ending says what kind of animation; there are .gif, .mp4, .html, "
+            "and a name without an ending is a folder for PNG frames"
+        )
+    if kind == ".html":
+        k3d("an animation as a page")
+        return
+    if kind == FOLDER:
+        refuse_link(path)
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise UsageError(f"{path}: frames go into a new or an empty folder; name another, or empty it")
+    matplotlib("figure", "an animation")
+    if kind == ".mp4":
+        _find_ffmpeg()
+
+
+def _find_ffmpeg() -> str:
+    """The program ffmpeg: on the path, or that of the package imageio-ffmpeg.
+
+    Raises
+    ------
+    MissingDependencyError
+    """
+    if matplotlib("animation", "an animation").writers.is_available("ffmpeg"):
+        return str(matplotlib("pyplot", "an animation").rcParams["animation.ffmpeg_path"])
+    try:
+        return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        raise MissingDependencyError(
+            "an animation as .mp4 needs ffmpeg: pip install imageio-ffmpeg, or that of the system "
+            "(Debian: apt install ffmpeg); .gif and .html need neither"
+        ) from None
+
+
+def gif_bytes(frames: Frames) -> bytes:
+    """All frames as a GIF that goes round."""
+    from PIL import Image
+
+    images = [Image.fromarray(frames.image(k)) for k in range(len(frames))]
+    several = images[:: max(1, len(images) // PALETTE_OF)]  # colours that only some frames have
+    sheet = Image.new("RGB", (images[0].width, images[0].height * len(several)))
+    for k, image in enumerate(several):
+        sheet.paste(image, (0, k * image.height))
+    palette = sheet.quantize(COLORS)
+    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    # a GIF counts hundredths of a second; pillow joins equal frames, which keeps the time
+    duration = max(20, round(100.0 / frames.motion.fps) * 10)
+    buffer = io.BytesIO()
+    reduced[0].save(
+        buffer, format="GIF", save_all=True, append_images=reduced[1:], duration=duration, loop=0, optimize=False
+    )
+    return buffer.getvalue()
+
+
+def _write_gif(path: Path, frames: Frames) -> None:
+    data = gif_bytes(frames)
+    with whole_file(path) as handle:
+        handle.write(data)
+
+
+def _write_mp4(path: Path, frames: Frames) -> None:
+    animation, pyplot = (matplotlib(part, "an animation") for part in ("animation", "pyplot"))
+    with TemporaryDirectory() as folder, pyplot.rc_context({"animation.ffmpeg_path": _find_ffmpeg()}):
+        part = os.path.join(folder, "part.mp4")
+        # an even number of dots, and colours that every player knows
+        even = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+        writer = animation.FFMpegWriter(fps=frames.motion.fps, codec="libx264", extra_args=even)
+        with writer.saving(frames.figure, part, frames.figure.dpi):
+            for k in range(len(frames)):
+                frames.show(k)
+                writer.grab_frame()
+        data = Path(part).read_bytes()
+    with whole_file(path) as handle:
+        handle.write(data)
+
+
+def _write_frames(path: Path, frames: Frames) -> None:
+    path.mkdir(parents=True, exist_ok=True)
+    from PIL import Image
+
+    digits = len(str(len(frames) - 1))
+    for k in range(len(frames)):
+        buffer = io.BytesIO()
+        Image.fromarray(frames.image(k)).save(buffer, format="PNG")
+        with whole_file(path / f"frame_{k:0{digits}}.png") as handle:
+            handle.write(buffer.getvalue())
+
+
+#: Endings of files that matplotlib makes.
+WRITERS: dict[str, Callable[[Path, Any], None]] = {".gif": _write_gif, ".mp4": _write_mp4, FOLDER: _write_frames}

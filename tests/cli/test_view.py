@@ -1,0 +1,87 @@
+"""``eomgen view``: a range of coordinates or a run, as a file or a page that a browser opens."""
+
+from __future__ import annotations
+
+import json
+import webbrowser
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from eomgen.cli.command import run_command
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FOUR_BAR = str(EXAMPLES / "four_bar.yaml")
+
+
+def code_of(words: list[str]) -> int:
+    """The exit code of a command line."""
+    try:
+        return run_command(words)
+    except SystemExit as end:
+        return int(end.code or 0)
+
+
+def test_a_range_is_shown_without_forces(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "turn.gif"
+    words = ["view", FOUR_BAR, "--target", "numpy", "--range", "theta=0:2*pi:13", "--out", str(file), "--plot", "psi"]
+    assert code_of([*words, "--trace", "coupler", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "name": "four_bar",
+        "points": 13,
+        "files": [str(file)],
+        "opened": False,
+    }
+    with Image.open(file) as image:
+        assert image.n_frames == 13
+
+
+def test_a_run_opens_in_a_browser(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("k3d")
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda url: opened.append(url) or True)
+    words = ["view", FOUR_BAR, "--target", "numpy", "--end", "0.5", "--fps", "8", "--set", "theta=0.5"]
+    assert code_of(words) == 0
+    page = Path(opened[0].removeprefix("file://"))
+    assert "<title>four_bar</title>" in page.read_text()
+    assert f"wrote {page}" in capsys.readouterr().out
+    page.unlink()
+
+
+def test_frames_go_into_a_new_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "frames"
+    words = ["view", FOUR_BAR, "--target", "numpy", "--range", "theta=0:1:4", "--out", str(folder)]
+    assert code_of(words) == 0
+    assert [file.name for file in sorted(folder.iterdir())] == [f"frame_{k}.png" for k in range(4)]
+    assert code_of(words) == 2  # it is not empty any more
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--range", "theta=0:1", "--end", "2"], "--end and options of the integrator are for runs"),
+        (["--range", "theta"], "write NAME=START:END"),
+        (["--out", "x.avi"], "there are .gif, .mp4, .html"),
+        (["--range", "thet=0:1:3", "--out", "x.gif"], "did you mean theta"),
+        (["--trace", "coupler.Q", "--out", "x.gif", "--end", "0.1"], "no marker or body 'coupler.Q'"),
+    ],
+)
+def test_slips_are_told(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert code_of(["view", FOUR_BAR, "--target", "numpy", *words]) in (2, 4)
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_plots_take_columns(tmp_path: Path) -> None:
+    words = ["run", str(EXAMPLES / "pendulum.yaml"), "--target", "numpy", "--end", "0.5"]
+    wishes = ["--columns theta,theta_dot", "--plot-as phase", "--columns theta_dot --against theta", ""]
+    for more in wishes:
+        file = tmp_path / "p.png"
+        assert code_of([*words, "--plot", str(file), *more.split()]) == 0
+        file.unlink()
+    assert code_of([*words, "--columns", "theta"]) == 2
+    assert code_of([*words, "--plot", str(tmp_path / "p.png"), "--columns", "thet"]) == 2

@@ -1,0 +1,121 @@
+"""Plots of runs: what is drawn, where its names stand, and that nothing is squeezed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import eomgen as eg
+from eomgen.errors import UsageError
+from eomgen.runtime.refined import cubic_between
+
+matplotlib.use("agg")
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(autouse=True)
+def close_figures() -> Iterator[None]:
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def run() -> Any:
+    return eg.load(EXAMPLES / "slider_crank.yaml").compile(target="numpy").simulate(1.0)
+
+
+def pendulum(theta: float = 0.01, end: float = 8.0) -> Any:
+    m = eg.Model("pendulum", gravity=(0, -9.81, 0))
+    bob = m.body("bob", mass=1, com=(0, -1, 0))
+    m.revolute("hinge", m.ground, bob, coordinate="theta")
+    return m.compile(target="numpy").simulate(end, initial={"theta": theta}, rtol=1e-10, atol=1e-12)
+
+
+def test_shape_against_shape_is_the_path_of_the_point(run: Any) -> None:
+    ax = run.plot(x="pin_x", y="s")
+    line = ax.lines[0].get_xydata()
+    # the tip of the rod is on the slider: a straight line of 45 degrees, drawn in one scale
+    assert line[:, 0] == pytest.approx(line[:, 1], abs=1e-9)
+    assert ax.get_aspect() == 1.0
+    assert len(line) > 500
+    assert run.plot("theta", x="s").get_xlabel() == "s (m)"
+
+
+def test_a_phase_portrait_of_a_small_swing_is_an_ellipse() -> None:
+    ax = pendulum().plot("theta", kind="phase")
+    x, y = ax.lines[0].get_xydata().T
+    assert (x / 0.01) ** 2 + (y / (0.01 * np.sqrt(9.81))) ** 2 == pytest.approx(1.0, abs=1e-4)
+    assert ax.get_xlabel() == "theta (rad)"
+    assert ax.get_ylabel() == "theta_dot (rad/s)"
+
+
+def test_a_spectrum_has_the_frequency_and_amplitude_of_the_swing() -> None:
+    period = 2.0 * np.pi / np.sqrt(9.81)
+    ax = pendulum(end=10 * period).plot(kind="spectrum")
+    frequency, amplitude = ax.lines[0].get_xydata().T
+    k = int(np.argmax(amplitude))
+    assert frequency[k] == pytest.approx(1.0 / period, rel=1e-3)
+    assert amplitude[k] == pytest.approx(0.01, rel=1e-3)
+
+
+def test_energy_and_residuals(run: Any) -> None:
+    parts, change = run.plot(kind="energy")
+    kinetic, potential, total = (line.get_ydata() for line in parts.lines)
+    assert kinetic + potential == pytest.approx(total)
+    assert np.abs(change.lines[0].get_ydata()).max() < 1e-6
+    position, _ = run.plot(kind="residuals")
+    assert position.get_yscale() == "log"
+    assert position.lines[0].get_ydata().max() < 1e-9
+    with pytest.raises(UsageError, match="no constraints"):
+        pendulum(end=0.1).plot(kind="residuals")
+
+
+def test_sixty_columns_leave_the_axes_their_room() -> None:
+    mod = eg.load(EXAMPLES / "stewart_platform.yaml").compile(target="numpy")
+    traj = mod.simulate(0.02)
+    names = [n for n in traj.names if traj.units.get(n) in ("rad", "m", "rad/s", "m/s")][:60]
+    assert len(names) == 60
+    panels = traj.plot(*names)
+    assert len(panels) == 4
+    figure = panels[0].figure
+    figure.canvas.draw()
+    for ax in panels:
+        box = ax.get_window_extent()
+        assert box.width > 0.35 * figure.bbox.width
+        assert box.height > 120
+        legend = ax.get_legend().get_window_extent()
+        assert legend.x0 >= box.x1 - 1.0  # outside
+        assert legend.x1 <= figure.bbox.x1 + 1.0
+        styles = {(line.get_color(), line.get_linestyle()) for line in ax.lines}
+        assert len(styles) == len(ax.lines)
+
+
+def test_wishes_that_do_not_go_together_are_refused(run: Any) -> None:
+    for call, words in (
+        ({"y": "s"}, "goes with x="),
+        ({"x": "s"}, "nothing to draw over it"),
+        ({"x": "s", "y": "theta", "kind": "phase"}, "do not go together"),
+        ({"kind": "phases"}, "did you mean phase"),
+        ({"x": "thet", "y": "s"}, "did you mean theta"),
+    ):
+        with pytest.raises(UsageError, match=words):
+            run.plot(**call)
+    assert plt.get_fignums() == []
+
+
+def test_cubics_take_the_later_state_after_a_reset() -> None:
+    """A ball that bounces: x = t (1 - t) twice, its rate turned round at t = 1."""
+    t = np.array([0.0, 1.0, 1.0, 2.0])
+    x = np.array([[0.0, 0.0, 0.0, 0.0]])
+    slopes = np.array([[1.0, -1.0, 1.0, -1.0]])
+    times = np.linspace(0.0, 2.0, 41)
+    part = times % 1.0
+    for way in (1.0, -1.0):  # backwards too
+        found = cubic_between(way * t, x, way * slopes, way * times)
+        assert found[0] == pytest.approx(part * (1.0 - part), abs=1e-14)
