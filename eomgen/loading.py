@@ -33,7 +33,8 @@ def load(
         What becomes of masses and inertias that no body can have, and of motions without inertia: refused (the default,
         True), taken and told in ``Model.notes``, or taken in silence (False).  The file's own word unless given.
     **robot
-        For robots: ``floating``, ``lock``, ``mimic``, ``limits`` and the other fields of
+        For robots: ``mimic`` ('coupling', the default, or 'independent'), ``limits`` ('note', the default, 'stop' or
+        'off'), ``floating``, ``lock`` and the other fields of
         :class:`eomgen.robots.RobotOptions`.
 
     Returns

@@ -143,7 +143,7 @@ _ROBOT = (
     click.option(
         "--mimic",
         type=click.Choice(["independent", "coupling"]),
-        help="Robots: joints that mimic others are independent, or a coupling.",
+        help="Robots: joints that mimic others are tied by a coupling (the default), or independent.",
     ),
     click.option(
         "--rotation",
@@ -165,8 +165,8 @@ _ROBOT = (
     ),
     click.option(
         "--limits",
-        type=click.Choice(["note", "off"]),
-        help="Robots: note which limits of joints are data only, or not.",
+        type=click.Choice(["note", "stop", "off"]),
+        help="Robots: a run that passes a limit of a joint says so, stops push back there, or nothing happens.",
     ),
     click.option("--assets", metavar="DIR", help="Robots (MJCF): the folder within which other files may be read."),
 )

@@ -11,6 +11,7 @@ import click
 from ..errors import UsageError
 from ..files.writing import write_whole
 from ..suggestions import hint
+from ..syntax_trees import parse_module
 from .example_files import example_files
 from .failures import reports_failures
 from .screen import print_json, print_table, say
@@ -21,7 +22,7 @@ def describe_example(file: Path) -> str:
     """The ``doc:`` line of a model file, the first comment of a robot, or the first line of a script's docstring."""
     text = file.read_text(encoding="utf-8")
     if file.name.endswith(".py"):
-        return (ast.get_docstring(ast.parse(text)) or "").split("\n", 1)[0]
+        return (ast.get_docstring(parse_module(text)) or "").split("\n", 1)[0]
     if file.name.endswith(".urdf"):
         comment = re.search(r"<!--(.*?)-->", text, re.DOTALL)
         return " ".join(comment.group(1).split()) if comment else ""

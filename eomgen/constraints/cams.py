@@ -245,6 +245,7 @@ TYPES = table(
                 "expression",
                 "the follower's coordinate over theta = the cam's angle less the phase, from 0 to a full turn",
                 required=True,
+                local=(CAM_ANGLE,),
             ),
             "phase": Field("expression", "the cam's angle where theta is 0 (rad)", default=0),
             "periodic": _PERIODIC,
@@ -260,10 +261,13 @@ TYPES = table(
             "shape": Field(
                 "choice", "shape of the follower", required=True, choices=("knife_edge", "roller", "flat_face")
             ),
-            "contour": Field("expression", "r(theta), radius of the contour over its polar angle (m)"),
+            "contour": Field(
+                "expression", "r(theta), radius of the contour over its polar angle (m)", local=(CAM_ANGLE,)
+            ),
             "support": Field(
                 "expression",
                 "of a flat face: h(theta), distance of the tangent with its normal at theta (m)",
+                local=(CAM_ANGLE,),
             ),
             "radius": Field("expression", "radius of the roller (m)"),
             "coordinate": Field("name", "name of the polar angle of the contact point (<name>_contact)"),

@@ -94,6 +94,10 @@ def build_joints(reader: Reader, declared: list[Declared]) -> tuple[JointSpec, .
         pair = reader.pair(f"{path}.between", values["between"]) if "between" in values else None
         kind = _with_expressions(reader, joint)
         columns = reader.axis(f"{path}.axis", values["axis"]) if "axis" in values else TURNS["z"]
+        if "axes" in values:
+            if "axis" in values:
+                reader.faults.add(f"{path}.axes", "axis is given too", "leave one of them out")
+            columns = reader.axes(f"{path}.axes", values["axes"])
         if pair is None:
             continue
         if pair[0].body == pair[1].body:

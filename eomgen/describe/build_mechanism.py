@@ -27,8 +27,9 @@ from .build_lagrangian import build_lagrangian, declare_lagrangian
 from .cam_turns import check_turns
 from .checks import check_connected, check_keys, check_names
 from .description import GROUND_NAME, DescribedEntry, Description, Faults, items
+from .dotted_names import undotted
 from .element_entry import Surroundings
-from .fields import BODY, INPUT, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
+from .fields import BODY, INPUT, MODEL, MOTION, OUTPUT, OUTPUT_FIELDS, PARAMETER, SIMULATION, Fields
 from .fields import GROUND as GROUND_FIELDS
 from .input_rates import add_rates
 from .joint_data import check_display
@@ -58,7 +59,10 @@ def build(description: Description) -> Mechanism:
     ModelError
         The description has faults; all of them are listed.
     """
+    description = undotted(description)
     faults = Faults(description)
+    if description.incomplete:
+        raise ModelError(faults.sorted())
     names = Namespace(faults)
     graph = Graph()
     reader = Reader(graph, names, faults, description)
@@ -68,6 +72,9 @@ def build(description: Description) -> Mechanism:
     fault = ("is missing", "give the model a name") if name is None else fault_of_model_name(name)
     if fault:
         faults.add("name", *fault)
+    if values.get("attachments"):
+        remedy = "add this model to another as a component, which gives markers in their place"
+        faults.add("attachments", "stand for markers of another model", remedy)
     parameters = tuple(_parameter(reader, entry) for entry in sections["parameters"])
     inputs = tuple(_input(reader, entry) for entry in sections["inputs"])
     numbers = reader.numbers = {p.name: p.value for p in parameters if p.value is not None}
@@ -133,6 +140,7 @@ def build(description: Description) -> Mechanism:
         lines=dict(description.lines),
         doc=doc,
         check_inertia=reader.check_word("check_inertia", values.get("check_inertia", True)),
+        limits_told=_limits_told(reader, values.get("limits")),
         negative=negative,
         named_markers=tuple(marker for label, marker in reader.markers.items() if "." in label),
         body_shapes=tuple(
@@ -143,6 +151,10 @@ def build(description: Description) -> Mechanism:
         added_bodies=tuple(range(described, len(bodies))),
         notes=inertia_notes,
     )
+
+
+def _limits_told(reader: Reader, given: Any) -> bool:
+    return given is None or reader.choice("limits", given, MODEL["limits"]) != "off"
 
 
 def _described(reader: Reader, entry: DescribedEntry, fields: Fields) -> tuple[str, str]:

@@ -13,7 +13,9 @@ from .build_mechanism import build
 from .description import GROUND_NAME, SECTIONS, Description, without_defaults
 from .element_methods import ElementMethods
 from .handles import BodyHandle, JointHandle, Names, Settings
+from .keywords import check_keywords, keywords_of
 from .model_bodies import BodyMethods
+from .model_components import ComponentMethods
 from .model_functions import FunctionMethods
 from .model_totals import TotalMethods
 from .sympy_face import symbol
@@ -27,7 +29,7 @@ Value = Any  # a number, a text or a SymPy expression
 Vector = Sequence[Any]
 
 
-class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods):
+class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods, ComponentMethods):
     """What a :class:`~..api.model.Model` is told: methods that add to its description."""
 
     def __init__(
@@ -74,6 +76,16 @@ class Builder(BodyMethods, ElementMethods, FunctionMethods, TotalMethods):
         return cls.from_description(
             describe_lagrangian(name, L, coordinates, forces, dissipation, constraints, parameters, inputs)
         )
+
+    @classmethod
+    def from_equations(
+        cls, name: str, coordinates: Sequence[Any], mass_matrix: Any, forcing: Any, **further: Any
+    ) -> Self:
+        """A model from M v' = f; see :func:`eomgen.describe.given_equations.describe_equations`."""
+        from .given_equations import describe_equations
+
+        check_keywords("from_equations", further, keywords_of(describe_equations))
+        return cls.from_description(describe_equations(name, coordinates, mass_matrix, forcing, **further))
 
     # -- quantities -----------------------------------------------------------------------------------------------
     def parameter(self, name: str, value: Value = None, unit: str = "", doc: str = "") -> Any:

@@ -8,9 +8,9 @@ SymPy expressions as the user gave them.  Nothing is looked up or judged here; t
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import Problem, UsageError
 from ..graph.shown import NO_TEXT, shortened, shown
@@ -37,6 +37,18 @@ class DescribedEntry:
     folder: str = ""
 
 
+class Origin(NamedTuple):
+    """Where an entry that an instance of a component brought comes from.
+
+    ``place`` is the dotted path of the entry in the component, ``instance`` the name of the instance (``leg1``, or
+    ``leg1.knee``), ``prefix`` what stands before its names.
+    """
+
+    place: str
+    instance: str
+    prefix: str
+
+
 @dataclass
 class Description:
     """Everything said about a model so far, and where.
@@ -58,6 +70,12 @@ class Description:
         What an import left out or changed.
     renamed : dict
         Section -> name in an imported file -> name in the model, where they differ.
+    instances : dict of str to str
+        Name of an instance of a component -> what stands before its names: ``leg1`` -> ``leg1_``.
+    origins : dict of str to Origin
+        Path of an entry that an instance brought -> where it comes from.
+    incomplete : bool
+        Whether components or instances have faults, so that names are missing.
     """
 
     values: Values = field(default_factory=dict)
@@ -67,6 +85,9 @@ class Description:
     problems: list[Problem] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     renamed: dict[str, dict[str, str]] = field(default_factory=dict)
+    instances: dict[str, str] = field(default_factory=dict)
+    origins: dict[str, Origin] = field(default_factory=dict)
+    incomplete: bool = False
 
     def add(self, section: str, name: Any, values: Values) -> DescribedEntry:
         """Append an entry to a section."""
@@ -103,18 +124,19 @@ class Faults:
     """Collects the problems of one description, with the file and line of each."""
 
     def __init__(self, description: Description) -> None:
-        self.lines = description.lines
+        self.lines, self.origins = description.lines, description.origins
         self.problems: list[Problem] = []
         self._seen: set[Problem] = set()
         self._paths: set[str] = set()
         for problem in description.problems:
-            self._take(problem)
+            self.take(problem)
 
     def add(self, path: str, message: str, remedy: str = "") -> None:
         """Note a fault at a dotted path."""
-        self._take(Problem(path, message, remedy, *place_of(path, self.lines)))
+        self.take(Problem(path, message, remedy, *place_of(path, self.lines)))
 
-    def _take(self, problem: Problem) -> None:
+    def take(self, problem: Problem) -> None:
+        """Note a fault whose file and line are known; one that was noted already counts once."""
         if problem in self._seen:
             return
         self._seen.add(problem)
@@ -132,8 +154,29 @@ class Faults:
         return path in self._paths
 
     def sorted(self) -> list[Problem]:
-        """All problems; those of a file in the order of its lines."""
-        return sorted(self.problems, key=lambda p: (p.file, p.line))
+        """All problems; those of a file in the order of its lines, one of several instances once."""
+        return sorted(self._told_once(), key=lambda p: (p.file, p.line))
+
+    def _told_once(self) -> list[Problem]:
+        """Problems of what instances brought, at the entry of the component, with the names of the instances."""
+        found: dict[Any, tuple[Problem, list[str]]] = {}
+        for problem in self.problems:
+            section, _, rest = problem.path.partition(".")
+            name = re.split(r"[.\[]", rest, maxsplit=1)[0]
+            origin = self.origins.get(f"{section}.{name}")
+            if origin is None:
+                found[problem] = (problem, [])
+                continue
+            path = origin.place + rest[len(name) :]
+            alike = tuple(part.replace(origin.prefix, "") if origin.prefix else part for part in problem[1:3])
+            first = problem._replace(path=path)
+            found.setdefault((path, *alike, *problem[3:]), (first, []))[1].append(origin.instance)
+        return [p._replace(message=p.message + _in_instances(names)) if names else p for p, names in found.values()]
+
+
+def _in_instances(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:3])
+    return f" (in {shown} and {len(names) - 3} more)" if len(names) > 3 else f" (in {shown})"
 
 
 def items(value: Any) -> list[Any] | None:
@@ -175,6 +218,9 @@ def label_of(reference: Mapping[str, Any]) -> str:
     turn = items(reference.get("rpy"))
     if turn is not None and not is_zero(turn):
         text = f"{text[:-1]}, rpy={text_of(turn)})"
+    for key in ("axes", "matrix"):
+        if key in reference:
+            text = f"{text[:-1]}, {key}={text_of(reference[key])})"
     if NO_TEXT in text:  # two such markers would bear one label
         raise UsageError(
             f"the place of an unnamed marker of {shown(reference.get('body'))} has no text; name the marker"

@@ -33,6 +33,7 @@ ASIDE = frozenset(
         "named_markers",
         "body_shapes",
         "added_bodies",
+        "limits_told",
     }
 )
 

@@ -36,7 +36,8 @@ class ElementMethods(Described):
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type cylindrical: slides along and turns about the common z axis."""
     def universal(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
-        coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
+        axes: Sequence[Any] | None = None, coordinates: Sequence[Any] | None = None,
+        limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type universal: a cross that turns about x of P and y of S, which stay perpendicular."""
     def constant_velocity(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
@@ -49,6 +50,9 @@ class ElementMethods(Described):
     def planar(self, name: str, predecessor: Any, successor: Any, axis: str | Sequence[float] | None = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None) -> JointHandle:
         """Add a joint of type planar: moves in the x-y plane of P and turns about z."""
+    def translational(self, name: str, predecessor: Any, successor: Any, coordinates: Sequence[Any] | None = None,
+        limits: Mapping[str, float] | None = None) -> JointHandle:
+        """Add a joint of type translational: slides along x, y and z of P without turning."""
     def curve_slider(self, name: str, predecessor: Any, successor: Any, curve: Sequence[Value], coordinate: Any = None,
         coordinates: Sequence[Any] | None = None, limits: Mapping[str, float] | None = None,
         dry_friction: float | None = None, armature: Value = None) -> JointHandle:
@@ -113,6 +117,10 @@ class ElementMethods(Described):
         """Add a linear spring on an angle: of a joint, or of the second marker about the z axis of the first."""
     def torsional_damper(self, name: str, *between: Any, joint: Any = None, damping: Value = None) -> None:
         """Add a viscous damper on an angle: of a joint, or of the second marker about the z axis of the first."""
+    def joint_spring(self, name: str, joint: Any, stiffness: Value, rest: Value = 0) -> None:
+        """Add a linear spring on any coordinate of a joint, an angle or a length."""
+    def joint_damper(self, name: str, joint: Any, damping: Value) -> None:
+        """Add a viscous damper on any coordinate of a joint, an angle or a length."""
     def element(self, name: str, *between: Any, joint: Any = None, law: Value = None, potential: Value = None,
         via: Sequence[Any] | None = None) -> None:
         """Add a force of any law along a joint's coordinate, the line between two markers, or a path."""

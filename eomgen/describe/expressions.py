@@ -11,16 +11,13 @@ from __future__ import annotations
 import ast
 import math
 import re
-import threading
 from collections.abc import Callable
 
 from ..errors import ExpressionError
 from ..graph.core import Expr, Graph
 from ..operations import OPERATIONS
+from ..syntax_trees import parse_statement
 from .names import QUANTITIES, function_words, nearest
-
-#: CPython counts the depth of its parser for all threads at once, and raises SystemError where two are in it.
-PARSER = threading.Lock()
 
 LENGTH = 4000  #: characters of one expression
 DEPTH = 60  #: nesting
@@ -115,9 +112,7 @@ def parse(text: str, graph: Graph, resolve: Resolve, locate: Locate | None = Non
     line = re.sub(r"\s", " ", text)
     start = len(line) - len(line.lstrip())
     try:
-        # as one interactive statement: for a module, Python would look for a file to quote the faulty line from
-        with PARSER:
-            tree = ast.parse(line[start:].rstrip() + "\n", mode="single")
+        tree = parse_statement(line[start:].rstrip() + "\n")
     except SyntaxError as error:
         column = (error.offset or 1) + start
         raise ExpressionError(f"not a valid expression ({error.msg})", column, allowed(), text) from None

@@ -37,6 +37,8 @@ KINDS = {
     "pair": "a list of two markers, each a body, body.marker, ground or {body, at, rpy}",
     "joint": "the name of a joint, or of one coordinate of a joint",
     "axis": "x, y, z, -x, -y, -z or three numbers",
+    "frame_axes": "a mapping of two of x, y, z to x, y, z, -x, -y, -z or three numbers",
+    "axes": "two directions at right angles, each x, y, z, -x, -y, -z or three numbers",
     "choice": "one of the listed words",
     "flag": "true or false",
     "check": "true or false, error, note or off",
@@ -64,6 +66,10 @@ KINDS = {
     "rates": "a mapping of names to expressions",
     "times": "true, false or a whole number greater than 0",
     "sign": "1, -1 or 0",
+    "prefix": "the beginning of names",
+    "loops": "a mapping of variables to lists, counts or {from, to, step}",
+    "attached": "a marker, or a mapping of attachments to markers",
+    "values": "a mapping of names to numbers or expressions",
 }
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -129,6 +135,8 @@ FUNCTION: dict[str, Fields] = {
 MARKER: Fields = {
     "at": Field("vector", "position in body axes (m)", default=(0, 0, 0)),
     "rpy": Field("vector", "fixed-axis roll, pitch, yaw (rad)", default=(0, 0, 0)),
+    "axes": Field("frame_axes", "two of its axes in body axes, such as {x: [1, 1, 0], z: z}, instead of rpy"),
+    "matrix": Field("matrix", "3 x 3, its axes as columns in body axes, instead of rpy"),
 }
 CYLINDER: Fields = {
     "around": Field("marker", "its z axis is the axis of the cylinder", required=True),
@@ -201,11 +209,12 @@ JOINT: Fields = {
     ),
 }
 AXIS = Field("axis", "axis of the joint in the markers", default="z")
+AXIS_PAIR = Field("axes", "axes of the cross in the markers: the first stays with P, the second with S")
 COORDINATE = Field("name", "name of the coordinate (the joint's name unless given)")
 COORDINATES = Field("names", "names of the coordinates, in order")
 #: Data of a joint that has coordinates; the last only where it has one.
 JOINT_DATA: Fields = {
-    "limits": Field("limits", "limits of the coordinate; data only"),
+    "limits": Field("limits", "limits of the coordinate; nothing stops there, but a run that passes one says so"),
     "dry_friction": Field("number", "Coulomb friction (N m or N); data only"),
     "armature": Field("expression", "inertia of the drive as the coordinate feels it (kg m^2 or kg)"),
 }
@@ -252,13 +261,39 @@ MODEL: Fields = {
     "constraints": Field("table", "equations between coordinates or markers"),
     "outputs": Field("table", "named results"),
     "events": Field("table", "zeros of expressions to find during a run, and what happens there"),
+    "components": Field("table", "parts of mechanisms to be added, each as often as one likes"),
+    "add": Field("table", "instances of components"),
+    "attachments": Field("names", "names that stand for markers of the model that takes this one in as a component"),
     "lagrangian": Field("table", "a bare Lagrangian, instead of bodies and joints"),
     "equations": Field("table", "equations of motion M v' = f as they are, instead of bodies and joints"),
     "independent": Field("names", "coordinates to integrate, when loops leave a choice", default=()),
     "initial": Field("table", "initial values by coordinate or <coordinate>_dot"),
     "guess": Field("table", "rough values of coordinates, where the assembly of loops starts"),
     "simulation": Field("table", "defaults of a simulation"),
+    "limits": Field(
+        "choice", "whether a run that passes a limit of a joint says so", default="note", choices=("note", "off")
+    ),
     "check_inertia": Field("check", "what becomes of masses and inertias that no body can have", default=True),
+}
+
+#: Keys of a model file that hold parts of mechanisms and their use; what they bring stands in the sections then.
+PARTS = ("components", "add")
+COMPONENT: Fields = {
+    "doc": _DOC,
+    "file": Field("file", "model file that describes it, its path from the folder of this one, instead of all else"),
+    "attachments": MODEL["attachments"],
+    **{key: MODEL[key] for key in ("parameters", "inputs", "functions", "bodies", "joints", "forces")},
+    **{key: MODEL[key] for key in ("constraints", "outputs", "events", "initial", "guess", "add")},
+}
+ADDED: Fields = {
+    "component": Field("name", "name of a component", required=True),
+    "prefix": Field("prefix", "put before each name of the component (the entry's name and _ unless given)"),
+    "for": Field("loops", "variables and their values, side by side; an instance for each, numbered 1, 2, ..."),
+    "at": Field("attached", "a marker for each attachment by name, or one for the only attachment or for its ground"),
+    "parameters": Field("values", "values of its parameters: numbers, or expressions that take their place"),
+    "inputs": Field("values", "values of its inputs: numbers, or expressions that take their place"),
+    "initial": Field("values", "initial values by its own names of coordinates and velocities"),
+    "guess": Field("values", "rough coordinates by its own names"),
 }
 
 #: Sections whose entries may be written as one value: section -> the key it stands for.
@@ -279,6 +314,8 @@ def joint_fields(type_name: str) -> Fields:
     fields = JOINT | {key: field for key, field in joint.options.items() if field.required}
     if joint.has_axis:
         fields["axis"] = AXIS
+    if joint.has_axes:
+        fields["axes"] = AXIS_PAIR
     if len(joint.coordinates) == 1:
         fields["coordinate"] = COORDINATE
     fields |= {key: field for key, field in joint.options.items() if key != "rotation"}

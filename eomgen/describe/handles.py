@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import UsageError
@@ -97,7 +97,16 @@ class BodyHandle(MarkerHandle):
         self.name = name
         self._entry = entry
 
-    def at(self, x: Any = 0, y: Any = 0, z: Any = 0, *, rpy: Sequence[Any] = (0, 0, 0)) -> MarkerHandle:
+    def at(
+        self,
+        x: Any = 0,
+        y: Any = 0,
+        z: Any = 0,
+        *,
+        rpy: Sequence[Any] = (0, 0, 0),
+        axes: Mapping[str, Any] | None = None,
+        matrix: Any = None,
+    ) -> MarkerHandle:
         """An unnamed marker.
 
         Parameters
@@ -106,6 +115,10 @@ class BodyHandle(MarkerHandle):
             Position in body axes (m).
         rpy : sequence of three, optional
             Fixed-axis roll, pitch, yaw (rad).
+        axes : mapping, optional
+            Two of its axes in body axes, instead of ``rpy``: ``{"x": (1, 1, 0), "z": "z"}``.
+        matrix : (3, 3) array, optional
+            Its axes as columns in body axes, instead of ``rpy``; numbers, texts or SymPy expressions.
 
         Returns
         -------
@@ -115,9 +128,18 @@ class BodyHandle(MarkerHandle):
         if not is_zero(rpy):
             listed = items(rpy)
             reference["rpy"] = rpy if listed is None else tuple(listed)
+        reference |= _turned(axes, matrix)
         return MarkerHandle(self.model, reference)
 
-    def marker(self, name: str, at: Sequence[Any] = (0, 0, 0), rpy: Sequence[Any] = (0, 0, 0)) -> MarkerHandle:
+    def marker(
+        self,
+        name: str,
+        at: Sequence[Any] = (0, 0, 0),
+        rpy: Sequence[Any] = (0, 0, 0),
+        *,
+        axes: Mapping[str, Any] | None = None,
+        matrix: Any = None,
+    ) -> MarkerHandle:
         """A named marker, known as ``body.name`` everywhere.
 
         Parameters
@@ -128,6 +150,8 @@ class BodyHandle(MarkerHandle):
             Position in body axes (m).
         rpy : sequence of three, optional
             Fixed-axis roll, pitch, yaw (rad).
+        axes, matrix : optional
+            As for :meth:`at`, instead of ``rpy``.
 
         Returns
         -------
@@ -138,10 +162,18 @@ class BodyHandle(MarkerHandle):
         placed: dict[str, Any] = {"at": at}
         if not is_zero(rpy):
             placed["rpy"] = rpy
+        placed |= _turned(axes, matrix)
         markers = self._entry.values.get("markers", [])
         listed = list(markers.items()) if isinstance(markers, dict) else list(markers)
         self._entry.values["markers"] = [*listed, (name, placed)]
         return MarkerHandle(self.model, f"{self.name}.{name}")
+
+
+def _turned(axes: Mapping[str, Any] | None, matrix: Any) -> dict[str, Any]:
+    """Keys of a place for axes and matrix, those that are given."""
+    rows = None if matrix is None else items(matrix)
+    plain = matrix if rows is None else [items(row) or row for row in rows]
+    return {key: value for key, value in (("axes", axes), ("matrix", plain)) if value is not None}
 
 
 class JointHandle:

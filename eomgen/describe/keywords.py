@@ -35,6 +35,12 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
     return checked
 
 
+def keywords_of(function: Callable[..., Any]) -> list[str]:
+    """Arguments of a function that are given by keyword only."""
+    parameters = inspect.signature(function).parameters.values()
+    return [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+
+
 def check_keywords(name: str, given: Iterable[str], allowed: Sequence[str]) -> None:
     """Raise UsageError for the first keyword that a method does not have."""
     for key in given:

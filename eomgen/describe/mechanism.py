@@ -227,6 +227,7 @@ class Mechanism:
     lines: Mapping[str, tuple[str, int]] = field(default_factory=dict)  #: dotted path -> (file, line), for messages
     doc: str = ""
     check_inertia: str = "error"  #: what becomes of motions without inertia: error, note or off
+    limits_told: bool = True  #: whether runs that pass a limit of a joint say so
     negative: tuple[str, ...] = ()  #: bodies with a negative mass or moment, taken because it was asked for
     named_markers: tuple[Marker, ...] = ()  #: for pictures
     body_shapes: tuple[BodyShape, ...] = ()  #: for pictures

@@ -41,6 +41,7 @@ ARGUMENTS = {
     "shape": ("sequence of three", "Sequence[Value]"),
     "limits": ("mapping", "Mapping[str, float]"),
     "number": ("float", "float"),
+    "axes": ("two of str or three floats", "Sequence[Any]"),
     "axis": ("str or three floats", "str | Sequence[float]"),
 }
 _SCALAR = ("scalar", "Value")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import Any
 
 from ..errors import UsageError
+from ..files.path_names import beside
 from ..frames import Frame
 from ..graph import vectors as vec
 from ..graph.core import Expr
@@ -149,10 +149,4 @@ def _locate(reader: Reader, file: str) -> str:
         A model file names a file outside its own folder.
     """
     model = place_of("", reader.faults.lines)[0]
-    if not model:
-        return file
-    folder = os.path.realpath(os.path.dirname(os.path.abspath(model)))
-    path = os.path.realpath(os.path.join(folder, file))
-    if os.path.isabs(file) or os.path.commonpath((folder, path)) != folder:
-        raise UsageError(f"{file} lies outside the folder of the model file, which a model file cannot reach")
-    return path
+    return beside(model, file) if model else file

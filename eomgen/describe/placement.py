@@ -65,6 +65,22 @@ def axis_columns(axis: Numbers) -> tuple[Numbers, Numbers, Numbers] | None:
     return first, _cross(n, first), n
 
 
+def axes_columns(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Columns of the turn that brings x and y to two unit vectors at right angles; y is made so to the last digit."""
+    z = _cross(x, y)
+    z = z if sum(a == 0.0 for a in z) == 2 else _unit(z)
+    return x, _cross(z, x), z
+
+
+def complete_axes(first: int, a: Numbers, second: int, b: Numbers) -> tuple[Numbers, ...]:
+    """Columns of the turn of a frame of which axes ``first`` and ``second`` (0 to 2) are given, at right angles."""
+    x, y, z = axes_columns(a, b)
+    if (second - first) % 3 != 1:
+        z = (-z[0], -z[1], -z[2])
+    found = {first: x, second: y, 3 - first - second: z}
+    return found[0], found[1], found[2]
+
+
 def turn_matrix(graph: Graph, columns: Sequence[Numbers]) -> Mat3:
     """The constant matrix with the given columns."""
     return vec.transpose(tuple(vec.vector(graph, column) for column in columns))  # type: ignore[arg-type]

@@ -11,8 +11,10 @@ from ..forces import FORCES
 from ..joints import JOINTS
 from ..numeric.rigid_inertia import CHECKS
 from .fields import (
+    ADDED,
     AXES,
     BODY,
+    COMPONENT,
     CYLINDER,
     DISPLAY,
     EQUATIONS,
@@ -39,6 +41,7 @@ from .fields import (
     solid_fields,
 )
 from .names import LONGEST
+from .repetition import ROUNDS
 
 Schema = dict[str, Any]
 
@@ -46,17 +49,24 @@ _NAME: Schema = {"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLen
 _EXPRESSION: Schema = {"type": ["number", "string"]}
 _VECTOR: Schema = {"type": "array", "items": {"$ref": "#/$defs/expression"}, "minItems": 3, "maxItems": 3}
 _SIX: Schema = {"type": "array", "minItems": 6, "maxItems": 6}
-_MARKER_NAME: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)?$"}
+#: A name, with those of instances and of bodies before it: ``leg1.foot.tip``.
+_REFERENCE: Schema = {"type": "string", "pattern": r"^[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*$"}
 
 
 def _ref(name: str) -> Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
+def _object(properties: Schema, required: list[str] | None = None) -> Schema:
+    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
+    return {**schema, "required": required} if required else schema
+
+
 def _definitions() -> Schema:
     expression = _ref("expression")
     return {
         "name": _NAME,
+        "reference": _REFERENCE,
         "expression": _EXPRESSION,
         "vector": _VECTOR,
         "inertia": {
@@ -68,7 +78,7 @@ def _definitions() -> Schema:
         },
         "placement": {"anyOf": [_ref("vector"), _table(MARKER)]},
         "markers": {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("placement")},
-        "marker": {"anyOf": [_MARKER_NAME, _table(PLACED)]},
+        "marker": {"anyOf": [_ref("reference"), _table(PLACED)]},
         "stop": {"anyOf": [_ref("marker"), _table(CYLINDER)]},
         "pair": {"type": "array", "items": _ref("marker"), "minItems": 2, "maxItems": 2},
         "axis": {
@@ -77,7 +87,6 @@ def _definitions() -> Schema:
                 {"type": "array", "items": _ref("expression"), "minItems": 3, "maxItems": 3},
             ]
         },
-        "names": {"type": "array", "items": _ref("name")},
         "solids": {"type": "array", "items": {"oneOf": [_solid(name) for name in SOLID]}},
         "points": {"type": "array", "items": _table(POINT)},
         "limits": _object({key: _each(field) for key, field in LIMITS.items()}),
@@ -85,13 +94,17 @@ def _definitions() -> Schema:
     }
 
 
+_NUMBERS: Schema = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 1, "maxItems": ROUNDS}
+_COUNT: Schema = {"type": "integer", "minimum": 1, "maximum": ROUNDS}
+_RANGE = {key: {"type": "number"} for key in ("from", "to", "step")}
+
 #: kind of field -> its schema; kinds not listed are handled by :func:`_field`.
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
     "name": _ref("name"),
-    "body": _ref("name"),
-    "joint": _ref("name"),
-    "names": _ref("names"),
+    "body": _ref("reference"),
+    "joint": _ref("reference"),
+    "names": {"type": "array", "items": _ref("name")},
     "number": {"type": ["number", "string"]},
     "numbers": {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2},
     "grid": {"type": "array", "items": {"type": "array", "items": {"type": ["number", "string"]}}, "minItems": 2},
@@ -110,15 +123,23 @@ _KINDS: dict[str, Schema] = {
     "times": {"anyOf": [{"type": "boolean"}, {"type": "integer", "minimum": 1}]},
     "sign": {"enum": [1, -1, 0]},
     "file": {"type": "string"},
-    "about": {"anyOf": [_MARKER_NAME, _ref("vector")]},
+    "about": {"anyOf": [_ref("reference"), _ref("vector")]},
     "solids": _ref("solids"),
     "points": _ref("points"),
     "limits": _ref("limits"),
     "display": _ref("display"),
     "pair": _ref("pair"),
     "axis": _ref("axis"),
+    "frame_axes": {
+        "type": "object",
+        "properties": dict.fromkeys("xyz", _ref("axis")),
+        "additionalProperties": False,
+        "minProperties": 2,
+        "maxProperties": 2,
+    },
+    "axes": {"type": "array", "items": _ref("axis"), "minItems": 2, "maxItems": 2},
     "shape": _ref("vector"),
-    "joints": {"type": "array", "items": _ref("name"), "minItems": 2, "maxItems": 2},
+    "joints": {"type": "array", "items": _ref("reference"), "minItems": 2, "maxItems": 2},
     "two": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "factors": {"type": "object", "additionalProperties": _ref("expression"), "minProperties": 1},
     "wheels": {
@@ -134,6 +155,22 @@ _KINDS: dict[str, Schema] = {
         ]
     },
     "matrix": {"type": "array", "items": {"type": "array", "items": _ref("expression")}},
+    "prefix": {"type": "string", "pattern": "^([A-Za-z][A-Za-z0-9_]*)?$"},
+    "values": {"type": "object", "additionalProperties": _ref("expression")},
+    "loops": {
+        "type": "object",
+        "propertyNames": _ref("name"),
+        "additionalProperties": {
+            "anyOf": [_NUMBERS, _COUNT, _object(_RANGE, ["to"])],
+        },
+        "minProperties": 1,
+    },
+    "attached": {
+        "anyOf": [
+            _ref("marker"),
+            {"type": "object", "propertyNames": _ref("name"), "additionalProperties": _ref("marker")},
+        ]
+    },
     "rates": {"type": "object", "additionalProperties": _ref("expression")},
     "radii": {"type": "array", "items": _ref("expression"), "minItems": 2, "maxItems": 2},
     "forces": {
@@ -157,11 +194,6 @@ def _each(field: Field) -> Schema:
     """A number for the coordinate, or a list of one for each of several coordinates."""
     number = {"type": ["number", "string", "null"]}
     return {"anyOf": [number, {"type": "array", "items": number}], "description": field.doc}
-
-
-def _object(properties: Schema, required: list[str] | None = None) -> Schema:
-    schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
-    return {**schema, "required": required} if required else schema
 
 
 def _table(fields: Fields, without: tuple[str, ...] = ()) -> Schema:
@@ -219,7 +251,7 @@ def model_schema() -> dict[str, Any]:
     dict
         Plain data, ready for ``json.dumps``.  It describes the layout; names and expressions are judged by the check.
     """
-    values = _section(_ref("expression"), "")
+    values = {**_section(_ref("expression"), ""), "propertyNames": _ref("reference")}
     sections: Schema = {
         "parameters": _section(_short("parameters", PARAMETER), MODEL["parameters"].doc),
         "inputs": _section(_short("inputs", INPUT), MODEL["inputs"].doc),
@@ -241,7 +273,11 @@ def model_schema() -> dict[str, Any]:
         "guess": {**values, "description": MODEL["guess"].doc},
     }
     sections["bodies"]["properties"] = {"ground": _table(GROUND)}
+    sections["add"] = _section(_table(ADDED), MODEL["add"].doc)
+    own = {key: sections[key] if field.kind == "table" else _field(field) for key, field in COMPONENT.items()}
+    sections["components"] = _section(_object(own), MODEL["components"].doc)
     properties = {key: sections[key] if field.kind == "table" else _field(field) for key, field in MODEL.items()}
+    properties["independent"]["items"] = _ref("reference")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "eomgen model file",

@@ -12,6 +12,8 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..errors import ExpressionError
 from ..files.path_names import usable_name
 from ..frames import GROUND, Frame, Marker
@@ -21,6 +23,7 @@ from ..graph.evaluate import evaluate
 from ..graph.shown import quoted, shown
 from ..graph.substitute import symbols_of
 from ..graph.vectors import Mat3, Vec3
+from ..limits.descriptions import PERPENDICULAR
 from ..numeric.rigid_inertia import word_of_check
 from ..suggestions import hint
 from ..texts import WHOLE, join_surrogates, lone_surrogate
@@ -30,7 +33,7 @@ from .expressions import parse
 from .fields import CONSTANT, INERTIA, KINDS, MARKER, NUMBER, OUTPUT, PLACED, Field
 from .mechanism import Quantity
 from .names import nearest
-from .placement import TURNS, Numbers, axis_columns, rpy_rotation
+from .placement import TURNS, Numbers, axes_columns, axis_columns, complete_axes, rpy_rotation, turn_matrix
 from .scope import Namespace, Scope
 from .sympy_face import is_sympy, lower_sympy
 
@@ -203,9 +206,44 @@ class Reader:
     def frame(self, path: str, values: Mapping[str, Any]) -> Frame:
         """A placement in a body from ``at`` and ``rpy``."""
         at = self.vector(f"{path}.at", values["at"]) if "at" in values else vec.zero(self.graph)
-        if "rpy" not in values:
+        given = [key for key in ("rpy", "axes", "matrix") if key in values]
+        if len(given) > 1:
+            self.faults.add(f"{path}.{given[1]}", f"{given[0]} is given too", "give one of rpy, axes and matrix")
+        if not given:
             return Frame(self.identity, at)
-        return Frame(rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"])), at)
+        if given[0] == "rpy":
+            return Frame(rpy_rotation(self.graph, self.vector(f"{path}.rpy", values["rpy"])), at)
+        read = self.turn_of_axes if given[0] == "axes" else self.turn_of_matrix
+        return Frame(read(f"{path}.{given[0]}", values[given[0]]), at)
+
+    def turn_of_axes(self, path: str, value: Any) -> Mat3:
+        """The rotation whose columns are a frame's axes, two of which are given."""
+        if not isinstance(value, Mapping) or len(value) != 2 or not {*value} <= {*"xyz"}:
+            self.wrong(path, value, "frame_axes")
+            return self.identity
+        (first, a), (second, b) = ((key, self.axis(f"{path}.{key}", one)[2]) for key, one in value.items())
+        if self.faults.under(path):
+            return self.identity
+        if abs(sum(x * y for x, y in zip(a, b, strict=True))) > PERPENDICULAR:
+            self.faults.add(path, f"the directions of {first} and {second} are not at right angles", "correct one")
+            return self.identity
+        columns = complete_axes("xyz".index(first), a, "xyz".index(second), b)
+        return turn_matrix(self.graph, columns)
+
+    def turn_of_matrix(self, path: str, value: Any) -> Mat3:
+        """A rotation matrix of numbers and expressions, as far as declared values tell orthogonal and right-handed."""
+        rows = [items(row) for row in items(value) or ()]
+        if len(rows) != 3 or any(row is None or len(row) != 3 for row in rows):
+            self.wrong(path, value, "matrix")
+            return self.identity
+        x, y, z = (self.vector(f"{path}[{k}]", row) for k, row in enumerate(rows))
+        known = [[self.known(entry) for entry in row] for row in (x, y, z)]
+        if all(entry is not None for row in known for entry in row):
+            numbers = np.array(known, dtype=float)
+            if np.abs(numbers @ numbers.T - np.eye(3)).max() > PERPENDICULAR or np.linalg.det(numbers) < 0.0:
+                remedy = "its columns are three axes of length 1 at right angles, right-handed"
+                self.faults.add(path, "is no rotation", remedy)
+        return (x, y, z)
 
     def moving(self, label: str) -> Marker:
         """The marker of a label in an expression; raises ExpressionError if there is none."""
@@ -262,6 +300,20 @@ class Reader:
             return None
         first, second = (self.marker(f"{path}[{k}]", part) for k, part in enumerate(parts))
         return None if first is None or second is None else (first, second)
+
+    def axes(self, path: str, value: Any) -> Sequence[Numbers]:
+        """Columns of the turn that brings x and y to two directions at right angles."""
+        parts = items(value)
+        if parts is None or len(parts) != 2:
+            self.wrong(path, value, "axes")
+            return TURNS["z"]
+        x, y = (self.axis(f"{path}[{k}]", part)[2] for k, part in enumerate(parts))
+        if self.faults.under(path):
+            return TURNS["z"]
+        if abs(sum(a * b for a, b in zip(x, y, strict=True))) > PERPENDICULAR:
+            self.faults.add(path, f"{quoted(value)} are not at right angles", f"give {KINDS['axes']}")
+            return TURNS["z"]
+        return axes_columns(x, y)
 
     def axis(self, path: str, value: Any) -> Sequence[Numbers]:
         """Columns of the turn that brings an axis to z."""

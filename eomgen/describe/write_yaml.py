@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import UsageError
 from ..texts import comment_text, yaml_quoted
 from .description import SECTIONS, Description, is_zero, items
+from .dotted_names import undotted
 from .fields import MODEL, SHORT
 from .sympy_face import is_sympy, name_of
 from .write_equations import with_intermediates
@@ -40,7 +41,7 @@ def yaml_text(description: Description) -> str:
     UsageError
         An expression or value has no form in a model file.
     """
-    description = with_named_markers(description)
+    description = with_named_markers(undotted(description))
     lines = [f"# {comment_text(note)}" for note in description.notes]
     functions = frozenset(entry.name for entry in description.sections["functions"])
     for key in MODEL:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..errors import ModelError, Problem
-from ..files.path_names import as_name
+from ..errors import ModelError, Problem, UsageError
+from ..files.path_names import as_name, beside
 from ..files.reading import open_plain
+from .components import Components
 from .description import SECTIONS, Description, Faults
-from .fields import KINDS, MODEL, SHORT
+from .dotted_names import undotted
+from .fields import KINDS, MODEL, PARTS, SHORT
 from .names import nearest
 from .yaml_nodes import SIZE, Document
 
@@ -30,6 +32,7 @@ def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = Fal
     Returns
     -------
     Description
+        With the entries of all components that it adds.
 
     Raises
     ------
@@ -41,57 +44,116 @@ def describe_yaml_file(path: str | os.PathLike[str], *, allow_native: bool = Fal
         The file is not YAML or not a mapping.
     """
     name = as_name("path", path)
+    return _describe(_text_of(name), name, _Origin(allow_native, os.path.dirname(name)))
+
+
+def describe_yaml(text: str, file: str = "model.yaml") -> Description:
+    """The raw data of a model file's text; ``file`` is the name that messages bear."""
+    return _describe(text, file, _Origin())
+
+
+class _Origin(NamedTuple):
+    """Whether functions may bring code, the folder where their files lie, and the files that named this one."""
+
+    trusted: bool = False
+    folder: str = ""
+    within: tuple[str, ...] = ()
+
+
+def _text_of(name: str) -> str:
     with open_plain(name) as file:
         data = file.read(SIZE + 1)
     if len(data) > SIZE:
         raise ModelError([Problem("file", "is too large", f"at most {SIZE} bytes", name, 1)])
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ModelError([Problem("file", "is not UTF-8 text", "save it as UTF-8", name, line)]) from None
-    description = describe_yaml(text, name)
-    for entry in description.sections["functions"]:
-        entry.trusted, entry.folder = allow_native, os.path.dirname(name)
-    return description
 
 
-def describe_yaml(text: str, file: str = "model.yaml") -> Description:
-    """The raw data of a model file's text; ``file`` is the name that messages bear."""
+def _describe(text: str, file: str, origin: _Origin) -> Description:
     document = Document(text, file)
     tree = document.value
     if not isinstance(tree, Mapping):
         raise ModelError([Problem("file", "is not a mapping", f"allowed keys: {', '.join(MODEL)}", file, 1)])
-    description = Description(lines=document.lines, problems=document.problems)
+    description = Description(lines=dict(document.lines), problems=document.problems)
     faults = Faults(description)
+
+    def fill(given: Mapping[str, Any], start: str, target: Description) -> None:
+        for key in given:
+            if key in SECTIONS:
+                _add_section(target, faults, start, key, given[key], origin)
+            elif key in ("initial", "guess") and start:
+                if isinstance(given[key], Mapping):
+                    target.values[key] = given[key]
+                elif given[key] is not None:
+                    faults.add(f"{start}{key}", f"is not {KINDS['table']}", "write names as keys")
+
+    def open_file(name: str) -> Description | None:
+        return _open_part(name, file, origin, faults)
+
     for key, value in tree.items():
         if key not in MODEL:
             faults.add(key, "unknown key", nearest(key, MODEL, "allowed"))
-        elif key in SECTIONS:
-            _add_section(description, faults, key, value)
-        elif value is not None or MODEL[key].kind != "table":
+        elif key not in SECTIONS and key not in PARTS and (value is not None or MODEL[key].kind != "table"):
             description.values[key] = value
+    fill(tree, "", description)
+    if tree.get("components") is not None or tree.get("add") is not None:
+        before = len(faults)
+        components = Components(tree.get("components"), document.lines, fill, open_file, faults)
+        components.add(tree.get("add"), "", description)
+        components.read_all()
+        description = undotted(description)
+        description.incomplete = len(faults) > before
     description.problems = faults.problems
     return description
 
 
-def _add_section(description: Description, faults: Faults, section: str, value: Any) -> None:
+def _open_part(name: str, file: str, origin: _Origin, faults: Faults) -> Description | None:
+    """The description of a file that a model file names; None where it is none, which is told."""
+    within = (*origin.within, os.path.realpath(file))
+    path = os.path.join(os.path.dirname(file), name)
+    real = beside(file, name)
+    if real in within:
+        chain = ", ".join(os.path.basename(one) for one in (*within[within.index(real) :], real))
+        raise UsageError(f"the file {name} adds itself: {chain}")
+    try:
+        found = _describe(_text_of(path), path, _Origin(origin.trusted, os.path.dirname(path), within))
+    except ModelError as error:
+        for problem in error.problems:
+            faults.take(problem)
+        return None
+    for problem in found.problems:
+        faults.take(problem)
+    for entry in found.sections["bodies"]:  # meshes are looked up from the folder of the whole model
+        for solid in entry.values.get("solids") or ():
+            if isinstance(solid, dict) and isinstance(solid.get("file"), str):
+                solid["file"] = os.path.join(os.path.dirname(name), solid["file"])
+    return found
+
+
+def _add_section(
+    description: Description, faults: Faults, start: str, section: str, value: Any, origin: _Origin
+) -> None:
     """Take in the entries of a section; an empty section is one that was left out."""
     if value is None:
         return
     if not isinstance(value, Mapping):
-        faults.add(section, f"is not {KINDS['table']}", f"write the names of the {section} as keys")
+        faults.add(f"{start}{section}", f"is not {KINDS['table']}", f"write the names of the {section} as keys")
         return
     for name, given in value.items():
-        values = given
+        values, place = given, f"{section}.{name}"
         if not isinstance(given, dict):
             key = SHORT.get(section)
             if given is None and key == "value":
                 values = {}
             elif key is not None:
-                description.lines[f"{section}.{name}.{key}"] = description.lines[f"{section}.{name}"]
+                if place in description.lines:
+                    description.lines[f"{place}.{key}"] = description.lines[place]
                 values = {key: given}
             else:
-                faults.add(f"{section}.{name}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}")
+                faults.add(f"{start}{place}", f"is not {KINDS['table']}", "write its keys as {key: value, ...}")
                 values = {}
-        description.add(section, name, values).trusted = False
+        entry = description.add(section, name, values)
+        entry.trusted, entry.folder = section == "functions" and origin.trusted, origin.folder

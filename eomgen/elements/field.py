@@ -16,7 +16,8 @@ class Field(NamedTuple):
 
     ``kind`` is one of :data:`~eomgen.describe.fields.KINDS`; ``level`` says what its expressions may depend on;
     ``choices`` lists the words of a choice; ``own`` is how many of the first coordinates of its own joint an expression
-    depends on; ``not_zero`` says what to take instead where 0 has no meaning.
+    depends on; ``not_zero`` says what to take instead where 0 has no meaning; ``local`` are names that only this
+    expression knows, such as ``length``.
     """
 
     kind: str
@@ -27,6 +28,7 @@ class Field(NamedTuple):
     choices: tuple[str, ...] = ()
     own: int = 0
     not_zero: str = ""
+    local: tuple[str, ...] = ()
 
 
 Fields = dict[str, Field]

@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple, TypeGuard
 
+from ..syntax_trees import parse_module
+
 
 class Import(NamedTuple):
     """One imported name."""
@@ -36,7 +38,7 @@ class SourceText:
     """
 
     def __init__(self, name: str, text: str) -> None:
-        self.name, self.text, self.tree = name, text, ast.parse(text)
+        self.name, self.text, self.tree = name, text, parse_module(text)
         self.definitions: dict[str, ast.stmt] = {}
         self.imports: dict[str, Import] = {}
         self.types: dict[str, Import] = {}

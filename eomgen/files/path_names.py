@@ -42,3 +42,18 @@ def usable_name(given: Any) -> str | None:
     except Exception:  # of an object's own __fspath__ too
         return None
     return name if usable else None
+
+
+def beside(file: str, name: str) -> str:
+    """The path of a file that another names: in the folder of that one, or below.
+
+    Raises
+    ------
+    UsageError
+        It lies outside that folder.
+    """
+    folder = os.path.realpath(os.path.dirname(os.path.abspath(file)))
+    path = os.path.realpath(os.path.join(folder, name))
+    if os.path.isabs(name) or os.path.commonpath((folder, path)) != folder:
+        raise UsageError(f"{name} lies outside the folder of the model file, which a model file cannot reach")
+    return path

@@ -66,6 +66,9 @@ def _element(path: Callable[[Entry], Path | None], angle: bool) -> Callable[[Ent
     return read
 
 
+_OWN = ("length", "angle", "rate")
+
+
 def _law(of: str, unit: str) -> Fields:
     return {
         "law": Field(
@@ -73,10 +76,12 @@ def _law(of: str, unit: str) -> Fields:
             f"{unit} that drives the coordinate up or pushes the markers apart; an expression of {of}, ``rate`` "
             "and all that forces know",
             level=MOTION,
+            local=_OWN,
         ),
         "potential": Field(
             "expression",
             f"potential energy (J), of {of} and parameters; its force, minus its derivative, comes with it",
+            local=_OWN,
         ),
     }
 

@@ -13,7 +13,7 @@ from ..graph import vectors as vec
 from ..graph.core import Expr
 from ..records import dataclass
 from .force import Force, Load, View
-from .paths import BETWEEN, ON_JOINT, Line, Path, read_angle
+from .paths import BETWEEN, ON_JOINT, Line, Path, read_angle, read_coordinate
 from .routes import VIA, read_path
 
 
@@ -68,6 +68,7 @@ class Damper(Force):
 _STIFFNESS = Field("expression", "stiffness (N/m or N m/rad)", required=True)
 _DAMPING = Field("expression", "damping (N s/m or N m s/rad)", required=True, level=MOTION)
 _MARKERS = BETWEEN._replace(required=True)
+_COORDINATE = ON_JOINT._replace(required=True)
 _ANGLE = {"joint": ON_JOINT, "between": BETWEEN}
 
 
@@ -122,5 +123,21 @@ TYPES = table(
         {**_ANGLE, "damping": _DAMPING},
         _damper(read_angle),
         one_of=("joint", "between"),
+    ),
+    ElementType(
+        "joint_spring",
+        "a linear spring on any coordinate of a joint, an angle or a length.",
+        {
+            "joint": _COORDINATE,
+            "stiffness": _STIFFNESS,
+            "rest": Field("expression", "the coordinate without force (rad or m)", default=0),
+        },
+        _spring(read_coordinate, "rest"),
+    ),
+    ElementType(
+        "joint_damper",
+        "a viscous damper on any coordinate of a joint, an angle or a length.",
+        {"joint": _COORDINATE, "damping": _DAMPING},
+        _damper(read_coordinate),
     ),
 )

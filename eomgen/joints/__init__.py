@@ -2,7 +2,7 @@
 
 from .guides import CurveSlider, PointOnCurve, PointOnSurface, SurfaceSlider
 from .joint import Closure, Coordinate, Joint, QuaternionSlot, Shape, Velocity
-from .many_degrees import Cylindrical, Planar, Weld
+from .many_degrees import Cylindrical, Planar, Translational, Weld
 from .one_degree import Continuous, Prismatic, Revolute, Screw
 from .rods import Distance, Inline, Inplane, Orientation, Parallel, Perpendicular, RevoluteSpherical
 from .turning import Free, Spherical
@@ -20,6 +20,7 @@ JOINTS: dict[str, type[Joint]] = {
         ConstantVelocity,
         Spherical,
         Planar,
+        Translational,
         CurveSlider,
         SurfaceSlider,
         PointOnCurve,
@@ -63,6 +64,7 @@ __all__ = [
     "Shape",
     "Spherical",
     "SurfaceSlider",
+    "Translational",
     "Universal",
     "Velocity",
     "Weld",

@@ -78,6 +78,7 @@ class Joint(ABC):
     ----------------
     type_name : the word in model files and the Model's method
     has_axis : whether ``axis=`` is accepted
+    has_axes : whether ``axes=``, directions of x and y, is accepted instead
     options : further keys of this type, which are fields of the dataclass
     coordinates : the coordinates, in order
     role : 'either'; 'tree' for a joint that no equations in the relative pose can close a loop by, so that it is never
@@ -89,6 +90,7 @@ class Joint(ABC):
 
     type_name: ClassVar[str]
     has_axis: ClassVar[bool] = True
+    has_axes: ClassVar[bool] = False
     role: ClassVar[str] = "either"
     counts_turns: ClassVar[bool] = False
     options: ClassVar[Fields] = {}

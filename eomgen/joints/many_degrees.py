@@ -70,6 +70,31 @@ class Planar(Joint):
 
 
 @dataclass(frozen=True)
+class Translational(Joint):
+    """Slides along x, y and z of P without turning.  Allows 3, removes 3."""
+
+    type_name: ClassVar[str] = "translational"
+    look: ClassVar[JointLook] = JointLook((SymbolPart("box", (1.6, 1.6, 1.6)),))
+    has_axis: ClassVar[bool] = False
+    coordinates: ClassVar[tuple[Coordinate, ...]] = tuple(Coordinate(f"_{axis}", "length") for axis in "xyz")
+
+    def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
+        return vec.identity(graph), (q[0], q[1], q[2])
+
+    def subspace(self, graph: Graph, q: Sequence[Expr]) -> list[tuple[Vec3, Vec3]]:
+        return [(vec.zero(graph), unit(graph, k)) for k in range(3)]
+
+    def closure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Closure]:
+        return same_orientation(rotation)
+
+    def aligned(self, rotation: Mat3) -> list[Expr]:
+        return [rotation[0][0], rotation[2][2]]
+
+    def measure(self, graph: Graph, rotation: Mat3, position: Vec3) -> list[Expr]:
+        return list(position)
+
+
+@dataclass(frozen=True)
 class Weld(Joint):
     """No motion.  Allows 0, removes 6."""
 

@@ -29,6 +29,7 @@ class Universal(Joint):
         (SymbolPart("cylinder", (0.4, 2.6), "x", "P"), SymbolPart("cylinder", (0.4, 2.6), "y"))
     )
     coordinates: ClassVar[tuple[Coordinate, ...]] = TWO_ANGLES
+    has_axes: ClassVar[bool] = True
 
     def pose(self, graph: Graph, q: Sequence[Expr]) -> tuple[Mat3, Vec3]:
         return euler(graph, "xy", q), vec.zero(graph)

@@ -24,6 +24,8 @@ SMALL_LOOP = 1e-3
 BY_CHANCE = 1e-3
 #: How far given Euler parameters may be from length 1: six digits written.
 UNIT = 1e-6
+#: Cosine of two unit vectors that count as being at right angles: six digits written.
+PERPENDICULAR = 1e-6
 #: Relative difference of entries that should be alike, such as those across the diagonal of a tensor.
 TENSOR, TENSOR_TERMS = 1e-9, 1e-12
 #: Distance of two points of a table, relative to their place, below which they are one.

@@ -221,6 +221,7 @@ def collect_metadata(kinematics: Kinematics, mobility: Mobility, equations: Tree
         "initial": _numbers(kinematics, "initial"),
         "guess": _numbers(kinematics, "guess"),
         "length_scale": mobility.length_scale,
+        **({} if m.limits_told else {"limits_told": False}),
         "limits": {
             name: dict(limits)
             for j in m.joints

@@ -12,14 +12,18 @@ from ..describe.placement import TURNS
 from ..errors import ModelError, Problem
 from ..joints import JOINTS
 from ..limits.files import FREEDOMS, LAWS, TIES
+from ..numeric.rigid_inertia import EXCESS, fault_of_inertia
 from ..rotations import euler_angles_from_matrix, euler_parameters_from_matrix
 from .link_names import RobotNames, clean_model_name
-from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied
+from .link_tree import GROUND, Bodies, RobotBody, build_bodies, find_tied, weigh_bodies
 from .robot import Drive, Range, Robot, RobotJoint, RobotOptions
 from .robot_frames import Inertia, Placement, numbers
 from .ties import Sum, Tie, describe_tie
 
 SHOWN = 8  #: joints that a note names
+#: Stops of joints: part of the range that one gives way under the drive's effort; what is left of the speed after it.
+GIVE, REBOUND = 0.01, 0.3
+GRAVITY = 9.81  #: m/s^2, of the weight that stands for an effort that is not told
 _INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 
 
@@ -44,14 +48,17 @@ class _Writer:
             values={"name": clean_model_name(robot.name), "gravity": gravity}, lines={"": (robot.file, 1)}
         )
         self.out.notes = list(robot.notes)
-        check = "note" if found.massless and options.check_inertia == "error" else options.check_inertia
+        check = "note" if found.massless and options.check == "error" else options.check
         if check != "error":
             self.out.values["check_inertia"] = check
+        if options.limits != "note":
+            self.out.values["limits"] = "off"
         self.names = RobotNames()
         self.joints: dict[str, str] = {}  # the robot's name -> ours
         self.bodies: dict[str, str] = {}  # body -> ours
         self.markers: dict[str, str] = {}  # link -> how to refer to its frame
         self.tied = find_tied(robot, found)
+        self.carried = weigh_bodies(found)
 
     def describe(self) -> Description:
         moving = [body for body in self.found.bodies.values() if body.joint is not None]
@@ -117,7 +124,10 @@ class _Writer:
 
     def _inertia(self, name: str, inertia: Inertia) -> Values:
         """mass, com and inertia: numbers, or parameters where they are not zero."""
-        values: Values = {"mass": self._value(f"m_{name}", inertia.mass, "kg")}
+        values: Values = {}
+        if self.options.check_inertia is None and (fault_of_inertia(inertia.tensor) or ("", ""))[1] == EXCESS:
+            values["check_inertia"] = "note"
+        values |= {"mass": self._value(f"m_{name}", inertia.mass, "kg")}
         if inertia.com.any():
             com = zip("xyz", numbers(inertia.com), strict=True)
             values["com"] = [self._value(f"c_{name}_{axis}", x, "m") for axis, x in com]
@@ -173,6 +183,8 @@ class _Writer:
             self._force("friction", joint, "friction" if "coulomb" in rubbing else "damping", rubbing)
         if joint.stiffness:
             self._spring(joint)
+        if self.options.limits == "stop":
+            self._stop(body)
         if joint.initial or joint.start:
             start = [joint.initial] if joint.start is None else self._start(joint.start)
             reference = [float(n.endswith("_e0") and self._in_parameters(joint.type)) for n in names]
@@ -185,6 +197,35 @@ class _Writer:
             unit = "N" if joint.type == "prismatic" else "N*m"
             self._add("inputs", force, {"value": 0.0, "unit": unit}, joint.place)
             self._force("actuator", joint, "drive", {"value": force})
+
+    def _stop(self, body: RobotBody) -> None:
+        """Stops at the limits of a joint, which give way by a hundredth of its range under the drive's greatest effort.
+
+        Where the file tells no effort, it is the weight that the joint carries, with the lever of what lies farthest.
+        """
+        joint = body.joint
+        assert joint is not None
+        bounds = {
+            key: joint.limits[key] for key in ("lower", "upper") if math.isfinite(joint.limits.get(key, math.inf))
+        }
+        if not bounds or len(JOINTS[joint.type].coordinates) != 1:
+            return
+        span = joint.limits.get("upper", math.inf) - joint.limits.get("lower", -math.inf)
+        if span <= 0.0:
+            self.out.notes.append(f"no stops at {self.joints[joint.name]}, whose limits leave it no range")
+            return
+        span = span if math.isfinite(span) else 1.0
+        effort = joint.limits.get("effort", 0.0)
+        if not 0.0 < effort < math.inf:
+            effort = GRAVITY * self.carried[body.name].force(joint.type)
+        speed = joint.limits.get("velocity", 0.0)
+        law = {
+            "stiffness": effort / (GIVE * span) ** 1.5,
+            "restitution": REBOUND,
+            "velocity": speed if 0.0 < speed < math.inf else span,
+            "formula": "flores",
+        }
+        self._force("stop", joint, "stop", {**bounds, **law})
 
     def _start(self, pose: Placement) -> list[float]:
         """Coordinates of a free joint."""
@@ -203,9 +244,8 @@ class _Writer:
             rest = {"angle": joint.rest} if joint.rest else {}
             self._force("torsional_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
             return
-        q = self.joints[joint.name]
-        stretch = f"({q} - {joint.rest!r})" if joint.rest else q
-        self._force("actuator", joint, "spring", {"value": f"-{joint.stiffness!r}*{stretch}"})
+        rest = {"rest": joint.rest} if joint.rest else {}
+        self._force("joint_spring", joint, "spring", {"stiffness": joint.stiffness, **rest})
 
     # -- what ties joints together --------------------------------------------------------------------------------
     def _loops(self) -> None:
@@ -295,9 +335,10 @@ class _Writer:
         """Say of which joints limits and dry friction are data that do not act."""
         moving = [body.joint for body in self.found.bodies.values() if body.joint is not None]
         limited = [j for j in moving if any(key != "effort" or j.clamp is None for key in j.limits)]
-        if limited and self.options.limits != "off":
+        if limited and self.options.limits == "note":
             names = self._few(limited)
-            self.out.notes.append(f"limits of joints are data, nothing stops there ({names}); limits='off' is silent")
+            remedy = "a run that passes one says so; limits='stop' puts stops there, limits='off' is silent"
+            self.out.notes.append(f"nothing stops at the limits of joints ({names}); {remedy}")
         rubbing = [j for j in moving if j.dry_friction]
         if rubbing and not self.options.smoothing:
             names = self._few(rubbing)

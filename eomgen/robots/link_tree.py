@@ -6,12 +6,13 @@ Links welded to each other make one body, in the frame of the link nearest to th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..describe.names import nearest
 from ..errors import ModelError
-from ..numeric.rigid_inertia import fault_of_inertia, inertia_scales, longest_within
+from ..numeric.rigid_inertia import EXCESS, fault_of_inertia, inertia_scales, longest_within
 from ..numeric.rotation_matrices import about
 from .robot import Robot, RobotJoint, RobotLink, RobotOptions
 from .robot_frames import IDENTITY, Inertia, Placement, moved, sum_inertias
@@ -56,8 +57,8 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
         if options.mimic != "independent":
             _check_mimic(robot, joint)
     if robot.problems:
-        if options.check_inertia == "error":
-            _check_inertias(robot)
+        if options.check == "error":
+            _check_inertias(robot, options.check_inertia is None)
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     carried: dict[str, list[RobotJoint]] = {}
     for joint in robot.joints.values():
@@ -92,10 +93,38 @@ def build_bodies(robot: Robot, options: RobotOptions) -> Bodies:
             "give it joints; the base of a URDF robot floats with floating=True, or --floating",
             (robot.file, 1),
         )
-    _check_masses(robot, found, options.check_inertia)
+    _check_masses(robot, found, options.check)
     if robot.problems:
         raise ModelError(sorted(robot.problems, key=lambda p: p.line))
     return found
+
+
+class Carried(NamedTuple):
+    """What a joint moves: its mass (kg), and how far from the joint its farthest centre of mass lies (m)."""
+
+    mass: float
+    reach: float
+
+    def force(self, joint_type: str) -> float:
+        """Mass along a slide (kg), mass times reach about an axis (kg m); 1 where there is none."""
+        return (self.mass if joint_type == "prismatic" else self.mass * self.reach) or 1.0
+
+
+def weigh_bodies(found: Bodies) -> dict[str, Carried]:
+    """What the joint of each body moves, all that it carries included."""
+    result: dict[str, Carried] = {}
+    for body in reversed(found.bodies.values()):  # children come after their parents
+        inertia, before = body.inertia(), result.get(body.name, Carried(0.0, 0.0))
+        own = float(np.linalg.norm(inertia.com)) if inertia.mass else 0.0
+        mine = result[body.name] = Carried(before.mass + inertia.mass, max(before.reach, own))
+        if body.joint is None or not body.joint.parent:
+            continue
+        home, frame = found.home[body.joint.parent]
+        place = frame @ body.joint.outer
+        other = result.get(home, Carried(0.0, 0.0))
+        reach = mine.reach + float(np.linalg.norm(place.position))
+        result[home] = Carried(other.mass + mine.mass, max(other.reach, reach))
+    return result
 
 
 def find_tied(robot: Robot, found: Bodies) -> set[str]:
@@ -187,10 +216,10 @@ def _check_mimic(robot: Robot, joint: RobotJoint) -> None:
         robot.problem(path, "the joint mimics itself", "name another joint", joint.place)
 
 
-def _check_inertias(robot: Robot) -> None:
+def _check_inertias(robot: Robot, lenient: bool) -> None:
     """Note inertias that no link can have, of a robot with other faults, whose bodies are not known.
 
-    Links welded to others are left out: the body they make may be sound.
+    Links welded to others are left out: the body they make may be sound; so are excess moments, if ``lenient``.
     """
     faulty = {problem.line for problem in robot.problems}
     sound = [joint for joint in robot.joints.values() if joint.place[1] not in faulty]
@@ -205,6 +234,8 @@ def _check_inertias(robot: Robot) -> None:
     scales = inertia_scales([i.mass for i in inertias], [i.tensor for i in inertias], longest)
     for link, scale in zip(robot.links.values(), scales, strict=True):
         fault = fault_of_inertia(link.inertia.tensor, scale=scale)
+        if fault and lenient and fault[1] == EXCESS:
+            continue
         if fault and link.name in moved_links - welded and link.place[1] not in faulty:
             robot.problem(f"link.{link.name}.inertial.inertia", *fault, link.place)
 

@@ -21,8 +21,8 @@ from .robot import RobotOptions
 from .urdf import read_urdf
 from .xml_text import read_xml
 
-MIMIC = ("independent", "coupling")
-LIMITS = ("note", "off")
+MIMIC = ("coupling", "independent")
+LIMITS = ("note", "stop", "off")
 ROTATIONS = ("euler_angles", "euler_parameters")
 
 
@@ -79,9 +79,8 @@ def make_options(given: dict[str, Any]) -> RobotOptions:
             raise UsageError(f"no option {key!r} for a robot file; {nearest(key, known, 'options')}")
     for key, allowed in (("mimic", MIMIC), ("rotation", ROTATIONS), ("limits", LIMITS)):
         if key in given and not (isinstance(given[key], str) and given[key] in allowed):
-            hint = "; stops do not act yet, limits are data" if str(given[key]) == "stop" else ""
-            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}{hint}")
-    if "check_inertia" in given:
+            raise UsageError(f"{key}={given[key]!r}: allowed: {', '.join(allowed)}")
+    if given.get("check_inertia") is not None:
         word = word_of_check(given["check_inertia"])
         if word is None:
             raise UsageError(f"check_inertia={given['check_inertia']!r}: allowed: {', '.join(CHECKS)}, True, False")

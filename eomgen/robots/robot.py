@@ -27,8 +27,8 @@ class RobotOptions:
         How free and ball joints turn: ``euler_angles`` or ``euler_parameters``.
     gravity : three numbers, optional
         In ground axes (m/s^2); (0, 0, -9.81) for URDF, the file's own for MJCF.
-    mimic : {'independent', 'coupling'}
-        Whether a joint that mimics another keeps a coordinate of its own, or is tied to it by a constraint.
+    mimic : {'coupling', 'independent'}
+        Whether a joint that mimics another is tied to it by a constraint, or keeps a coordinate of its own.
     lock : names, or mapping of names to values
         Joints held at a value (0 unless given): they become welds.
     merge : bool
@@ -44,9 +44,10 @@ class RobotOptions:
         Angles this near (rad) to a multiple of pi/2 are taken as that multiple.
     check_inertia : {'error', 'note', 'off'} or bool
         What becomes of masses and inertias that no body can have, and of joints that move no mass: refused, noted, or
-        taken in silence.  A robot without any mass is one for kinematics, which is noted.
-    limits : {'note', 'off'}
-        Whether a note says which limits of joints are data only.
+        taken in silence.  Unless given, principal moments of which one exceeds the sum of the others are noted, other
+        impossible inertias refused.  A robot without any mass is one for kinematics, which is noted.
+    limits : {'note', 'stop', 'off'}
+        Whether a run that passes a limit of a joint says so, stops push back there, or nothing happens.
     assets : str, optional
         Folder within which an MJCF file may read other files; its own folder by default.
     """
@@ -54,7 +55,7 @@ class RobotOptions:
     floating: bool = False
     rotation: str = "euler_angles"
     gravity: Any = None
-    mimic: str = "independent"
+    mimic: str = "coupling"
     lock: Any = ()
     merge: bool = True
     symbolic: bool = False
@@ -62,8 +63,13 @@ class RobotOptions:
     friction: Any = False
     snap: float = 1e-11
     assets: str | None = None
-    check_inertia: Any = "error"
+    check_inertia: Any = None
     limits: str = "note"
+
+    @property
+    def check(self) -> str:
+        """What becomes of inertias that no body can have, but for excess moments: error, note or off."""
+        return self.check_inertia or "error"
 
     @property
     def smoothing(self) -> float:

@@ -153,7 +153,7 @@ class _UrdfReader:
             self.fault(element, f"{path}.mass", "is missing", 'give <mass value="..."/>')
         else:
             mass = self.number(weight, "value", f"{path}.mass")
-            if mass < 0.0 and self.options.check_inertia == "error":
+            if mass < 0.0 and self.options.check == "error":
                 self.fault(weight, f"{path}.mass", f"is {mass:g}", f"a mass is 0 or positive; {SWITCH}")
         if tensor is None:
             return Inertia(mass, np.zeros(3), np.zeros((3, 3))).seen(frame)

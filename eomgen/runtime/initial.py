@@ -29,7 +29,7 @@ from .constraint_kernels import constraint_system
 from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
-from .near_names import UnknownNameError, unknown
+from .near_names import UnknownNameError, unknown, without_dots
 
 
 class Given(NamedTuple):
@@ -63,6 +63,7 @@ class Initial:
         """Split values into positions and rates; raises UsageError for a name that is neither."""
         layout = self.layout
         rates = layout.v + layout.loop_rates
+        values = without_dots(values)
         for name in values:
             if name in layout.p:
                 raise UnknownNameError(f"{name!r} is a parameter, not a coordinate; bind(p={{{name!r}: ...}}) sets it")

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..kernel_table import NAMED, Sizes
 from ..numeric.scales import Array, Scales, Space
-from .near_names import check_names
+from .near_names import check_names, without_dots
 from .room import read_numbers, read_value
 
 ABI = 1  #: layout of the metadata this file reads
@@ -186,6 +186,7 @@ class Layout:
         if given is None:
             return current
         if isinstance(given, Mapping):
+            given = without_dots(given)
             check_names(what, given, names)
             result = np.array(current, dtype=float)
             for name, value in given.items():

@@ -17,6 +17,11 @@ class UnknownNameError(UsageError, KeyError):
         return str(self.args[0]) if self.args else ""
 
 
+def without_dots(given: Mapping[Any, Any]) -> dict[Any, Any]:
+    """Values by name; ``leg1.hip`` of an instance of a component is ``leg1_hip``."""
+    return {name.replace(".", "_") if isinstance(name, str) else name: value for name, value in given.items()}
+
+
 def unknown(what: str, name: object, allowed: Iterable[str]) -> UnknownNameError:
     """The error for an unknown name, with near misses or, if there are none, what there is."""
     return UnknownNameError(f"no {what} {name!r}; {_hint(name, allowed)}")

@@ -16,7 +16,7 @@ from ..texts import shown
 from .input_kinds import Expressed, Tabulated, of_time
 from .input_texts import is_formula, read_formula
 from .layout import Layout
-from .near_names import check_names, require_mapping, require_time_and_state, unknown
+from .near_names import check_names, require_mapping, require_time_and_state, unknown, without_dots
 from .room import as_real, read_number, read_numbers
 
 KINKS = 1000  #: at most so many corners of tables are stepped on exactly by SciPy's methods
@@ -168,6 +168,7 @@ class Forcing:
     def __init__(self, layout: Layout, inputs: Mapping[str, Any] | None) -> None:
         given = {} if inputs is None else inputs
         require_mapping("inputs", given)
+        given = without_dots(given)
         check_names("input", given, (*layout.u, *(name for name in layout.input_rates if name not in layout.u)))
         self.layout = layout
         self.constants: dict[str, float] = {}

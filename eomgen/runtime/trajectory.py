@@ -128,6 +128,8 @@ class Trajectory:
     def __getitem__(self, name: str) -> Array:
         if name == "t":
             return self.t
+        if name not in self.names and (plain := str(name).replace(".", "_")) in self.names:
+            name = plain  # leg1.hip, of an instance of a component
         if name not in self.names:
             raise unknown("column", name, ("t", *self.names))
         return self._columns[name]

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..errors import UsageError
 from ..files.path_names import as_path
 from ..files.writing import whole_file
+from ..texts import shown
 from .film_frames import DPI, Frames
 from .scene import Scene
 from .shown_motion import ShownMotion, States, moving_scene, sample, with_arrows
@@ -43,6 +45,8 @@ def animate(
     trace = (trace,) if isinstance(trace, str) else tuple(trace)
     plot = (plot,) if isinstance(plot, str) else tuple(plot)
     forces = (forces,) if isinstance(forces, str) else forces
+    if not isinstance(forces, bool | list | tuple):
+        raise UsageError(f"forces must be True, a joint or a list of joints, not {shown(forces)}")
     columns = {name: trajectory[name] for name in plot}  # unknown names fail before anything is drawn
     motion = sample(trajectory, states, fps, speed)
     scene = moving_scene(module, motion, names, axes, trace)

@@ -32,6 +32,8 @@ class Explorer:
         With the parameters of the sliders bound.
     q : (n_q,) array
         The position shown; loops are closed.
+    t : float
+        The time (s), of mechanisms that drivers move.
     message : str
         Why the position is not the one asked for; empty where it is.
     sliders : dict of str to ipywidgets.FloatSlider
@@ -41,7 +43,7 @@ class Explorer:
     def __init__(self, module: Any, start: Array) -> None:
         self._kit = ipywidgets("explore")
         self._first, self._start = module, np.array(start)
-        self.module, self.q, self.message = module, np.array(start), ""
+        self.module, self.q, self.t, self.message = module, np.array(start), 0.0, ""
         scene = build_scene(module, self.q[:, None])
         self._size = float((scene.high - scene.low).max())
         room = ROOM * (scene.high - scene.low)  # for what the sliders do
@@ -53,11 +55,22 @@ class Explorer:
         seen = [name for name in constants if self._matters(name, constants[name])][:PARAMETERS]
         self._coordinates = {name: self._slider(name, at, self._range(name, at)) for name, at in places.items()}
         self._parameters = {name: self._slider(name, constants[name], _around(constants[name])) for name in seen}
-        self.sliders = self._coordinates | self._parameters
+        self._clock = {"t": self._slider("t", 0.0, (0.0, self._end()))} if module.n_rows and self._is_driven() else {}
+        self.sliders = self._clock | self._coordinates | self._parameters
         reset = self._kit.Button(description="start position")
         reset.on_click(lambda _: self.reset())
-        columns = [self._kit.VBox(list(group.values())) for group in (self._coordinates, self._parameters) if group]
+        groups = (self._clock | self._coordinates, self._parameters)
+        columns = [self._kit.VBox(list(group.values())) for group in groups if group]
         self.widget = self._kit.VBox([self._plot, self._says, self._kit.HBox(columns), reset])
+
+    def _end(self) -> float:
+        """The end time that the model declares, else 1 s."""
+        return float(self.module.metadata.get("simulation", {}).get("end") or 1.0)
+
+    def _is_driven(self) -> bool:
+        """Whether time moves the constraints."""
+        every = self.module.constraints.every
+        return bool(np.abs(every(self.q, t=TRIED * self._end() / 3.0) - every(self.q, t=0.0)).max(initial=0.0) > SAME)
 
     def _moved(self) -> dict[str, int]:
         """Independent coordinates and their places in q."""
@@ -112,7 +125,10 @@ class Explorer:
         constants = dict(zip(self._first.p_names, self._first.p, strict=True))
         for name, slider in self.sliders.items():
             with slider.hold_trait_notifications():
-                slider.value = float(constants[name] if name in self._parameters else self._start[self._moved()[name]])
+                if name in self._clock:
+                    slider.value = 0.0
+                else:
+                    slider.value = float(constants[name] if name in constants else self._start[self._moved()[name]])
 
     def update(self) -> None:
         """Close the loops at the sliders' values, near the position before, and show them."""
@@ -120,27 +136,32 @@ class Explorer:
         wanted = {name: slider.value for name, slider in self._coordinates.items()}
         try:
             module = self._first.bind(p=values)
-            q = self._closed(module, wanted)
+            t = self._clock["t"].value if self._clock else 0.0
+            q = self._closed(module, wanted, t)
             self.message = self._missed(wanted, q)
-            scene = build_scene(module, q[:, None])
+            scene = build_scene(module, q[:, None], t)
         except EomgenError as error:
             self.message = str(error).partition("\n")[0]
         else:
-            self.module, self.q = module, q
+            self.module, self.q, self.t = module, q, t
             move_objects(self._plot, scene)
         self._says.value = f"<b style='color:#b22222'>{escape(self.message)}</b>"
 
-    def _closed(self, module: Any, wanted: dict[str, float]) -> Array:
+    def _closed(self, module: Any, wanted: dict[str, float], t: float) -> Array:
         """The position of these values, reached in small steps so that the way of closing the loops stays the same."""
         names = self.module.q_names
         start = {name: float(self.q[names.index(name)]) for name in wanted}
         parts = [abs(wanted[n] - start[n]) / (s.max - s.min) for n, s in self._coordinates.items() if s.max > s.min]
+        parts += [abs(t - self.t) / slider.max for slider in self._clock.values()]
         count = max(1, int(np.ceil(LEAPS * max(parts, default=0.0)))) if module.n_rows else 1
         q = self.q
         for k in range(1, count + 1):
             now = {name: start[name] + (wanted[name] - start[name]) * k / count for name in wanted}
             guess = dict(zip(names, q.tolist(), strict=True)) | now
-            found = module.assemble(guess) if module.n_rows else np.array(list(guess.values()))
+            if module.n_rows:
+                found = module.assemble(guess, t=self.t + (t - self.t) * k / count)
+            else:
+                found = np.array(list(guess.values()))
             if self._missed(now, found):
                 return np.asarray(found)
             q = found

@@ -277,17 +277,22 @@ def told_by_the_caller() -> Iterator[None]:
         _SILENT.reset(token)
 
 
+def is_told_by_the_caller() -> bool:
+    """Whether a run is part of another call, which warns itself."""
+    return _SILENT.get()
+
+
 def warn_of_unknown(names: Sequence[str]) -> None:
     """Tell the line of the user's that called of events that were no number throughout a run."""
     if names and not _SILENT.get():
         warnings.warn(
             f"event{'s' * (len(names) > 1)} {', '.join(names)}: no number (NaN) at any step of the run, so nothing was "
             "found; look for a logarithm, root or quotient outside its domain",
-            stacklevel=_calls_within() + 1,
+            stacklevel=calls_within() + 1,
         )
 
 
-def _calls_within() -> int:
+def calls_within() -> int:
     """How many calls, this one's caller first, lie within the package."""
     package, calls = __name__.rpartition("simulation")[0], 0
     frame: FrameType | None = sys._getframe(1)

@@ -19,6 +19,7 @@ from .bound_run import Run, watch_run
 from .compiled import can_run, integrate_compiled
 from .events import UNWATCHED, Events, warn_of_unknown
 from .integrate import Interrupted, Solution, check_options, choose_solver, integrate, require_end, takes_jacobian
+from .passed_limits import warn_of_limits
 from .recording import record
 from .run_arguments import check_method, declare, find_span, find_state, ordered_times, own_step
 from .stalled import Crawling
@@ -230,10 +231,14 @@ def simulate(
             watch.close()
     _check(run, solution, start, end, title)
     try:
-        return record(bound, forcing, solution, title, options, watched.names)
+        made = record(bound, forcing, solution, title, options, watched.names)
     except EvaluationError as error:
         where = "?" if error.time is None else f"{error.time:.6g}"
         raise SimulationError(f"the solution at t = {where} s is not a valid state: {error}; tighten rtol") from error
+    if bound.layout.limits:
+        atol = float(np.max(options.get("atol", 0.0)))
+        warn_of_limits(made, bound.layout, float(options.get("rtol", 0.0)), atol)
+    return made
 
 
 def _check(run: Run, solution: Solution, start: float, end: float, method: str) -> None:

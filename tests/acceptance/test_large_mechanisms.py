@@ -16,7 +16,7 @@ ENERGY = 1e-8
 FREE_MOTIONS: dict[str, dict[str, Any]] = {
     "spatial_slider_crank": {"span": 2.0},
     "spatial_four_bar": {"span": 2.0},
-    "stewart_platform": {"span": 0.3, "inputs": {f"f_{k}": 0.0 for k in range(1, 7)}},
+    "stewart_platform": {"span": 0.3, "inputs": {f"leg{k}_f": 0.0 for k in range(1, 7)}},
     "delta_robot": {"span": 0.6},  # through a singular position at 0.314 s
     "double_wishbone": {"span": 1.0},
     "excavator": {"span": 1.0},
@@ -93,8 +93,8 @@ def test_flyball_governor_equals_its_reference(module: Any) -> None:
 def test_stewart_platform_equals_its_reference(which: int, module: Any) -> None:
     """Leg lengths and rates, leg forces of a given motion, and the platform's mass matrix."""
     pose = models.reference("stewart_platform_mathworks")["poses"][which]
-    mod = module("stewart_platform").bind(u={f"f_{k}": 0.0 for k in range(1, 7)})
-    legs = [mod.q_names.index(f"length_{k}") for k in range(1, 7)]
+    mod = module("stewart_platform").bind(u={f"leg{k}_f": 0.0 for k in range(1, 7)})
+    legs = [mod.q_names.index(f"leg{k}_length") for k in range(1, 7)]
     q, v, a = mod.kinematics(pose["q"], pose["qd"], pose["qdd"])
     np.testing.assert_allclose(q[legs], pose["leg_length"], rtol=1e-12)
     np.testing.assert_allclose(v[legs], pose["leg_rate"], rtol=0, atol=1e-10)
@@ -177,7 +177,7 @@ def test_the_cylinders_of_the_excavator_follow_from_triangles(module: Any) -> No
     mod = module("excavator")
     for angles in ([0.5, -1.9, -0.6], [0.9, -1.4, -1.0], [0.2, -2.2, 0.2]):
         q, _, _ = mod.kinematics(angles)
-        lengths = [q[mod.q_names.index(f"length_{k}")] for k in (1, 2, 3)]
+        lengths = [q[mod.q_names.index(f"leg{k}_length")] for k in (1, 2, 3)]
         boom, stick = angles[0], angles[1]
         foot, under = np.array([0.6, -0.3]), np.array([2.0, 0.45])
         a, b = np.hypot(*foot), np.hypot(*under)

@@ -54,3 +54,21 @@ def test_a_lower_stop_brakes(side: str, rate: float) -> None:
     inward, d = (-1.0 if side == "lower" else 1.0), 0.2
     push = K * d**n * (1.0 + f * inward * rate)
     assert mod.rhs(0.0, np.array([inward * d, rate]))[1] == pytest.approx(-inward * push / inertia, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_springs_and_dampers_on_coordinates(method: str) -> None:
+    """On both coordinates of a cylindrical joint: m z'' = -k (z - z0) - c z', I a'' = -K a, V the sum of both."""
+    k, rest, c, K, mass, inertia = 30.0, 0.2, 1.5, 4.0, 2.0, 0.3
+    m = eg.Model("piston", gravity=(0, 0, 0))
+    piston = m.body("piston", mass=mass, inertia=(1, 1, inertia))
+    m.cylindrical("C", m.ground, piston, coordinates=["z", "a"])
+    m.joint_spring("S", "z", stiffness=k, rest=rest)
+    m.joint_spring("T", "a", stiffness=K)
+    m.joint_damper("D", "z", c)
+    mod = m.compile(method=method, target="numpy")
+    z, a, v, w = 0.5, 0.7, 0.3, -0.4
+    x = np.array([z, a, v, w])
+    V = k * (z - rest) ** 2 / 2 + K * a**2 / 2
+    assert mod.energy(x) == pytest.approx([mass * v**2 / 2 + inertia * w**2 / 2, V], rel=1e-13)
+    assert mod.rhs(0.0, x) == pytest.approx([v, w, (-k * (z - rest) - c * v) / mass, -K * a / inertia], rel=1e-12)

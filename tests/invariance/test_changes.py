@@ -14,14 +14,14 @@ from invariance.random_models import random_tree
 
 import eomgen as eg
 from eomgen.describe.description import Description
+from eomgen.describe.rewritten_texts import scaled
+from eomgen.describe.visit import copied
 from eomgen.verification import Finding
 from eomgen.verification.variants import CHANGES, Variant, variant_findings
 from eomgen.verification.variants.compare import compare
 from eomgen.verification.variants.findings import RUN, all_at_once, original_of
-from eomgen.verification.variants.rewritten_texts import scaled
 from eomgen.verification.variants.short_runs import run_findings
 from eomgen.verification.variants.variant import drop
-from eomgen.verification.variants.visit import copied
 
 #: Small examples that together have every change: loops, redundant rows, rods, rolling, cams, gears, drivers, a table.
 EXAMPLES = ("slider_crank", "four_bar", "double_wishbone", "rolling_disc", "cam_follower", "planetary_gear", "car_axis",

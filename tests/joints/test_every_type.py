@@ -20,6 +20,7 @@ ALLOWED = {
     "constant_velocity": 2,
     "spherical": 3,
     "planar": 3,
+    "translational": 3,
     "curve_slider": 1,
     "surface_slider": 2,
     "point_on_curve": 4,

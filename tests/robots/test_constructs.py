@@ -178,7 +178,7 @@ CASES = [
     ({"b": 'mocap="true"', "free": ""}, "mocap"),
     ({"joint": 'actuatorgravcomp="true"', "a": 'gravcomp="1"'}, "gravity compensation"),
     ({"joint": 'frictionloss="0.1"'}, "dry friction of joints is data and does not act (j)"),
-    ({"joint": 'range="-1 1" limited="true"'}, "limits of joints are data"),
+    ({"joint": 'range="-1 1" limited="true"'}, "nothing stops at the limits of joints"),
     ({"tail": '<keyframe><key name="home" qpos="0 0"/></keyframe>'}, "left out: stored states (<keyframe>)"),
     (
         {"site": '<site name="s"/>', "tail": '<actuator><motor name="jet" site="s"/></actuator>'},

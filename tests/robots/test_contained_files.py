@@ -352,7 +352,7 @@ def test_limits_of_joints_may_be_as_large_as_others_write_them(tmp_path: Path) -
         ({"snap": -1.0}, "an angle"),
         ({"assets": 5}, "assets must be the name of a file or folder, as text or Path, not 5"),
         ({"floating": "yes"}, "floating='yes': allowed: True, False"),
-        ({"mimic": ["coupling"]}, "allowed: independent, coupling"),
+        ({"mimic": ["coupling"]}, "allowed: coupling, independent"),
     ],
 )
 def test_odd_options_are_named_errors(given: dict[str, Any], said: str, tmp_path: Path) -> None:

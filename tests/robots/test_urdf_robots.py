@@ -37,6 +37,7 @@ TURNED = [(name, ANGLES) for name in ("panda", "bolt", "solo12", "anymal", "bori
 
 def load(name: str, base: str, **options: Any) -> Any:
     rotation = ANGLES if base == FIXED else base
+    options = {"mimic": "independent", **options}  # as in Pinocchio
     return eg.load(ROBOTS[name][0], floating=base != FIXED, rotation=rotation, actuate=True, **options)
 
 

@@ -73,6 +73,16 @@ def test_an_open_chain_takes_what_it_is_given() -> None:
     assert explorer.q[1] == explorer.sliders["bend"].value
 
 
+def test_time_moves_what_drivers_move() -> None:
+    explorer = eg.load(EXAMPLES / "v_twin.yaml").compile(target="numpy").explore()
+    assert list(explorer.sliders) == ["t", "r", "l"]
+    explorer.sliders["t"].value = 0.013  # 100 pi / s: more than half a turn
+    t = explorer.sliders["t"].value
+    names = explorer.module.q_names
+    assert explorer.q[names.index("theta")] == pytest.approx(100 * np.pi * t, abs=1e-9)
+    assert explorer.q[names.index("s_1")] == pytest.approx(slider_at(100 * np.pi * t - np.pi / 4, 0.04, 0.16), abs=1e-9)
+
+
 def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch, module: Any) -> None:
     def lacking(name: str) -> Any:
         raise ImportError(f"No module named {name!r}", name=name)

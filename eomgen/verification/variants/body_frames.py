@@ -13,10 +13,11 @@ import numpy as np
 
 from ...describe.description import GROUND_NAME, DescribedEntry, Description, items
 from ...describe.fields import INERTIA
+from ...describe.rewritten_texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
+from ...describe.visit import Slot, Visitor, bodies_of, copied, visit
 from ...numeric.rotation_matrices import from_quaternion, from_roll_pitch_yaw, roll_pitch_yaw
-from .rewritten_texts import is_zero, markers_of, number_of, product, rewritten, scaled, total
+from .plain import values_of
 from .variant import NotApplicable, Variant
-from .visit import Slot, Visitor, bodies_of, copied, visit
 
 WAS = "old_frame"  #: the marker that a body's former frame becomes
 _PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -30,15 +31,6 @@ _KINDS = (
 def random_turn(random: Any) -> Any:
     """A turn (3, 3) of any angle about any axis."""
     return from_quaternion(*random.normal(size=4))
-
-
-def values_of(description: Description) -> dict[str, float]:
-    """Declared values of parameters, texts such as ``pi/10`` evaluated."""
-    return {
-        entry.name: number_of(entry.values["value"], {})
-        for entry in description.sections["parameters"]
-        if entry.values.get("value") is not None
-    }
 
 
 class MovedBodyFrame:

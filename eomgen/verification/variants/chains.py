@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
+from ...describe.rewritten_texts import scaled
+from ...describe.visit import bodies_of, copied
 from .pieces import frame_on, frames_of
-from .rewritten_texts import scaled
 from .variant import NotApplicable, References, Variant, coordinates_of
-from .visit import bodies_of, copied
 
 _SLIDES = tuple(("prismatic", axis) for axis in "xyz")
 
@@ -18,6 +18,8 @@ _SLIDES = tuple(("prismatic", axis) for axis in "xyz")
 def links_of(entry: DescribedEntry) -> Sequence[tuple[str, str]] | None:
     """Type and axis of the simple joints, one for each coordinate in order; None if there is no such chain."""
     kind, values = entry.values["type"], entry.values
+    if "axes" in values:
+        return None
     turns = tuple(("revolute", axis) for axis in values.get("sequence", "xyz"))
     if values.get("rotation", "euler_angles") != "euler_angles":
         return None
@@ -27,11 +29,12 @@ def links_of(entry: DescribedEntry) -> Sequence[tuple[str, str]] | None:
         "cylindrical": (("prismatic", "z"), ("revolute", "z")),
         "universal": (("revolute", "x"), ("revolute", "y")),
         "planar": (*_SLIDES[:2], ("revolute", "z")),
+        "translational": _SLIDES,
     }.get(kind)
 
 
 def chain(description: Description, random: Any) -> Variant:
-    """Every spherical, free, cylindrical, universal and planar joint as a chain; its coordinates keep their names."""
+    """Every joint of several degrees for which there is one as a chain; its coordinates keep their names."""
     made = copied(description)
     names, keys = coordinates_of(description), References(description).keys
     joints: list[DescribedEntry] = []

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ...describe.rewritten_texts import names_of
 from ...errors import EomgenError, ModelError
 from ...kinematics.idle_rows import IDLE
 from ...limits.rounding import EPS
 from ..comparison import NO_LIMIT
 from ..finding import Finding
 from .probe_states import ROUNDINGS, Original, compiled, reactions_of
-from .rewritten_texts import names_of
 from .variant import NotApplicable, Variant
 
 #: Names whose constant is free: it changes where ground is shifted.

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
+from ...describe.rewritten_texts import rewritten
+from ...describe.visit import Slot, Visitor, visit
 from ...joints import JOINTS
-from .rewritten_texts import rewritten
 from .variant import NotApplicable, Variant, coordinates_of, sketch_of
-from .visit import Slot, Visitor, visit
 
 
 def body_of(reference: Any) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ...describe.visit import Slot
 from .variant import NotApplicable, UnitScales
-from .visit import Slot
 
 
 class Dimension(NamedTuple):
@@ -118,6 +118,11 @@ def _force(kind: str, key: str, slot: Slot, length: bool) -> Dimension:
     push = FORCE if length else TORQUE
     if kind in ("torque", "actuator", "element") and key in ("value", "law"):
         return push
+    if kind in ("joint_spring", "joint_damper"):
+        if key == "rest":
+            return Dimension(reach)
+        per = {"stiffness": (reach, 0, 0), "damping": (reach, 0, -1)}
+        return Dimension(*(a - b for a, b in zip(push, per[key], strict=True)))
     if kind == "friction":
         rate = Dimension(reach, 0, -1)
         return {"viscous": Dimension(*(a - b for a, b in zip(push, rate, strict=True)))}.get(

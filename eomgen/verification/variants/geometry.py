@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import Description
-from .rewritten_texts import names_of
-from .visit import Slot, Visitor, visit
+from ...describe.rewritten_texts import names_of
+from ...describe.visit import Slot, Visitor, visit
 
 _CONTENT = ("mass", "inertia", "principal", "first_moment", "density", "line_density", "com")
 

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ...describe.rewritten_texts import number_of
+from ...describe.visit import copied
 from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
 from ..finding import Finding
 from .compare import compare_module
 from .probe_states import Original, compiled
-from .rewritten_texts import number_of
 from .variant import Variant
-from .visit import copied
 
 if TYPE_CHECKING:
     from ...describe.builder import Builder

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
+from ...describe.visit import copied
 from .cuts import in_loops
 from .pieces import Frame, frames_of
 from .variant import NotApplicable, References, Variant, coordinates_of, drop, entry_of
-from .visit import copied
 
 #: Joint -> elementary constraints that hold the same relative poses.
 CONSTRAINTS = {

@@ -13,6 +13,7 @@ import numpy as np
 
 from ... import pipeline
 from ...describe.builder import Builder
+from ...describe.visit import copied
 from ...emit import emit_package
 from ...emit.write import write_package
 from ...equations import METHODS
@@ -21,13 +22,12 @@ from ...limits.verification import REGULAR
 from ...numeric import algebra
 from ...runtime.minimal import Minimal
 from ..finding import Finding
-from .body_frames import values_of
 from .compare import Worst, compare_module, refused, states_of
 from .geometry import parameters_of_geometry
 from .inputs import input_findings
+from .plain import values_of
 from .probe_states import Original, compiled, compiled_model
 from .variant import Variant
-from .visit import copied
 
 Call = Callable[[str, Builder, Original, Any], Finding]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...describe.description import DescribedEntry, Description
+from ...describe.visit import copied
 from ...joints.joint import SEQUENCES
 from ...numeric import algebra
 from ...rotations import (
@@ -18,7 +19,6 @@ from ...rotations import (
     velocity_matrix,
 )
 from .variant import NotApplicable, References, States, Variant, coordinates_of, drop
-from .visit import copied
 
 EULER = "euler_angles"
 

@@ -9,11 +9,11 @@ from typing import Any
 
 from ...describe.description import Description
 from ...describe.names import QUANTITIES
+from ...describe.rewritten_texts import rewritten, scaled
 from ...describe.scope import ENERGIES
+from ...describe.visit import Slot, Visitor, visit
 from .dimensions import INERTIA, LENGTH, NONE, SPEED, SPIN, TORQUE, Dimension, dimension_of
-from .rewritten_texts import rewritten, scaled
 from .variant import NotApplicable, UnitScales, Variant, coordinates_of, kinds_of, velocities_of
-from .visit import Slot, Visitor, visit
 
 #: The engineer's units: millimetre, tonne, millisecond.
 MM_T_MS = UnitScales(length=1e3, mass=1e-3, time=1e3)

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...describe.description import DescribedEntry, Description
 from ...describe.placement import TURNS, axis_columns
+from ...describe.rewritten_texts import number_of
 from ...numeric.rotation_matrices import from_roll_pitch_yaw, roll_pitch_yaw
-from .body_frames import values_of
-from .rewritten_texts import number_of
+from .plain import values_of
 
 Frame = dict[str, Any]
 

@@ -11,9 +11,10 @@ from typing import Any
 
 from ...describe.builder import Builder
 from ...describe.description import GROUND_NAME, DescribedEntry, Description
-from ...describe.write_yaml import yaml_text
-from ...describe.yaml_file import describe_yaml
-from .visit import Visitor, visit
+from ...describe.placed_on import with_rpy
+from ...describe.plain_form import plain_description
+from ...describe.rewritten_texts import number_of
+from ...describe.visit import Visitor, visit
 
 #: Type of constraint -> the key whose marker is ground unless given.
 _ON_GROUND = {"rolling": "plane", "knife_edge": "on", "driver": "on"}
@@ -29,10 +30,7 @@ def plain(model: Builder | Description) -> Description:
         It has values that no model file can hold, such as functions of Python.
     """
     given = model.description if isinstance(model, Builder) else model
-    result = describe_yaml(yaml_text(given))
-    folders = {entry.name: entry for entry in given.sections["functions"]}
-    for entry in result.sections["functions"]:
-        entry.trusted, entry.folder = folders[entry.name].trusted, folders[entry.name].folder
+    result = plain_description(given)
     for section, keys in _DATA.items():
         for entry in result.sections[section]:
             for key in keys:
@@ -45,9 +43,16 @@ def plain(model: Builder | Description) -> Description:
         side = _ON_GROUND.get(entry.values["type"])
         if side is not None and side not in entry.values and not (side == "on" and "marker" not in entry.values):
             entry.values[side] = GROUND_NAME
-    result = visit(result, _Placed())
-    result.lines.clear()
-    return result
+    return visit(result, _Placed(values_of(result)))
+
+
+def values_of(description: Description) -> dict[str, float]:
+    """Declared values of parameters, texts such as ``pi/10`` evaluated."""
+    return {
+        entry.name: number_of(entry.values["value"], {})
+        for entry in description.sections["parameters"]
+        if entry.values.get("value") is not None
+    }
 
 
 def _write_placements(entry: DescribedEntry) -> None:
@@ -61,8 +66,11 @@ def _write_placements(entry: DescribedEntry) -> None:
 
 
 class _Placed(Visitor):
-    """Writes ``at`` and ``rpy`` out wherever a placement is given."""
+    """Writes ``at`` and ``rpy`` out wherever a placement is given; parameters in a matrix have declared values."""
+
+    def __init__(self, parameters: Mapping[str, float]) -> None:
+        self.parameters = parameters
 
     def placement(self, body: str, placed: Mapping[str, Any], slot: Any) -> dict[str, Any]:
-        at = list(placed.get("at", (0, 0, 0)))
+        placed, at = with_rpy(placed, self.parameters), list(placed.get("at", (0, 0, 0)))
         return {"at": at} if slot.key == "points" else {"at": at, "rpy": list(placed.get("rpy", (0, 0, 0)))}

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...describe.description import Description
-from .rewritten_texts import is_zero
+from ...describe.rewritten_texts import is_zero
+from ...describe.visit import bodies_of, copied
 from .variant import kinds_of, velocities_of
-from .visit import bodies_of, copied
 
 #: Motion of a probe: outputs of the group, by suffix.
 LINEAR = ("ax", "ay", "az")

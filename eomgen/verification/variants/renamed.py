@@ -5,17 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import GROUND_NAME, Description
+from ...describe.rewritten_texts import rewritten
+from ...describe.visit import Slot, Visitor, visit
 from .body_frames import WAS
-from .rewritten_texts import rewritten
 from .variant import Variant, coordinates_of, kinds_of, velocities_of
-from .visit import Slot, Visitor, visit
 
-_LOCAL = {
-    "element": ("length", "angle", "rate"),
-    "torsional_element": ("angle", "rate"),
-    "cam": ("theta",),
-    "cam_contact": ("theta",),
-}
 #: Sections whose entries nobody needs to know the order of.
 _ORDER = ("parameters", "inputs", "functions", "bodies", "joints", "forces", "constraints", "events")
 
@@ -115,7 +109,7 @@ class _Renamed(Visitor):
         return self.bodies[body] + dot + self.markers.get(name, name)
 
     def scalar(self, value: Any, slot: Slot) -> Any:
-        hidden = {*_LOCAL.get(slot.type, ()), *self.local}
+        hidden = {*(slot.field.local if slot.field else ()), *self.local}
 
         def name(word: str) -> str:
             return word if word in hidden else self.word(word)

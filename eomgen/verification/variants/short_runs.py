@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...describe.description import Description
+from ...describe.rewritten_texts import names_of
 from ...errors import EomgenError
 from ...limits.verification import ATOL, RTOL, RUNS
 from ...simulation.simulate import simulate
@@ -16,7 +17,6 @@ from .compare import FREE_CONSTANT, refused
 from .cuts import cut_another
 from .inputs import duration
 from .probe_states import Original, compiled
-from .rewritten_texts import names_of
 from .variant import NotApplicable, Variant
 
 LONGEST = 1.0  #: of runs with events (s)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from ...describe.description import DescribedEntry, Description
-from .rewritten_texts import negative, rewritten
+from ...describe.rewritten_texts import negative, rewritten
+from ...describe.visit import Slot, Visitor, copied, visit
 from .variant import NotApplicable, Variant, coordinates_of
-from .visit import Slot, Visitor, copied, visit
 
 #: Joints whose inverse is of the same type with all coordinates of the other sign.
 TYPES = (
-    *("revolute", "continuous", "prismatic", "screw", "cylindrical", "spherical", "weld"),
+    *("revolute", "continuous", "prismatic", "translational", "screw", "cylindrical", "spherical", "weld"),
     *("distance", "parallel", "perpendicular", "orientation"),
 )
 #: Elements on a joint's coordinate -> the key that changes its sign, "" if none does.
@@ -20,6 +20,8 @@ _ELEMENTS = {
     "actuator": "value",
     "spring": "length",
     "torsional_spring": "angle",
+    "joint_spring": "rest",
+    "joint_damper": "",
     "damper": "",
     "torsional_damper": "",
     "friction": "",

@@ -14,10 +14,10 @@ import numpy as np
 from ...describe.build_cam_points import needs_point
 from ...describe.build_joints import coordinate_names
 from ...describe.description import DescribedEntry, Description
+from ...describe.rewritten_texts import names_of
+from ...describe.visit import Slot, Visitor, visit
 from ...joints import JOINTS
 from ...records import dataclass
-from .rewritten_texts import names_of
-from .visit import Slot, Visitor, visit
 
 #: Coordinates and velocities by name -> those of the variant by name.
 States = Callable[[Mapping[str, float]], dict[str, float]]

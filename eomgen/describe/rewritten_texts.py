@@ -1,6 +1,6 @@
-"""Stage verification, texts: expressions of a plain description, with other names, other axes or other units.
+"""Stage describe, rewriting texts: an expression -> the same with other names, other axes or other units.
 
-Values of a plain description are numbers and texts.  Texts are changed by their tokens, never evaluated as code.
+Values are numbers and texts.  Texts are changed by their tokens, never evaluated as code.
 """
 
 from __future__ import annotations
@@ -9,17 +9,19 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...describe.expressions import parse
-from ...describe.names import QUANTITIES
-from ...graph.core import Graph
-from ...graph.evaluate import evaluate
+from ..graph.core import Graph
+from ..graph.evaluate import evaluate
+from .expressions import parse
+from .names import QUANTITIES
 
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
     rf"|\b(?P<quantity>{'|'.join(sorted(QUANTITIES, key=len, reverse=True))})"
-    r"\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)?)\s*\)"
-    r"|(?P<name>[A-Za-z_]\w*)"
+    r"\(\s*(?P<marker>[A-Za-z]\w*(?:\.\w+)*)\s*\)"
+    r"|(?P<name>[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)"
 )
+
+_ATOM = re.compile(r"[A-Za-z0-9_.]+\Z")
 
 Rename = Callable[[str], str]
 Locate = Callable[[str, str], str]
@@ -38,6 +40,11 @@ def rewritten(value: Any, name: Rename, locate: Locate) -> Any:
         return name(found[0])
 
     return _TOKEN.sub(one, value)
+
+
+def in_brackets(text: str) -> str:
+    """A text so that it can stand in the place of a name."""
+    return text if _ATOM.match(text) else f"({text})"
 
 
 def names_of(value: Any) -> set[str]:

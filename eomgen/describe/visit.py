@@ -1,36 +1,42 @@
-"""Stage verification, visits: a plain description -> a copy in which a visitor has changed scalars, markers and names.
+"""Stage describe, visits: a description of texts and numbers -> a copy in which scalars, markers and names are changed.
 
 The table of fields says what each key holds, so a change states only what it does to a scalar, a marker, a coordinate.
+What does not have the form of its key stays as it is; the check of the model tells it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ...constraints import CONSTRAINTS
-from ...describe.description import GROUND_NAME, DescribedEntry, Description
-from ...describe.fields import (
+from ..constraints import CONSTRAINTS
+from ..forces import FORCES
+from ..joints import JOINTS
+from .description import GROUND_NAME, DescribedEntry, Description
+from .fields import (
     BODY,
     EQUATIONS,
     EVENT,
     INPUT,
     LAGRANGIAN,
+    MARKER,
     OUTPUT_FIELDS,
+    Field,
     Fields,
     joint_fields,
 )
-from ...forces import FORCES
 
 
 class Slot(NamedTuple):
-    """Where a scalar stands: section, type of the entry, key, place within it, and the entry itself."""
+    """Where a scalar stands: section, type of the entry, key, place within it, the entry, and the field of the key."""
 
     section: str
     type: str
     key: str
     place: tuple[Any, ...] = ()
     entry: DescribedEntry | None = None
+    field: Field | None = None
 
     def at(self, *index: Any) -> Slot:
         """A place within this one."""
@@ -58,13 +64,15 @@ class Visitor:
 
     def placement(self, body: str, placed: Mapping[str, Any], slot: Slot) -> dict[str, Any]:
         """``at`` and ``rpy`` in a body."""
-        return {key: self.vector(value, slot.named(key)) for key, value in placed.items()}
+        return {key: value if key == "axes" else self.vector(value, slot.named(key)) for key, value in placed.items()}
 
     def marker(self, reference: Any, slot: Slot) -> Any:
         """A reference to a marker: a text, or a mapping of body, at, rpy."""
         if isinstance(reference, str):
             body, dot, name = reference.partition(".")
             return self.body(body) + dot + name
+        if not isinstance(reference, Mapping) or not isinstance(reference.get("body"), str):
+            return reference
         placed = {key: value for key, value in reference.items() if key != "body"}
         return {"body": self.body(reference["body"]), **self.placement(reference["body"], placed, slot)}
 
@@ -77,24 +85,30 @@ class Visitor:
 
 def visit(description: Description, visitor: Visitor) -> Description:
     """The description as a visitor changes it."""
-    made = Description(values=dict(description.values), notes=list(description.notes))
-    for section, entries in description.sections.items():
-        made.sections[section] = [_entry(section, entry, visitor) for entry in entries]
+    made = replace(description, values=dict(description.values), notes=list(description.notes))
+    made.sections = {
+        section: [visit_entry(section, entry, visitor) for entry in entries]
+        for section, entries in description.sections.items()
+    }
     values = made.values
     if "gravity" in values:
         values["gravity"] = visitor.vector(values["gravity"], Slot("", "", "gravity"))
     for key in ("initial", "guess"):
-        if key in values:
+        if isinstance(values.get(key), Mapping):
             values[key] = {
-                visitor.coordinate(name): visitor.scalar(value, Slot("", "", key, (name,)))
+                _named(name, visitor.coordinate): visitor.scalar(value, Slot("", "", key, (name,)))
                 for name, value in values[key].items()
             }
-    if "independent" in values:
-        values["independent"] = [visitor.coordinate(name) for name in values["independent"]]
+    if isinstance(values.get("independent"), list | tuple):
+        values["independent"] = [_named(name, visitor.coordinate) for name in values["independent"]]
     for key, fields in (("lagrangian", LAGRANGIAN), ("equations", EQUATIONS)):
-        if values.get(key) is not None:
+        if isinstance(values.get(key), Mapping):
             values[key] = _values(values[key], fields, Slot(key, "", ""), visitor)
     return made
+
+
+def _named(name: Any, change: Callable[[str], str]) -> Any:
+    return change(name) if isinstance(name, str) else name
 
 
 def copied(description: Description) -> Description:
@@ -103,27 +117,27 @@ def copied(description: Description) -> Description:
 
 
 def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
-    """The table of fields of an entry."""
-    if section == "joints":
-        return joint_fields(values["type"])
-    if section == "forces":
-        return FORCES[values["type"]].fields("force", FORCES)
-    if section == "constraints":
-        return CONSTRAINTS[values["type"]].fields("constraint", CONSTRAINTS)
+    """The table of fields of an entry; empty for a type that is not known."""
+    kind = values.get("type")
+    types: Any = {"joints": JOINTS, "forces": FORCES, "constraints": CONSTRAINTS}.get(section)
+    if types is not None and isinstance(kind, str) and kind in types:
+        return joint_fields(kind) if section == "joints" else types[kind].fields(section[:-1], types)
     return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 
-def _entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:
+def visit_entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:
+    """An entry of a section as a visitor changes it."""
     slot = Slot(section, str(entry.values.get("type", "")), "", (), entry)
     values = _values(entry.values, fields_of(section, entry.values), slot, visitor)
-    return DescribedEntry(entry.name, values, entry.path, entry.trusted, entry.folder)
+    return replace(entry, values=values)
 
 
 def _values(values: Mapping[str, Any], fields: Fields, slot: Slot, visitor: Visitor) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, value in values.items():
-        kind = fields[key].kind if key in fields else ""
-        result[key] = value if value is None else _value(value, kind, slot._replace(key=key), visitor)
+        field = fields.get(key)
+        place = slot._replace(key=key, field=field)
+        result[key] = value if value is None or field is None else _value(value, field.kind, place, visitor)
     return result
 
 
@@ -131,51 +145,74 @@ _SCALARS = ("expression", "expressions", "vector", "value", "two", "radii", "sha
 
 
 def _value(value: Any, kind: str, slot: Slot, visitor: Visitor) -> Any:
+    listed = isinstance(value, list | tuple)
     if kind in _SCALARS:
         return visitor.vector(value, slot)
     if kind == "marker":
         return visitor.marker(value, slot)
     if kind == "pair":
-        return [visitor.marker(part, slot) for part in value]
+        return [visitor.marker(part, slot) for part in value] if listed else value
     if kind == "joint" or (kind == "name" and slot.key == "coordinate"):
-        return visitor.coordinate(value)
+        return _named(value, visitor.coordinate)
     if kind == "joints" or (kind == "names" and slot.key in ("coordinates", "velocities")):
-        return [visitor.coordinate(part) for part in ([value] if isinstance(value, str) else value)]
+        names = [value] if isinstance(value, str) else value if listed else None
+        return value if names is None else [_named(part, visitor.coordinate) for part in names]
     if kind in ("factors", "rates", "forces") and isinstance(value, Mapping):
-        return {visitor.coordinate(name): visitor.scalar(part, slot.at(name)) for name, part in value.items()}
+        return {_named(name, visitor.coordinate): visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("wheels", "inertia") and isinstance(value, Mapping):
         return {name: visitor.scalar(part, slot.at(name)) for name, part in value.items()}
     if kind in ("inertia", "forces"):
         return visitor.vector(value, slot)
     if kind == "body":
-        return visitor.body(value)
+        return _named(value, visitor.body)
     if kind == "via":
-        return [_via(part, slot, visitor) for part in value]
-    if kind in ("markers", "solids", "points", "about") and slot.entry is not None:
+        return [_via(part, slot, visitor) for part in value] if listed else value
+    if kind in ("markers", "solids", "points", "about", "display") and slot.entry is not None:
         return _part(value, kind, slot, slot.entry.name, visitor)
     return value
 
 
 def _via(part: Any, slot: Slot, visitor: Visitor) -> Any:
     if isinstance(part, Mapping) and "around" in part:
-        radius = visitor.scalar(part["radius"], slot.named("radius"))
-        return {**part, "around": visitor.marker(part["around"], slot), "radius": radius}
+        made = {**part, "around": visitor.marker(part["around"], slot)}
+        return (
+            made if "radius" not in part else {**made, "radius": visitor.scalar(part["radius"], slot.named("radius"))}
+        )
     return visitor.marker(part, slot)
+
+
+#: Keys of solids, points and shapes that are words, not scalars.
+_WORDS = ("type", "axis", "subtract", "file", "shape")
 
 
 def _part(value: Any, kind: str, slot: Slot, body: str, visitor: Visitor) -> Any:
     if kind == "about":
         return value if isinstance(value, str) else visitor.vector(value, slot)
     if kind == "markers":
-        return {name: visitor.placement(body, placed, slot) for name, placed in value.items()}
-    result = []
+        pairs = value.items() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+        try:
+            return {name: _placed(body, placed, slot, visitor) for name, placed in pairs}
+        except (TypeError, ValueError):  # no pairs, or names that are no names
+            return value
+    if not isinstance(value, list | tuple):
+        return value
+    result: list[Any] = []
     for part in value:
-        own = {k: v for k, v in part.items() if k not in ("at", "rpy", "type", "axis", "subtract", "file")}
-        rest = {k: v for k, v in part.items() if k in ("type", "axis", "subtract", "file")}
-        placed = {k: v for k, v in part.items() if k in ("at", "rpy")}
-        own = {k: visitor.vector(v, slot.named(k)) for k, v in own.items()}
-        result.append({**rest, **own, **visitor.placement(body, placed, slot)})
+        if not isinstance(part, Mapping):
+            result.append(part)
+            continue
+        words = {k: v for k, v in part.items() if k in _WORDS}
+        placed = {k: v for k, v in part.items() if k in MARKER}
+        own = {k: visitor.vector(v, slot.named(k)) for k, v in part.items() if k not in words and k not in placed}
+        result.append({**words, **own, **visitor.placement(body, placed, slot)})
     return result
+
+
+def _placed(body: str, placed: Any, slot: Slot, visitor: Visitor) -> Any:
+    """The place of a named marker: a mapping, or its position alone."""
+    if isinstance(placed, Mapping):
+        return visitor.placement(body, placed, slot)
+    return visitor.placement(body, {"at": placed}, slot)
 
 
 def bodies_of(description: Description) -> list[DescribedEntry]:

@@ -1,0 +1,227 @@
+"""Stage describe, components: the sections ``components`` and ``add`` of a model file -> entries of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ..errors import UsageError
+from .checks import unknown_key
+from .description import GROUND_NAME, Description, Faults
+from .dotted_names import undotted
+from .fields import ADDED, COMPONENT, KINDS
+from .instance import Component, Instance, add_instance, size_of
+from .names import fault_of_name, nearest
+from .repetition import Fault, put_in, rounds_of
+
+ENTRIES = 20_000  #: most entries and instances of a model that its components make
+
+#: Reads the sections of a mapping into a description: mapping, path before its keys, the description.
+Fill = Callable[[Mapping[str, Any], str, Description], None]
+#: Reads a file that the model file names; None where it is at fault, which is told.
+Open = Callable[[str], Description | None]
+
+
+class Components:
+    """The components of one model file, each read when it is first added.
+
+    Parameters
+    ----------
+    given : object
+        The section ``components``.
+    lines : mapping
+        Dotted path -> (file, line) in the model file.
+    fill, open_file : callable
+        Read what stands in the model file, and files that it names.
+    faults : Faults
+    """
+
+    def __init__(
+        self, given: Any, lines: Mapping[str, tuple[str, int]], fill: Fill, open_file: Open, faults: Faults
+    ) -> None:
+        self.lines, self.fill, self.open_file, self.faults, self.fault = lines, fill, open_file, faults, faults.add
+        self.given: Mapping[str, Any] = given if isinstance(given, Mapping) else {}
+        if given is not None and not isinstance(given, Mapping):
+            faults.add("components", f"is not {KINDS['table']}", "write the names of the components as keys")
+        self.read: dict[str, Component | None] = {}
+        self.within: list[str] = []
+
+    def read_all(self) -> None:
+        """Read also those that nothing adds, so that their faults are told."""
+        for name in self.given:
+            self.find(name, f"components.{name}")
+
+    def find(self, name: Any, path: str) -> Component | None:
+        """The component of a name; None where there is none, or it has faults, which are told."""
+        if not isinstance(name, str) or name not in self.given:
+            self.fault(path, f"no component {name!r}", nearest(str(name), self.given, "components"))
+            return None
+        if name in self.within:
+            chain = ", ".join([*self.within[self.within.index(name) :], name])
+            self.fault(path, f"the component {name!r} adds itself: {chain}", "take one of them out")
+            return None
+        if name not in self.read:
+            self.within.append(name)
+            self.read[name] = self._read(name)
+            self.within.pop()
+        return self.read[name]
+
+    def _read(self, name: str) -> Component | None:
+        given, path = self.given[name], f"components.{name}"
+        wrong = fault_of_name(name)
+        if wrong:
+            self.fault(path, *wrong)
+        if not isinstance(given, Mapping):
+            self.fault(path, f"is not {KINDS['table']}", "write its keys, or {file: leg.yaml}")
+            return None
+        for key in given:
+            if key not in COMPONENT:
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, COMPONENT))
+        if "file" in given:
+            if len(given) > 1:
+                self.fault(path, "has keys beside file", "the file says all of it")
+            return self._read_file(name, given["file"], path)
+        start = f"{path}."
+        lines = {key.removeprefix(start): place for key, place in self.lines.items() if key.startswith(start)}
+        description = Description(lines=lines)
+        self.fill(given, start, description)
+        self.add(given.get("add"), start, description)
+        description = undotted(description)
+        return self._checked(Component(name, start, description, self._attachments(given, start), closed=False))
+
+    def _read_file(self, name: str, file: Any, path: str) -> Component | None:
+        if not isinstance(file, str):
+            self.fault(f"{path}.file", f"{file!r} is not {KINDS['file']}", "")
+            return None
+        try:
+            description = self.open_file(file)
+        except FileNotFoundError:
+            self.fault(f"{path}.file", f"there is no file {file}", "its path starts at the folder of the model file")
+            return None
+        except UsageError as error:
+            self.fault(f"{path}.file", str(error), "")
+            return None
+        except OSError as error:
+            self.fault(f"{path}.file", f"{file} cannot be read ({error.strerror})", "")
+            return None
+        if description is None:
+            return None
+        return self._checked(component_of(description, name, "", lambda _, *what: self.fault(f"{path}.file", *what)))
+
+    def _checked(self, component: Component) -> Component:
+        for name in component.attachments:
+            if name in component.names.bodies or name in (GROUND_NAME, "body"):
+                message = f"the attachment {name!r} bears the name of a body"
+                self.fault(f"{component.place}attachments", message, "rename one of them")
+        return component
+
+    def _attachments(self, given: Mapping[str, Any], start: str) -> tuple[str, ...]:
+        listed = given.get("attachments") or []
+        listed = [listed] if isinstance(listed, str) else listed
+        if not isinstance(listed, list) or any(fault_of_name(name) for name in listed):
+            self.fault(f"{start}attachments", f"{listed!r} is not {KINDS['names']}", "such as [foot, top]")
+            return ()
+        return tuple(listed)
+
+    # -- instances ------------------------------------------------------------------------------------------------
+    def add(self, given: Any, start: str, target: Description) -> None:
+        """Add the instances of a section ``add`` to a description; ``start`` stands before its path."""
+        if given is None:
+            return
+        if not isinstance(given, Mapping):
+            self.fault(f"{start}add", f"is not {KINDS['table']}", "write the names of the instances as keys")
+            return
+        for name, keys in given.items():
+            self._add_one(name, keys, f"{start}add.{name}", target)
+
+    def _add_one(self, name: Any, keys: Any, path: str, target: Description) -> None:
+        wrong = fault_of_name(name)
+        if wrong:
+            self.fault(path, *wrong)
+            return
+        if not isinstance(keys, Mapping):
+            self.fault(path, f"is not {KINDS['table']}", "write component: NAME and the rest as keys")
+            return
+        for key in keys:
+            if key not in ADDED:
+                self.fault(f"{path}.{key}", "unknown key", unknown_key(key, ADDED))
+        if "component" not in keys:
+            self.fault(f"{path}.component", "is missing", nearest("", self.given, "components"))
+            return
+        component = self.find(keys["component"], f"{path}.component")
+        rounds = rounds_of(keys["for"], f"{path}.for", self.fault) if "for" in keys else [{}]
+        prefix = keys.get("prefix", f"{name}_")
+        if prefix != "" and fault_of_name(prefix):
+            self.fault(f"{path}.prefix", f"{prefix!r} cannot begin a name", "letters, digits and underscores")
+            return
+        if component is None or rounds is None:
+            return
+        if size_of(target) + component.size * len(rounds) > ENTRIES:
+            self.fault(path, "makes the model too large", f"at most {ENTRIES} entries and instances")
+            return
+        for k, variables in enumerate(rounds):
+            number = str(k + 1) if "for" in keys else ""
+            before = f"{prefix.rstrip('_')}{number}_" if number else prefix
+            instance = self._instance(component, f"{name}{number}", before, keys, variables, path)
+            if instance is None or not claim(target, instance, path, self.fault):
+                return
+            add_instance(target, component, instance, path, self.faults)
+
+    def _instance(
+        self, component: Component, name: str, prefix: str, keys: Mapping[str, Any], variables: Any, path: str
+    ) -> Instance | None:
+        tables: dict[str, Mapping[str, Any]] = {}
+        for key in ("parameters", "inputs", "initial", "guess"):
+            given = put_in(keys.get(key) or {}, variables)
+            if not isinstance(given, Mapping):
+                self.fault(f"{path}.{key}", f"is not {KINDS['table']}", "write names as keys")
+                return None
+            tables[key] = given
+        at = put_in(keys["at"], variables) if isinstance(keys.get("at"), Mapping) else keys.get("at")
+        values = {**tables["parameters"], **tables["inputs"]}
+        named = named_attachments(component, at, f"{path}.at", self.fault)
+        if named is None:
+            return None
+        places = {one: f"{key}.{one}" for key in ("parameters", "inputs") for one in tables[key]}
+        return Instance(name, prefix, named, values, places, tables["initial"], tables["guess"])
+
+
+def named_attachments(component: Component, at: Any, path: str, fault: Fault) -> Mapping[str, Any] | None:
+    """What is given as ``at``, by the names of attachments; one marker stands for the only one, or for ground."""
+    if at is None:
+        return {}
+    if isinstance(at, Mapping) and "body" not in at:
+        return at
+    if len(component.attachments) > 1:
+        fault(
+            path, f"{component.name} has several attachments", f"give a mapping of {', '.join(component.attachments)}"
+        )
+        return None
+    return {(component.attachments or (GROUND_NAME,))[0]: at}
+
+
+def claim(target: Description, instance: Instance, path: str, fault: Fault) -> bool:
+    """Take the name of an instance into a description; False, and a fault, where it is taken."""
+    if instance.name in target.instances:
+        fault(path, f"there is an instance {instance.name!r} already", "rename one of them")
+        return False
+    if any(entry.name == instance.name for entry in target.sections["bodies"]):
+        message = f"{instance.name!r} is a body too, so {instance.name}.x could mean two things"
+        fault(path, message, "rename one of them")
+        return False
+    target.instances[instance.name] = instance.prefix
+    return True
+
+
+def component_of(description: Description, name: str, place: str, fault: Fault) -> Component:
+    """A component of the description of a whole model: its bodies, joints and what belongs to them."""
+    for key in ("lagrangian", "equations"):
+        if description.values.get(key) is not None:
+            fault("", f"{name} has {key}", "a component is made of bodies and joints")
+    check = description.values.get("check_inertia")
+    for entry in description.sections["bodies"]:
+        if check is not None and entry.name != GROUND_NAME:
+            entry.values.setdefault("check_inertia", check)
+    attachments = description.values.get("attachments") or []
+    attachments = [attachments] if isinstance(attachments, str) else attachments
+    return Component(name, place, description, tuple(map(str, attachments)))

@@ -1,0 +1,388 @@
+"""Components are what the same model written out by hand is; faults name file, entry and instance."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+import eomgen as eg
+from eomgen.describe import model_schema
+from eomgen.describe.digest import model_digest
+from eomgen.describe.yaml_nodes import Document
+
+VALIDATOR = Draft202012Validator(model_schema())
+STEWART = Path(str(files("eomgen.examples"))) / "stewart_platform.yaml"
+BY_HAND = Path(__file__).parents[1] / "reference" / "stewart_by_hand.yaml"
+
+LINK = """
+name: link
+attachments: [base]
+parameters: {l: 0.5, m: {value: 1, unit: kg}}
+inputs: {tau: 0}
+bodies: {rod: {mass: m, com: [l/2, 0, 0], inertia: {zz: m*l**2/12}, markers: {end: [l, 0, 0]}}}
+joints: {hinge: {type: revolute, between: [base, rod]}}
+forces:
+  motor: {type: torque, joint: hinge, value: tau}
+  rubber: {type: torsional_element, joint: hinge, law: -0.1*angle - 0.2*hinge_dot}
+outputs: {end_x: x(rod.end), base_x: x(base)}
+initial: {hinge: 0.2}
+"""
+ARM = """
+name: arm
+gravity: [0, -g, 0]
+parameters: {g: 9.81, s: 0.8}
+inputs: {u: 0}
+bodies: {cart: {mass: 3, markers: {top: [0.1, 0.2, 0]}}}
+joints: {rail: {type: prismatic, between: [ground, cart], axis: x}}
+components:
+  link: {file: parts/link.yaml}
+  limb:
+    attachments: [root]
+    parameters: {L: 1, k: 2*L}
+    add:
+      upper: {component: link, at: root, parameters: {l: L}}
+      lower: {component: link, at: upper.rod.end, parameters: {l: L/2, m: 0.7}, inputs: {tau: k*u}}
+    outputs: {bend: upper.hinge - lower_hinge, foot: y(lower.rod.end)}
+add:
+  left: {component: limb, at: cart.top, parameters: {L: s}, initial: {upper.hinge: 0.4}}
+  right: {component: limb, at: {body: cart, at: [-0.1, 0.2, 0]}, parameters: {L: 2}}
+outputs: {gap: x(left.lower.rod.end) - x(right_lower_rod.end), angle_sum: left.upper.hinge + left_lower_hinge}
+initial: {left.lower.hinge: -0.3, rail: 0.1}
+"""
+BY_HAND_ARM = """
+name: arm
+gravity: [0, -g, 0]
+parameters: {g: 9.81, s: 0.8, left_upper_m: {value: 1, unit: kg}, left_lower_m: {value: 0.7, unit: kg},
+  right_L: 2, right_upper_m: {value: 1, unit: kg}, right_lower_m: {value: 0.7, unit: kg}}
+inputs: {u: 0, left_upper_tau: 0, right_upper_tau: 0}
+bodies:
+  cart: {mass: 3, markers: {top: [0.1, 0.2, 0], right_root: [-0.1, 0.2, 0]}}
+  left_upper_rod: {mass: left_upper_m, com: [s/2, 0, 0], inertia: {zz: left_upper_m*s**2/12},
+    markers: {end: [s, 0, 0]}}
+  left_lower_rod: {mass: left_lower_m, com: [s/2/2, 0, 0], inertia: {zz: left_lower_m*(s/2)**2/12},
+    markers: {end: [s/2, 0, 0]}}
+  right_upper_rod: {mass: right_upper_m, com: [right_L/2, 0, 0], inertia: {zz: right_upper_m*right_L**2/12},
+    markers: {end: [right_L, 0, 0]}}
+  right_lower_rod: {mass: right_lower_m, com: [right_L/2/2, 0, 0], inertia: {zz: right_lower_m*(right_L/2)**2/12},
+    markers: {end: [right_L/2, 0, 0]}}
+joints:
+  rail: {type: prismatic, between: [ground, cart], axis: x}
+  left_upper_hinge: {type: revolute, between: [cart.top, left_upper_rod]}
+  left_lower_hinge: {type: revolute, between: [left_upper_rod.end, left_lower_rod]}
+  right_upper_hinge: {type: revolute, between: [{body: cart, at: [-0.1, 0.2, 0]}, right_upper_rod]}
+  right_lower_hinge: {type: revolute, between: [right_upper_rod.end, right_lower_rod]}
+forces:
+  left_upper_motor: {type: torque, joint: left_upper_hinge, value: left_upper_tau}
+  left_upper_rubber: {type: torsional_element, joint: left_upper_hinge, law: -0.1*angle - 0.2*left_upper_hinge_dot}
+  left_lower_motor: {type: torque, joint: left_lower_hinge, value: 2*s*u}
+  left_lower_rubber: {type: torsional_element, joint: left_lower_hinge, law: -0.1*angle - 0.2*left_lower_hinge_dot}
+  right_upper_motor: {type: torque, joint: right_upper_hinge, value: right_upper_tau}
+  right_upper_rubber: {type: torsional_element, joint: right_upper_hinge, law: -0.1*angle - 0.2*right_upper_hinge_dot}
+  right_lower_motor: {type: torque, joint: right_lower_hinge, value: 2*right_L*u}
+  right_lower_rubber: {type: torsional_element, joint: right_lower_hinge, law: -0.1*angle - 0.2*right_lower_hinge_dot}
+outputs:
+  gap: x(left_lower_rod.end) - x(right_lower_rod.end)
+  angle_sum: left_upper_hinge + left_lower_hinge
+  left_bend: left_upper_hinge - left_lower_hinge
+  left_foot: y(left_lower_rod.end)
+  left_upper_end_x: x(left_upper_rod.end)
+  left_upper_base_x: x(cart.top)
+  left_lower_end_x: x(left_lower_rod.end)
+  left_lower_base_x: x(left_upper_rod.end)
+  right_bend: right_upper_hinge - right_lower_hinge
+  right_foot: y(right_lower_rod.end)
+  right_upper_end_x: x(right_upper_rod.end)
+  right_upper_base_x: x(cart.right_root)
+  right_lower_end_x: x(right_lower_rod.end)
+  right_lower_base_x: x(right_upper_rod.end)
+initial: {left_upper_hinge: 0.4, left_lower_hinge: -0.3, right_upper_hinge: 0.2, right_lower_hinge: 0.2, rail: 0.1}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "link.yaml").write_text(LINK)
+    return tmp_path
+
+
+def loaded(folder: Path, text: str, name: str = "arm.yaml") -> eg.Model:
+    (folder / name).write_text(text)
+    return eg.load(folder / name)
+
+
+def problems(folder: Path, text: str) -> list[str]:
+    with pytest.raises(eg.ModelError) as caught:
+        loaded(folder, text).mechanism()
+    return [str(problem).replace(f"{folder}/", "") for problem in caught.value.problems]
+
+
+def same_numbers(a: eg.Model, b: eg.Model, names: dict[str, str] | None = None) -> None:
+    """Same mass matrix, right-hand side and outputs to the last bit, at random states."""
+    one, other = a.compile(target="numpy"), b.compile(target="numpy")
+    assert [(names or {}).get(x, x) for x in one.x_names] == list(other.x_names)
+    random = np.random.default_rng(3)
+    start = other.x0()
+    np.testing.assert_array_equal(one.x0(), start)
+    for _ in range(5):
+        x = one.project(start + 0.05 * random.normal(size=start.size))
+        u = random.normal(size=len(one.u_names))
+        np.testing.assert_array_equal(one.mass_matrix(x[: one.n_q]), other.mass_matrix(x[: one.n_q]))
+        np.testing.assert_array_equal(one.rhs(0.3, x, u=u), other.rhs(0.3, x, u=u))
+        np.testing.assert_array_equal(one.outputs(0.3, x, u=u), other.outputs(0.3, x, u=u))
+
+
+def test_nested_components_are_the_model_by_hand(folder: Path) -> None:
+    made, by_hand = loaded(folder, ARM), loaded(folder, BY_HAND_ARM, "hand.yaml")
+    same_numbers(made, by_hand)
+    assert model_digest(loaded(folder, made.to_yaml(), "again.yaml").mechanism()) == model_digest(made.mechanism())
+
+
+def test_stewart_is_a_third_as_long_and_the_same() -> None:
+    text, by_hand = STEWART.read_text(), BY_HAND.read_text()
+    assert 3 * len(text) <= len(by_hand)
+    assert 3 * len(text.splitlines()) <= len(by_hand.splitlines())
+    made, hand = eg.load(STEWART), eg.load(BY_HAND)
+    hand.guess = {}
+    parts = ("swing", "tilt", "length")
+    names = {f"leg{k}_{n}{r}": f"{n}_{k}{r}" for k in range(1, 7) for n in parts for r in ("", "_dot")}
+    same_numbers(made, hand, names)
+
+
+def test_python_and_yaml_agree(folder: Path) -> None:
+    """The same arm from Python, its components Models and a file."""
+    link = eg.load(folder / "parts" / "link.yaml")
+    limb = eg.Model("limb")
+    root, length = limb.attachment("root"), limb.parameter("L", 1)
+    k = limb.parameter("k")
+    drive = limb.input("u")
+    upper = limb.add(link, "upper_", at=root, l=length)
+    limb.add(
+        folder / "parts" / "link.yaml", prefix="lower_", at=upper.marker("rod.end"), l=length / 2, m=0.7, tau=k * drive
+    )
+    m = eg.Model("arm", gravity=(0, "-g", 0))
+    m.parameter("g", 9.81)
+    s, u = m.parameter("s", 0.8), m.input("u", 0)
+    cart = m.body("cart", mass=3)
+    m.prismatic("rail", m.ground, cart, axis="x")
+    m.add(limb, prefix="left_", at=cart.marker("top", (0.1, 0.2, 0)), L=s, k=2 * s, u=u)
+    right = m.add(limb, "right_", at=cart.at(-0.1, 0.2, 0), L=2, k="2*right_L", u=u)
+    m.initial.update({"rail": 0.1, "left.upper.hinge": 0.4, "left.lower.hinge": -0.3})
+    assert sorted(right.bodies) == ["lower_rod", "upper_rod"]
+    assert right.joints["upper_hinge"].coordinate == right.symbol("upper_hinge")
+    made = loaded(folder, ARM)
+    one, other = m.compile(target="numpy"), made.compile(target="numpy")
+    assert one.x_names == other.x_names
+    x = other.x0() + 0.1
+    a, b = (mod.bind(u={"u": 0.3}).rhs(0, x) for mod in (one, other))
+    np.testing.assert_allclose(a, b, rtol=1e-12)
+
+
+def test_instances_in_another_order(folder: Path) -> None:
+    """The mechanism does not depend on the order of its instances."""
+    head, _, tail = ARM.partition("add:\n  left")
+    first, second, *rest = ("  left" + tail).split("\n")
+    turned = "\n".join([head + "add:", second, first, *rest])
+    a = loaded(folder, ARM).compile(target="numpy")
+    b = loaded(folder, turned, "turned.yaml").compile(target="numpy")
+    order = [a.x_names.index(name) for name in b.x_names]
+    assert order != sorted(order)
+    x = a.x0() + 0.1
+    np.testing.assert_allclose(b.rhs(0, x[order]), a.rhs(0, x)[order], rtol=0, atol=1e-11)
+
+
+def test_legs_at_angles(tmp_path: Path) -> None:
+    """A count, a range and a list; the angles are those of the loop, beside positions computed here."""
+    text = """
+name: star
+parameters: {r: 2}
+components:
+  ray:
+    attachments: [root]
+    bodies: {tip: {mass: 1, inertia: {zz: 1}}}
+    joints: {pin: {type: revolute, between: [root, tip]}}
+    outputs: {here: x(tip)}
+add:
+  a: {component: ray, for: {k: 3}, at: {body: ground, at: [r*cos(2*pi*k/3), 0, 0]}}
+  b:
+    component: ray
+    for: {k: {from: 0, to: 0.3, step: 0.1}, s: [1, r, -1, r/2]}
+    at: {body: ground, at: [k*s, 0, 0]}
+    prefix: other_
+"""
+    mod = loaded(tmp_path, text).compile(target="numpy")
+    assert mod.q_names == tuple(f"{p}{k}_pin" for p, n in (("a", 3), ("other", 4)) for k in range(1, n + 1))
+    wanted = [2 * np.cos(2 * np.pi * k / 3) for k in (1, 2, 3)] + [0.0, 0.2, -0.2, 0.3]
+    np.testing.assert_allclose(mod.outputs(0, mod.x0()), wanted, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("rpy", ["[0, 0, 0]", "[0.3, -0.2, 0.5]"])
+def test_ground_of_a_component_is_where_it_hangs(tmp_path: Path, rpy: str) -> None:
+    """A whole model hung on a body: its ground, markers of ground and places on ground follow the attachment."""
+    (tmp_path / "swing.yaml").write_text("""
+name: swing
+gravity: [0, 0, -1]
+bodies:
+  ground: {markers: {hook: {at: [0, 0.5, 0], rpy: [0, 0.4, 0]}}}
+  bob: {mass: 1, com: [0.2, 0, 0], inertia: [1, 2, 2.5]}
+  other: {mass: 1, inertia: [1, 1, 1]}
+joints:
+  pin: {type: revolute, between: [ground.hook, bob]}
+  rail: {type: prismatic, between: [{body: ground, at: [0.1, 0.2, 0.3], rpy: [0.1, 0, 0]}, other]}
+outputs: {hook_x: x(ground.hook)}
+initial: {pin: 0.3, rail: 0.2}
+""")
+    made = loaded(
+        tmp_path,
+        f"""
+name: hung
+bodies: {{car: {{mass: 1, inertia: [1, 1, 1], markers: {{m: {{at: [1, 2, 3], rpy: {rpy}}}}}}}}}
+joints: {{free: {{type: free, between: [ground, car]}}}}
+components: {{swing: {{file: swing.yaml}}}}
+add: {{s: {{component: swing, at: car.m}}}}
+initial: {{free_1: 0.2, free_y: 1}}
+""",
+    ).compile(target="numpy")
+    poses = dict(zip(made.body_names, made.poses(made.x0()[: made.n_q]), strict=True))
+    alone = eg.load(tmp_path / "swing.yaml").compile(target="numpy")
+    own = dict(zip(alone.body_names, alone.poses(alone.x0()[: alone.n_q]), strict=True))
+    roll, pitch, yaw = eval(rpy)  # noqa: S307 - the numbers above
+    at = np.eye(4)
+    at[:3, :3], at[:3, 3] = turned("z", yaw) @ turned("y", pitch) @ turned("x", roll), [1, 2, 3]
+    for name in ("bob", "other"):
+        np.testing.assert_allclose(poses[f"s_{name}"], poses["car"] @ at @ own[name], rtol=0, atol=1e-14)
+    hook = poses["car"] @ at @ [0, 0.5, 0, 1]
+    assert made.outputs(0, made.x0())[0] == pytest.approx(hook[0], abs=1e-14)
+
+
+def turned(axis: str, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    R = np.eye(3)
+    R[i, i] = R[j, j] = c
+    R[i, j], R[j, i] = -s, s
+    return R
+
+
+def test_names_with_dots_at_run_time(folder: Path) -> None:
+    mod = loaded(folder, ARM).compile(target="numpy")
+    run = mod.simulate(
+        0.1, initial={"left.upper.hinge": 0.9}, parameters={"right.L": 1.5}, inputs={"left.upper.tau": 1.0}
+    )
+    np.testing.assert_array_equal(run["left.upper.hinge"], run["left_upper_hinge"])
+    assert run["left_upper_hinge"][0] == 0.9
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "component: link, at: root",
+            "component: lnik, at: root",
+            "arm.yaml:14: components.limb.add.upper.component: no component 'lnik'; did you mean",
+        ),
+        ("{l: L}", "{q: L}", "arm.yaml:14: components.limb.add.upper.parameters.q: link has no parameter or input 'q'"),
+        ("at: cart.top,", "", "arm.yaml:18: add.left.at.root: the attachment 'root' of limb is missing"),
+        ("at: cart.top,", "at: {top: cart},", "arm.yaml:18: add.left.at.top: limb has no attachment 'top'"),
+        ("at: cart.top,", "at: cart.tip,", "arm.yaml:18: add.left.at.root: 'cart.tip' is not a marker"),
+        ("parts/link.yaml", "../link.yaml", "arm.yaml:9: components.link.file: ../link.yaml lies outside the folder"),
+        ("parts/link.yaml", "parts/lnik.yaml", "arm.yaml:9: components.link.file: there is no file parts/lnik.yaml"),
+        ("  right:", "  left:", "arm.yaml:19: add.left: is given twice"),
+        (
+            "component: limb, at: cart.top",
+            "component: limb, for: {k: [1, 2], j: [1]}, at: cart.top",
+            "arm.yaml:18: add.left.for: lists of different lengths",
+        ),
+        (
+            "component: limb, at: cart.top",
+            "component: limb, for: {k: 2000}, at: cart.top",
+            "arm.yaml:18: add.left.for.k: has more than 1000 values",
+        ),
+        ("  limb:\n", "  limb:\n    gravity: [0, 0, 0]\n", "arm.yaml:11: components.limb.gravity: unknown key"),
+        ("  left:", "  cart:", "arm.yaml:18: add.cart: 'cart' is a body too"),
+    ],
+)
+def test_faults_of_adding(folder: Path, old: str, new: str, told: str) -> None:
+    assert old in ARM
+    found = problems(folder, ARM.replace(old, new, 1))
+    assert any(one.startswith(told) for one in found), found
+    assert len(found) <= 2  # and not what follows from the missing names
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "type: revolute",
+            "type: revolut",
+            "parts/link.yaml:7: joints.hinge.type: no joint of type 'revolut' (in left.upper, left.lower, ",
+        ),
+        (
+            "x(rod.end)",
+            "x(rod.ned)",
+            "parts/link.yaml:11: outputs.end_x.expression: 'left_upper_rod' has no marker 'ned'",
+        ),
+        ("m*l**2/12", "m*l**2/12*s", "parts/link.yaml:6: bodies.rod.inertia: 's' is no name of the component"),
+        ("[base, rod]", "[base, cart]", "parts/link.yaml:7: joints.hinge.between: 'cart' is no name of the component"),
+        (
+            "bodies:",
+            "lagrangian: {coordinates: [q], expression: q_dot**2}\nbodies:",
+            "arm.yaml:9: components.link.file: link has lagrangian",
+        ),
+        ("name: link", "name: [link", "parts/link.yaml:3: file: not YAML"),
+        ("inputs:", "colour: red\ninputs:", "parts/link.yaml:5: colour: unknown key"),
+    ],
+)
+def test_faults_in_the_file_of_a_component(folder: Path, old: str, new: str, told: str) -> None:
+    assert old in LINK
+    (folder / "parts" / "link.yaml").write_text(LINK.replace(old, new, 1))
+    found = problems(folder, ARM)
+    assert any(one.startswith(told) for one in found), found
+
+
+def test_recursion_is_refused_with_its_cycle(folder: Path) -> None:
+    text = ARM.replace("add:\n      upper:", "add:\n      more: {component: limb, at: root}\n      upper:")
+    assert any("adds itself: limb, limb" in one for one in problems(folder, text))
+    (folder / "parts" / "link.yaml").write_text(
+        LINK + "components: {a: {file: link.yaml}}\nadd: {b: {component: a, at: base}}\n"
+    )
+    assert any("adds itself: link.yaml, link.yaml" in one for one in problems(folder, ARM))
+
+
+def test_sizes_are_bounded(tmp_path: Path) -> None:
+    """Components within components cannot make a model of a million entries."""
+    layers = "\n".join(f"  c{k}: {{add: {{x: {{component: c{k - 1}, for: {{i: 100}}}}}}}}" for k in range(1, 9))
+    text = "name: m\ncomponents:\n  c0: {bodies: {b: {mass: 1}}}\n" + layers + "\nadd: {y: {component: c8}}\n"
+    assert any(
+        "makes the model too large; at most 20000 entries and instances" in one for one in problems(tmp_path, text)
+    )
+
+
+def test_python_refuses_at_once(folder: Path) -> None:
+    link = eg.load(folder / "parts" / "link.yaml")
+    m = eg.Model("m")
+    with pytest.raises(eg.UsageError, match="link has no parameter or input 'mass'"):
+        m.add(link, "a_", at=m.ground, mass=3)
+    with pytest.raises(eg.UsageError, match="the attachment 'base' of link is missing"):
+        m.add(link, "a_")
+    with pytest.raises(eg.UsageError, match="belongs to the model 'link'"):
+        m.add(link, "a_", at=link.ground)
+    with pytest.raises(eg.UsageError, match="3 is no component"):
+        m.add(3)
+    assert m.bodies == {}  # what was refused left nothing behind
+    m.add(link, "a_", at=m.ground)
+    with pytest.raises(eg.UsageError, match="there is an instance 'a' already"):
+        m.add(link, "a_", at=m.ground)
+    with pytest.raises(eg.ModelError, match="stand for markers of another model"):
+        link.mechanism()
+
+
+def test_the_schema_accepts_them(folder: Path) -> None:
+    for text in (ARM, LINK, STEWART.read_text()):
+        assert list(VALIDATOR.iter_errors(Document(text, "m.yaml").value)) == []
+    for old, new in (("at: root,", "at: 3,"), ("file: parts", "fil: parts"), ("component: limb, at: cart", "at: cart")):
+        assert list(VALIDATOR.iter_errors(Document(ARM.replace(old, new, 1), "m.yaml").value)), new
