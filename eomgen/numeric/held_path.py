@@ -66,6 +66,7 @@ class HeldPath:
         for damping in (0.0, DAMPING):
             found, residual = close(system, q, steps=NEWTON, damping=damping)
             if closed(residual):
+                found[self.held] = q[self.held]  # Euler parameters are normalised at each step
                 return Point(s, found, self.tangent(s, found))
         return None
 
