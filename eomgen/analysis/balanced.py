@@ -10,7 +10,7 @@ from ..limits.constraints import STATE
 from ..limits.statics import DIFFERENCES
 from ..numeric import algebra
 from ..numeric.scales import Array
-from ..runtime.initial import Initial
+from ..runtime.constraint_kernels import constraint_system
 from ..runtime.near_names import unknown
 from .balance import Balance, balance_forces, force_slopes
 from .eigenvalue_rounding import stability_of_matrix
@@ -139,6 +139,6 @@ def read_coordinates(module: BoundModel, q: Array, t: float) -> dict[str, float]
     """All coordinates by name, those of cut joints included."""
     values = dict(zip(module.q_names, q.tolist(), strict=True))
     if module.layout.n_loop_coordinates:
-        y = Initial(module.kernels, t).loops(q)[0]
+        y = constraint_system(module.kernels).cut.evaluate(q, t)[0]
         values |= dict(zip(module.layout.loops, y.tolist(), strict=True))
     return values

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..limits.motions import ASTRAY
+from ..numeric.curves import Point
 from ..numeric.projection import largest
 from ..numeric.scales import Array, Scales
-from .path_following import Continuation, Point
+from .driven_coordinates import DrivenContinuation
 
 REACH = 0.05  #: scaled motion from the middle of an interpolant to its inner supports
 
@@ -75,7 +76,7 @@ def newton(nodes: Array, coefficients: Array, s: float) -> tuple[Array, Array, A
 
 
 def build_interpolant(
-    continuation: Continuation, before: Point, after: Point, middle: float
+    continuation: DrivenContinuation, before: Point, after: Point, middle: float
 ) -> ChangePointInterpolant | None:
     """An interpolant over s = middle from good points about it; None where a side is missing.
 
@@ -85,7 +86,7 @@ def build_interpolant(
     before, after : Point
         Good points of one smooth branch, on either side of ``middle``.
     """
-    scales = continuation.driven.scales
+    scales = continuation.scales
     rate = max(largest(before.tangent.rate / scales.q), largest(after.tangent.rate / scales.q))
     if rate == 0.0 or not before.s < middle < after.s:
         return None
@@ -95,7 +96,7 @@ def build_interpolant(
     for part in (-2.0, -1.0, 1.0, 2.0):
         s = middle + part * reach
         guess = rough.at(s)[0] if rough.covers(s) else _along(continuation, rough, s)
-        found = None if guess is None else continuation.solve(s, guess)
+        found = None if guess is None else continuation.curve.solve(s, guess)
         if found is None:
             return None
         supports.append(found)
@@ -106,8 +107,8 @@ def build_interpolant(
     return interpolant
 
 
-def _along(continuation: Continuation, rough: ChangePointInterpolant, s: float) -> Array | None:
+def _along(continuation: DrivenContinuation, rough: ChangePointInterpolant, s: float) -> Array | None:
     """A guess outside a rough interpolant, from the nearest points of the continuation or on from an end."""
-    scales = continuation.driven.scales
+    scales = continuation.scales
     near = min((*continuation.points, *rough.supports), key=lambda p: abs(p.s - s))
     return scales.move(near.q, near.tangent.rate * (s - near.s) / scales.q)

@@ -12,11 +12,10 @@ from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_number, read_numbers
 from ..texts import shown
-from .driven_coordinates import DrivenCoordinates
+from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic import complete, start_from
 from .open_joint import describe_gap
-from .path_following import StraightPath
 from .singular import Singular
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def motion_range(
     t: float = 0.0,
     within: tuple[float, float] | None = None,
 ) -> MotionRange:
-    """The limits between which a coordinate can move the mechanism, found by walking both ways.
+    """The limits between which a coordinate can move the mechanism, followed both ways.
 
     Parameters
     ----------
@@ -94,10 +93,10 @@ def motion_range(
     if parameters is not None or inputs is not None:
         module = module.bind(parameters, inputs)
     with np.errstate(all="ignore"):
-        return _walk_both_ways(module, name, initial, t, within)
+        return _follow_both_ways(module, name, initial, t, within)
 
 
-def _walk_both_ways(
+def _follow_both_ways(
     module: BoundModel,
     name: str,
     initial: Start,
@@ -134,8 +133,8 @@ def _walk_both_ways(
         y1 = np.zeros(len(y))
         if k >= 0:
             y1[k] = sign
-        path = StraightPath(t, y, sign if name == "t" else 0.0, y1)
-        followed = FollowedPath(driven, path, q, abs(bound - here))
+        path = DrivenPath(driven, t, y, sign if name == "t" else 0.0, y1)
+        followed = FollowedPath(path, q, abs(bound - here))
         singular += followed.singular
         gap = ""
         if followed.stop is not None:

@@ -13,27 +13,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import EomgenError
-from ..limits.constraints import ACCEPTED, AT_ONCE, SETTLED
 from ..limits.motions import NULL
 from ..numeric import algebra
-from ..numeric.projection import largest, within
-from ..numeric.scales import Array
+from ..numeric.closure import ClosureSystem, WantedValues, close, closed
+from ..numeric.constraint_system import ConstraintSystem
+from ..numeric.continuation import Continuation
+from ..numeric.curves import Point, Tangent
+from ..numeric.scales import Array, Scales
+from ..runtime.constraint_kernels import constraint_system
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
 STEPS = 25  #: Newton steps
-LONGEST = 0.3  #: largest scaled Newton step
-
-
-class Tangent(NamedTuple):
-    """The direction of the motion at one point."""
-
-    rate: Array  #: (n_v,) dq/ds as velocities
-    quality: float  #: smallest over largest singular value of K: 0 at a singular position
-    sign: float  #: of the determinant of as many independent rows of K as there are columns
-    free: Array  #: (n_v,) scaled motion that K restrains least
-    rows: Array  #: (n_c + k,) rows of K that hold that motion least
 
 
 class DrivenCoordinates:
@@ -52,76 +44,40 @@ class DrivenCoordinates:
         self.layout = layout = module.layout
         self.scales = layout.scales
         kernels = module.kernels
-        self._C, self._C_q = kernels.state("constraints", nan=True), kernels.state("constraint_jacobian", nan=True)
+        self.system: ConstraintSystem = constraint_system(kernels)
         self._rate = kernels.state("velocity_constraints", nan=True)
         known = layout.rank and "kinematics" in kernels.core.names
         self._kinematics = kernels.state("kinematics", nan=True) if known else None
         self._loops = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
-        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_loop_coordinates else None
         chosen = [layout.velocity_labels[i] for i in layout.independent]
         #: whether the compiled kernel leads the same coordinates
         self.direct = self._kinematics is not None and list(led) == chosen and set(chosen) <= set(layout.q)
-        self.in_tree = [name in layout.q for name in led]
-        self.columns = [
-            int(self.scales.velocities([layout.q.index(name)])[0]) if tree else layout.loops.index(name)
-            for name, tree in zip(led, self.in_tree, strict=True)
-        ]
-        kinds = [
-            layout.coordinate_kinds[layout.q.index(name)] if tree else layout.loop_kinds[layout.loops.index(name)]
-            for name, tree in zip(led, self.in_tree, strict=True)
-        ]
-        self.wraps = np.array([not tree and kind == "angle" for tree, kind in zip(self.in_tree, kinds, strict=True)])
-        self.led_scales = np.array([layout.length if kind == "length" else 1.0 for kind in kinds])
+        wanted = self.system.wanted(dict.fromkeys(led, 0.0), self.led)
+        nothing = WantedValues(lambda q: (np.empty(0), np.empty((0, layout.n_v))), np.empty(0), np.empty(0), [], [])
+        self._wanted = nothing if wanted is None else wanted
+        self.led_scales, self.wraps = self._wanted.scales, np.array(self._wanted.angles, dtype=bool)
         self._zero = np.zeros(layout.n_v)
-        n = layout.n_v
-        self._rows_y = np.zeros((len(led), n))
-        for k, (tree, column) in enumerate(zip(self.in_tree, self.columns, strict=True)):
-            if tree:
-                self._rows_y[k, column] = self.scales.q[column] / self.led_scales[k]
         independent = layout.rows if layout.rank else np.empty(0, dtype=np.intp)
         self._square = np.concatenate([independent, layout.n_c + np.arange(len(led))]).astype(np.intp)
 
-    # led coordinates
+    # positions
 
     def led_values(self, q: Array, t: float) -> Array:
         """y (k,) at a position."""
-        loops = self._loop_values(q, t)[0] if not all(self.in_tree) else ()
-        found = [
-            q[self.layout.q.index(name)] if tree else loops[column]
-            for name, tree, column in zip(self.led, self.in_tree, self.columns, strict=True)
-        ]
-        return np.array(found, dtype=float)
+        return self.system.at(t).measure(self.led, q)[0]
 
-    def _loop_values(self, q: Array, t: float, v: Array | None = None, a: Array | None = None) -> Array:
-        assert self._loops is not None
-        zero = self._zero
-        values: Array = np.asarray(self._loops(q, zero if v is None else v, zero if a is None else a, t=t), dtype=float)
-        return values
+    def equations(self, t: float, y: Array) -> WantedValues:
+        """The led coordinates as equations."""
+        measure = self.system.at(t).measure
+        return self._wanted._replace(evaluate=lambda q: measure(self.led, q), values=y)
 
-    def _gap(self, q: Array, y: Array, t: float) -> Array:
-        """Scaled y(q) - y."""
-        gap = self.led_values(q, t) - y
-        wrapped = np.remainder(gap + np.pi, 2 * np.pi) - np.pi
-        return np.asarray(np.where(self.wraps, wrapped, gap) / self.led_scales)
+    def closure(self, t: float, y: Array) -> ClosureSystem:
+        """The constraints and the led coordinates, all of them as equations."""
+        return ClosureSystem(self.system.at(t).position, self.scales, np.ones(self.layout.n_v), self.equations(t, y))
 
     def matrix(self, q: Array, t: float) -> Array:
         """K (n_c + k, n_v), scaled."""
-        J = self.scales.jacobian(self._C_q(q, t=t)) if self.layout.n_c else np.empty((0, self.layout.n_v))
-        rows = self._rows_y
-        if not all(self.in_tree):
-            assert self._loop_q is not None
-            y_q = self._loop_q(q, t=t) * self.scales.q
-            rows = rows.copy()
-            for k, (tree, column) in enumerate(zip(self.in_tree, self.columns, strict=True)):
-                if not tree:
-                    rows[k] = y_q[column] / self.led_scales[k]
-        return np.concatenate([J, rows])
-
-    # positions
-
-    def closure(self, q: Array, t: float) -> tuple[Array, Array]:
-        """C (n_h,) and C_q (n_c, n_v)."""
-        return self._C(q, t=t), self._C_q(q, t=t)
+        return self.closure(t, self._wanted.values).evaluate(q)[1]
 
     def position(self, t: float, y: Array, guess: Array) -> Array | None:
         """The closed position (n_q,) next to a guess; None if Newton's iteration finds none."""
@@ -130,27 +86,8 @@ class DrivenCoordinates:
             still = np.zeros(2 * len(y))
             q = self._kinematics(np.concatenate([y, still, guess]), t=t)[: self.layout.n_q]
             return q if np.isfinite(q).all() else None
-        if not np.isfinite(guess).all():
-            return None
-        q, before = guess, np.inf
-        for step in range(STEPS + 1):
-            C = self._C(q, t=t)
-            e = np.concatenate([self.scales.residual(C), self._gap(q, y, t)])
-            size = largest(e)
-            if size <= AT_ONCE or not np.isfinite(size):
-                return q if size <= AT_ONCE else None
-            K = self.matrix(q, t)
-            K = np.concatenate([K[: len(C)], K[self.layout.n_c :]])
-            rounded = self.scales.rounding(q, K)
-            if step and size > 0.5 * before and within(e, SETTLED, rounded):
-                return q
-            if step == STEPS:
-                break
-            dz = algebra.lstsq(K, e, rcond=NULL)
-            longest = largest(dz)
-            q = self.scales.move(q, -dz * min(1.0, LONGEST / longest) if longest else dz)
-            before = size
-        return q if within(e, ACCEPTED, rounded) else None
+        q, residual = close(self.closure(t, y), guess, STEPS, damping=None)
+        return q if closed(residual) else None
 
     # motion
 
@@ -188,13 +125,10 @@ class DrivenCoordinates:
         K = self.matrix(q, t)
         v = self.scales.q * algebra.lstsq(K, self.right(q, t, 1.0, y1), rcond=NULL)
         a = self._some_acceleration(t, q, v)
-        if not all(self.in_tree):
-            second = self._loop_values(q, t, v, a)[2]
-        gap = [
-            y2[k] - (a[column] if tree else second[column])
-            for k, (tree, column) in enumerate(zip(self.in_tree, self.columns, strict=True))
-        ]
-        right = np.concatenate([np.zeros(layout.n_c), np.array(gap, dtype=float) / self.led_scales])
+        loops = () if self._loops is None else self._loops(q, v, a, t=t)[2]
+        own = dict(zip((*layout.velocity_labels, *layout.loops), (*a, *loops), strict=True))
+        gap = y2 - np.array([own[name] for name in self.led])
+        right = np.concatenate([np.zeros(layout.n_c), gap / self.led_scales])
         a = a + self.scales.q * algebra.lstsq(K, right, rcond=NULL)
         return v, a
 
@@ -220,3 +154,41 @@ class DrivenCoordinates:
             return self.module.rhs(t, np.concatenate([q, v]))[layout.n_q :]
         except EomgenError:
             return np.full(layout.n_v, np.nan)
+
+
+class DrivenPath(NamedTuple):
+    """A straight path of a driven mechanism: t and the led values are linear in s."""
+
+    driven: DrivenCoordinates
+    t: float
+    y: Array
+    t1: float  #: dt/ds
+    y1: Array  #: dy/ds
+
+    @property
+    def scales(self) -> Scales:
+        """The scales of positions."""
+        return self.driven.scales
+
+    def at(self, s: float) -> tuple[float, Array]:
+        """Time and led values."""
+        return self.t + s * self.t1, self.y + s * self.y1
+
+    def beyond(self, s: float) -> DrivenPath:
+        """The rest of the path from s on."""
+        return DrivenPath(self.driven, *self.at(s), self.t1, self.y1)
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position of the path."""
+        return self.driven.tangent(self.at(s)[0], q, self.t1, self.y1)
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess."""
+        q = self.driven.position(*self.at(s), guess)
+        return None if q is None else Point(s, q, self.tangent(s, q))
+
+
+class DrivenContinuation(Continuation):
+    """A continuation along such a path."""
+
+    curve: DrivenPath

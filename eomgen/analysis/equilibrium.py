@@ -111,9 +111,9 @@ def _start(module: BoundModel, guess: Any, held: Mapping[str, float], t: float) 
         q = q[: module.n_q]
     if held:
         if not module.layout.n_h:
-            return initial.with_values(q, held)
+            return initial.system.with_values(q, held)
         try:
-            return initial.walk(q, held)
+            return initial.follow(q, held)
         except AssemblyError:
-            return initial.close(q, held).q
-    return initial.close(q, {}).q if module.layout.n_h else q
+            return initial.system.close(q, held).q
+    return initial.system.close(q, {}).q if module.layout.n_h else q

@@ -5,20 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.motions import ALIGNED, POOR, SAME
+from ..numeric.curves import ASTRAY, Point, interpolate
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant
-from .driven_coordinates import DrivenCoordinates
-from .path_following import Continuation, Point, StraightPath
+from .driven_coordinates import DrivenContinuation, DrivenPath
 from .singular import Singular, find_change_points, find_stop, name_singular
-
-ASTRAY = 0.02  #: scaled distance of a result from its guess that may mean another branch
 
 
 class FollowedPath:
-    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is smooth and was walked before.
+    """A continuation from s = 0 to ``end``, or as far as it goes; the way to ``known`` is known to be smooth.
 
-    ``extent`` is that of :class:`~.path_following.Continuation`.
+    ``extent`` is that of :class:`~..numeric.continuation.Continuation`.
 
     Attributes
     ----------
@@ -30,17 +28,10 @@ class FollowedPath:
         Change points on the way.
     """
 
-    def __init__(
-        self,
-        driven: DrivenCoordinates,
-        path: StraightPath,
-        start: Array,
-        end: float,
-        known: float = 0.0,
-        extent: float = 0.0,
-    ) -> None:
-        self.driven, self.path, self.end = driven, path, end
-        self.continuation = continuation = Continuation(driven, path, start, extent)
+    def __init__(self, path: DrivenPath, start: Array, end: float, known: float = 0.0, extent: float = 0.0) -> None:
+        self.path, self.end = path, end
+        self.driven = driven = path.driven
+        self.continuation = continuation = DrivenContinuation(path, start, extent)
         whole = continuation.to(end, known)
         self.interpolants, self.singular = find_change_points(continuation)
         self.stop: Singular | None = None
@@ -49,8 +40,6 @@ class FollowedPath:
             self.reached, last = find_stop(continuation, continuation.points[-1])
             self.stop = name_singular(driven, "stop", path.at(self.reached)[0], last.q, last.tangent)
         self.nodes = np.array([p.s for p in continuation.points])
-        self._values = np.array([p.q for p in continuation.points]).T
-        self._slopes = np.array([driven.scales.rates(p.q, p.tangent.rate) for p in continuation.points]).T
 
     @property
     def smooth(self) -> bool:
@@ -77,7 +66,7 @@ class FollowedPath:
         y1, y2 = self._rates(len(s)) if rates is None else rates
         layout = self.driven.layout
         q, v, a = (np.empty((n, len(s))) for n in (layout.n_q, layout.n_v, layout.n_v))
-        guesses = self._guesses(s)
+        guesses = interpolate(self.continuation.points, self.driven.scales, s)
         odd = np.ones(len(s), dtype=bool)
         if self.driven.direct:
             t, y = self._along(s)
@@ -98,21 +87,6 @@ class FollowedPath:
     def _edge(self) -> float:
         """The parameter from which on the position is that of the stop."""
         return np.inf if self.stop is None else self.reached - SAME * max(1.0, self.end)
-
-    def _guesses(self, s: Array) -> Array:
-        """Cubic interpolation between the points of the continuation (n_q, k)."""
-        points, scales = self.continuation.points, self.driven.scales
-        if len(points) == 1:
-            return np.repeat(points[0].q[:, None], len(s), axis=1)
-        k = np.clip(np.searchsorted(self.nodes, s), 1, len(points) - 1)
-        width = self.nodes[k] - self.nodes[k - 1]
-        x = np.clip((s - self.nodes[k - 1]) / width, 0.0, 1.0)
-        q0, q1 = self._values[:, k - 1], self._values[:, k]
-        d0, d1 = self._slopes[:, k - 1] * width, self._slopes[:, k] * width
-        result: Array = q0 + x * (d0 + x * (3 * (q1 - q0) - 2 * d0 - d1 + x * (2 * (q0 - q1) + d0 + d1)))
-        for i, _ in scales.space.quaternion_slots if scales.space is not None else ():
-            result[i : i + 4] /= np.sqrt((result[i : i + 4] ** 2).sum(axis=0))
-        return result
 
     def _rates(self, k: int) -> tuple[Array, Array]:
         rate = self.path.y1 / (self.path.t1 or 1.0)
@@ -145,14 +119,13 @@ class FollowedPath:
         return q, v, a
 
     def _closer(self, s: float, guess: Array) -> Array:
-        """The position next to a guess, walked to from the nearest point if Newton's iteration goes astray."""
+        """The position next to a guess, followed to from the nearest point if Newton's iteration goes astray."""
         driven, scales = self.driven, self.driven.scales
         found = driven.position(*self.path.at(s), guess)
         if found is not None and largest(scales.distance(found, guess)) <= ASTRAY:
             return found
         before = self._neighbours(s)[0] if len(self.nodes) > 1 else self.continuation.points[0]
-        t, y = self.path.at(before.s)
-        short = Continuation(driven, StraightPath(t, y, self.path.t1, self.path.y1), before.q)
+        short = DrivenContinuation(self.path.beyond(before.s), before.q)
         short.to(s - before.s)
         return short.points[-1].q
 

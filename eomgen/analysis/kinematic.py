@@ -1,7 +1,7 @@
 """Analysis: a Module, times and led coordinates -> positions, velocities and accelerations over the range.
 
-Masses and forces play no part.  The range is walked from the initial position, so that the mechanism stays on its
-branch; positions between the points of the walk are then solved from cubic guesses.
+Masses and forces play no part.  The range is followed from the initial position, so that the mechanism stays on its
+branch; positions between the points of the continuation are then solved from cubic guesses.
 """
 
 from __future__ import annotations
@@ -22,19 +22,18 @@ from ..runtime.near_names import unknown
 from ..runtime.refusals import require_velocities
 from ..runtime.room import read_flag, read_numbers, read_value, require_room
 from ..texts import shown
-from .driven_coordinates import DrivenCoordinates
+from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic_motion import KinematicAnalysis, keep
 from .known_range import KnownRange
 from .open_joint import describe_gap
-from .path_following import StraightPath
 from .singular import Singular
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
     from ..runtime.initial import Initial
 
-LONGEST = 4000.0 * np.pi  #: radians or length scales walked at most, 2000 turns
+LONGEST = 4000.0 * np.pi  #: radians or length scales followed at most, 2000 turns
 
 
 class Range(NamedTuple):
@@ -109,7 +108,7 @@ def kinematic_analysis(
 ) -> KinematicAnalysis:
     """Positions, velocities and accelerations over a range of time or of coordinates, without forces.
 
-    The range is walked from the initial position in small steps, so the mechanism stays on its branch, also through
+    The range is followed from the initial position in small steps, so the mechanism stays on its branch, also through
     change points, where others meet it.
 
     Parameters
@@ -118,7 +117,7 @@ def kinematic_analysis(
         Times (s), for drivers; 0 by default.
     initial : mapping of str to float, or (n_q,) or (n_x,) array, optional
         Where to start, at the first time: named coordinates, or a position such as one of ``branches()``.  The
-        declared initial position at t = 0 by default, from where it is walked to the first point; if that is a
+        declared initial position at t = 0 by default, from where it is followed to the first point; if that is a
         dead centre of the led coordinates, the branch is the one found next to it.
     parameters, inputs : optional
         As for :meth:`bind`.
@@ -207,7 +206,7 @@ def start_from(module: BoundModel, initial: Start, t0: float) -> tuple[float, Ar
         q = q[: layout.n_q]
     if q.shape != (layout.n_q,):
         raise UsageError(f"initial must name values or have shape ({layout.n_q},) or ({layout.n_x},), not {q.shape}")
-    return t0, here.close(q, {}).q if layout.n_h else q
+    return t0, here.system.close(q, {}).q if layout.n_h else q
 
 
 def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tuple[str, ...]:
@@ -257,13 +256,13 @@ def complete(module: BoundModel, q: Array, t: float, names: Sequence[str]) -> tu
 
 
 def _refuse_long_ways(driven: DrivenCoordinates, names: Sequence[str], y: Array) -> None:
-    """Ways of more than LONGEST are not walked: they take hours, and positions repeat."""
+    """Ways of more than LONGEST are not followed: they take hours, and positions repeat."""
     ways = np.abs(np.diff(y, axis=1)).sum(axis=1) / driven.led_scales
     k = int(ways.argmax()) if ways.size else 0
     if ways.size and ways[k] > LONGEST:
         raise UsageError(
-            f"the range of {names[k]}, walked from the initial position on, is {ways[k]:.6g} rad or length scales long "
-            f"({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are walked; the positions of a turn "
+            f"the range of {names[k]}, followed from the initial position on, is {ways[k]:.6g} rad or length scales "
+            f"long ({ways[k] / (2 * np.pi):.6g} turns), and at most {LONGEST:.6g} are followed; positions of a turn "
             "repeat, so give angles within a turn, or an initial position near the first point"
         )
 
@@ -295,7 +294,7 @@ def follow_to_start(
     length = largest(np.concatenate([(y0 - y) / driven.led_scales, [t0 - t]]))
     if length <= UNMOVED:
         return q
-    followed = FollowedPath(driven, StraightPath(t, y, (t0 - t) / length, (y0 - y) / length), q, length)
+    followed = FollowedPath(DrivenPath(driven, t, y, (t0 - t) / length, (y0 - y) / length), q, length)
     if followed.stop is not None:
         raise PartitionError(
             f"the way from the initial position to the first point is blocked: {followed.stop}; give initial={{...}} "
@@ -320,11 +319,11 @@ def follow_range(driven: DrivenCoordinates, asked: Range, q: Array, partial: boo
         t, y = float(asked.t[first]), asked.y[:, first]
         dt, dy = asked.t[first : last + 1] - t, asked.y[:, first : last + 1] - y[:, None]
         length = abs(float(dt[-1])) or largest(dy[:, -1] / driven.led_scales)
-        path = StraightPath(t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
+        path = DrivenPath(driven, t, y, float(dt[-1]) / length if length else 0.0, dy[:, -1] / (length or 1.0))
         along = np.abs(dt) if dt[-1] else np.abs(dy / driven.led_scales[:, None]).max(axis=0, initial=0.0)
         extent = extents[0] if dt[-1] else extents[1]
-        followed = FollowedPath(driven, path, q, length, known_range.known(first, last) * length, extent)
-        known_range.walked(first, last, followed.smooth)
+        followed = FollowedPath(path, q, length, known_range.known(first, last) * length, extent)
+        known_range.note(first, last, followed.smooth)
         new = slice(0, None) if not columns else slice(1, None)  # a piece starts where the last one ended
         reach = np.array([followed.holds(s) for s in along])
         taken = np.arange(len(along))[new][reach[new]]

@@ -1,4 +1,4 @@
-"""Analysis: a range of one coordinate, or of time alone, to and fro -> the part of each way that was walked before."""
+"""Analysis: a range of one coordinate, or of time alone, to and fro -> the part of each way that is known already."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..numeric.scales import Array
 
 
 class KnownRange:
-    """What of a range to and fro on one line was walked already.
+    """What of a range to and fro on one line was followed already.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ class KnownRange:
         self.low = self.high = 0.0 if self.values is None else float(self.values[0])
 
     def known(self, first: int, last: int) -> float:
-        """The part of the way between two points, from the first on, that was walked and is smooth."""
+        """The part of the way between two points, from the first on, that was followed and is smooth."""
         if self.values is None or not self.low <= self.values[first] <= self.high:
             return 0.0
         start, end = float(self.values[first]), float(self.values[last])
         inside = min(max(end, self.low), self.high) - start
         return inside / (end - start) if end != start else 0.0
 
-    def walked(self, first: int, last: int, smooth: bool) -> None:
+    def note(self, first: int, last: int, smooth: bool) -> None:
         """Take note of a way; after one that is not smooth nothing is known any more."""
         if self.values is None:
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..limits.constraints import CONTRADICTION
-from ..numeric.closure import ClosureSystem, WantedValues, close
+from ..numeric.closure import close
 from ..numeric.scales import Array
 from .driven_coordinates import DrivenCoordinates
 
@@ -23,25 +23,10 @@ def describe_gap(driven: DrivenCoordinates, t: float, y: Array, near: Array) -> 
         A closed position beside it.
     """
     layout, scales = driven.layout, driven.scales
-    start, free = np.array(near), np.ones(layout.n_v)
-    for name, tree, column, value in zip(driven.led, driven.in_tree, driven.columns, y, strict=True):
-        if tree:  # held exactly, so that the gap opens at a joint
-            start[layout.q.index(name)] = value
-            free[column] = 0.0
-    loops = [k for k, tree in enumerate(driven.in_tree) if not tree]
-    sizes = driven.led_scales[loops]
-
-    def led(q: Array) -> tuple[Array, Array]:
-        rows = driven.matrix(q, t)[layout.n_c :][loops] / scales.q * sizes[:, None]
-        return driven.led_values(q, t)[loops], rows
-
-    def position(q: Array) -> tuple[Array, Array]:
-        return driven.closure(q, t)
-
-    names = [driven.led[k] for k in loops]
-    equations = WantedValues(led, y[loops], sizes, driven.wraps[loops].tolist(), names) if loops else None
-    with np.errstate(all="ignore"):
-        q, _ = close(ClosureSystem(position, scales, free, equations), start)
+    system, led = driven.system.at(t), dict(zip(driven.led, y.tolist(), strict=True))
+    with np.errstate(all="ignore"):  # coordinates of the tree are held exactly, so that the gap opens at a joint
+        q, _ = close(system.closure(led), system.with_values(near, led))
+    position = system.position
     C = position(q)[0]
     if not C.size:
         return "beyond, nothing is open"

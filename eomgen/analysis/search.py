@@ -90,9 +90,9 @@ class Search:
         module = self.bound(values)
         initial = Initial(module.kernels, self.t)
         if self.layout.n_h:
-            q = initial.close(q, self.held, restarts=0).q
+            q = initial.system.close(q, self.held, restarts=0).q
         elif self.held:
-            q = initial.with_values(q, self.held)
+            q = initial.system.with_values(q, self.held)
         held = self.gradients(module, q) if self.supported else None
         return SearchPoint(q, values, module, balance_forces(module, self.t, q, held, preferred))
 

@@ -1,4 +1,4 @@
-"""Analysis: walks -> the singular positions on them: where they are, and which coordinates and joints are to blame.
+"""Analysis: followed paths -> the singular positions on them: where they are, which coordinates and joints cause them.
 
 At a singular position a motion is possible while the led coordinates (and the drivers) stand still.  Either the branch
 goes on through it, beside others (a change point: the sign of det K changes), or the led coordinates turn back there (a
@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..limits.motions import BLOCKED, EXTREME, LEAPS, SINGULAR, UNJUDGED
+from ..numeric.curves import Point, Tangent
 from ..numeric.projection import largest
+from ..numeric.roots import SECTIONS, carry_out, find_root, search_least
 from ..numeric.scales import Array
 from .change_point_interpolant import ChangePointInterpolant, build_interpolant
-from .driven_coordinates import DrivenCoordinates, Tangent
-from .path_following import Continuation, Point
-from .roots import find_root
+from .driven_coordinates import DrivenContinuation, DrivenCoordinates
 
 LOW = 0.03  #: quality below which a minimum is looked into
 SHARE = 0.2  #: of the largest part, from which a coordinate or row is named
@@ -71,14 +71,14 @@ def name_singular(driven: DrivenCoordinates, kind: str, t: float, q: Array, tang
     return Singular(kind, t, values, q, moving, joints)
 
 
-def cross(continuation: Continuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
+def cross(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
     """The interpolant over a change of sign between two points, and where det K = 0 on it; None if there is none."""
-    driven, scales = continuation.driven, continuation.driven.scales
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
     for _ in range(60):
         if largest(scales.distance(after.q, before.q)) <= NARROW:
             break
         middle = 0.5 * (before.s + after.s)
-        found = continuation.solve(middle, ChangePointInterpolant([before, after], scales).at(middle)[0])
+        found = path.solve(middle, ChangePointInterpolant([before, after], scales).at(middle)[0])
         if found is None or found.tangent.quality < SINGULAR:
             break
         before, after = (found, after) if found.tangent.sign == before.tangent.sign else (before, found)
@@ -89,16 +89,16 @@ def cross(continuation: Continuation, before: Point, after: Point) -> tuple[Chan
         return None
     low, high = interpolant.supports[1].s, interpolant.supports[2].s
     middle = _root(continuation, interpolant, low, high)
-    t = continuation.path.at(middle)[0]
-    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, continuation.path.y1).quality
+    t = path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
     return (interpolant, middle) if quality < SINGULAR else None
 
 
-def _root(continuation: Continuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+def _root(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
     """Where det K changes its sign on an interpolant; where it does not, the nearest to singular."""
 
     def value(s: float) -> float:
-        return continuation.driven.determinant(continuation.path.at(s)[0], interpolant.at(s)[0])
+        return continuation.curve.driven.determinant(continuation.curve.at(s)[0], interpolant.at(s)[0])
 
     f_low, f_high = value(low), value(high)
     if not f_low * f_high < 0.0:
@@ -106,26 +106,24 @@ def _root(continuation: Continuation, interpolant: ChangePointInterpolant, low: 
     return find_root(value, low, high, f_low, f_high)
 
 
-def _worst(continuation: Continuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
+def _worst(continuation: DrivenContinuation, interpolant: ChangePointInterpolant, low: float, high: float) -> float:
     """Where an interpolant is nearest to singular, by golden section."""
 
     def quality(s: float) -> float:
-        return continuation.tangent(s, interpolant.at(s)[0]).quality
+        return continuation.curve.tangent(s, interpolant.at(s)[0]).quality
 
-    part = 0.5 * (5.0**0.5 - 1.0)
-    for _ in range(60):
-        a, b = high - part * (high - low), low + part * (high - low)
-        low, high = (low, b) if quality(a) < quality(b) else (a, high)
-    return 0.5 * (low + high)
+    middle = 0.5 * (low + high)
+    width = (high - low) * 0.6**SECTIONS
+    return carry_out(search_least(low, middle, high, quality(middle), width), quality)[1]
 
 
-def find_stop(continuation: Continuation, last: Point) -> tuple[float, Point]:
+def find_stop(continuation: DrivenContinuation, last: Point) -> tuple[float, Point]:
     """The stop of a blocked continuation, s and the position there, to full precision where one coordinate is led.
 
     There the path is followed by the coordinate that still moves, w: s(w) has its extreme at the stop.
     """
-    driven, scales = continuation.driven, continuation.driven.scales
-    y1, t1 = continuation.path.y1, continuation.path.t1
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
+    y1, t1 = path.y1, path.t1
     tangent = last.tangent
     if t1 or np.count_nonzero(y1) != 1:
         return last.s, last
@@ -138,7 +136,7 @@ def find_stop(continuation: Continuation, last: Point) -> tuple[float, Point]:
             break
         led = (*driven.led[:k], name, *driven.led[k + 1 :])
         other = DrivenCoordinates(driven.module, led)
-        t = continuation.path.t
+        t = path.t
         q = last.q
         for _ in range(30):  # dy/dw = 0 by secant steps, w the scaled value of the free coordinate
             y = other.led_values(q, t)
@@ -152,7 +150,7 @@ def find_stop(continuation: Continuation, last: Point) -> tuple[float, Point]:
             q = found
             if abs(step) < BLOCKED:
                 break
-        s = float((driven.led_values(q, t)[k] - continuation.path.y[k]) / y1[k])
+        s = float((driven.led_values(q, t)[k] - path.y[k]) / y1[k])
         if abs(s - last.s) * abs(y1[k]) / driven.led_scales[k] < UNJUDGED:
             return s, Point(s, q, driven.tangent(t, q, 0.0, y1))
     return last.s, last
@@ -185,15 +183,15 @@ def _to_extreme(other: DrivenCoordinates, driven: DrivenCoordinates, k: int, t: 
     return -slope(q) / curvature if curvature else None
 
 
-def touch(continuation: Continuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
+def touch(continuation: DrivenContinuation, before: Point, after: Point) -> tuple[ChangePointInterpolant, float] | None:
     """As :func:`cross` where the quality has a minimum between two points, and det K need not change its sign."""
-    driven, scales = continuation.driven, continuation.driven.scales
+    path, driven, scales = continuation.curve, continuation.curve.driven, continuation.scales
     for _ in range(60):
         if largest(scales.distance(after.q, before.q)) <= NARROW:
             break
         rough = ChangePointInterpolant([before, after], scales)
         third = (after.s - before.s) / 3.0
-        found = [continuation.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
+        found = [path.solve(s, rough.at(s)[0]) for s in (before.s + third, after.s - third)]
         one, other = found
         if one is None or other is None or min(one.tangent.quality, other.tangent.quality) < SINGULAR:
             break
@@ -202,13 +200,16 @@ def touch(continuation: Continuation, before: Point, after: Point) -> tuple[Chan
     if interpolant is None:
         return None
     middle = _worst(continuation, interpolant, interpolant.supports[1].s, interpolant.supports[2].s)
-    t = continuation.path.at(middle)[0]
-    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, continuation.path.y1).quality
+    t = path.at(middle)[0]
+    quality = driven.tangent(t, interpolant.at(middle)[0], 0.0, path.y1).quality
     return (interpolant, middle) if quality < SINGULAR else None
 
 
-def find_change_points(continuation: Continuation) -> tuple[list[tuple[ChangePointInterpolant, float]], list[Singular]]:
+def find_change_points(
+    continuation: DrivenContinuation,
+) -> tuple[list[tuple[ChangePointInterpolant, float]], list[Singular]]:
     """Interpolants over the change points of a continuation, and the change points themselves, in order."""
+    path = continuation.curve
     leapt = {id(before) for before, _ in continuation.leaps}
     points = continuation.points
     crossings: list[tuple[ChangePointInterpolant, float]] = []
@@ -224,11 +225,7 @@ def find_change_points(continuation: Continuation) -> tuple[list[tuple[ChangePoi
     found = []
     for interpolant, middle in crossings:
         q = interpolant.at(middle)[0]
-        found.append(
-            name_singular(
-                continuation.driven, "change point", continuation.path.at(middle)[0], q, continuation.tangent(middle, q)
-            )
-        )
+        found.append(name_singular(path.driven, "change point", path.at(middle)[0], q, path.tangent(middle, q)))
     return crossings, found
 
 

@@ -21,8 +21,8 @@ from ..runtime.room import read_number
 from ..runtime.storage import table_path
 from .tables import as_html, as_text, number
 from .workspace_conditions import ConditionReader, Conditions, WorkspaceSingular, find_conditions
+from .workspace_flood import OUT, REACHED, Flood, Stage, flood
 from .workspace_grid import Grid, read_grid
-from .workspace_walk import OUT, REACHED, Flood, Stage, flood
 
 if TYPE_CHECKING:
     import pandas
@@ -267,7 +267,7 @@ def workspace(
 ) -> Workspace:
     """What outputs can reach over a grid of independent coordinates, and how well conditioned it is there.
 
-    The grid is walked from the initial position, neighbour to neighbour, so that the mechanism stays on its branch.
+    The grid is followed from the initial position, neighbour to neighbour, so that the mechanism stays on its branch.
 
     Parameters
     ----------

@@ -14,11 +14,11 @@ import numpy as np
 from ..errors import UsageError
 from ..limits.motions import DEGENERATE, NEGLIGIBLE, NULL, SINGULAR
 from ..numeric import algebra
+from ..numeric.roots import find_root
 from ..numeric.scales import Array
-from .roots import find_root
 from .singular import SHARE, Singular
+from .workspace_flood import OUT, Flood, Stage
 from .workspace_grid import Index
-from .workspace_walk import OUT, Flood, Stage
 
 
 class WorkspaceSingular(NamedTuple):

@@ -1,6 +1,7 @@
 """Stage emit: files of eomgen and what of them is reached -> their text without the rest.
 
-What stays is the text of eomgen, but for its documentation, of which the first paragraph stays.
+What stays is the text of eomgen, but for its documentation, of which the first paragraph stays: of files, of classes,
+and of the functions that users call.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ from .selection import Selection
 from .uses import Import, SourceText, assigned, is_text, is_typing
 
 
-def abridge(selection: Selection, file: str) -> str:
-    """The text of a file with what is reached of it."""
-    return _AbridgedText(selection, selection.sources[file]).written()
+def abridge(selection: Selection, file: str, documented: bool = True) -> str:
+    """The text of a file with what is reached of it, functions with their documentation or without."""
+    return _AbridgedText(selection, selection.sources[file], documented).written()
 
 
 class _AbridgedText:
     """The lines of a file, some of which go."""
 
-    def __init__(self, selection: Selection, source: SourceText) -> None:
-        self.selection, self.source = selection, source
+    def __init__(self, selection: Selection, source: SourceText, documented: bool) -> None:
+        self.selection, self.source, self.documented = selection, source, documented
         self.lines: list[str | None] = list(source.text.splitlines())
         self._shorten(source.tree)
         for node in sorted(source.tree.body, key=_order):
@@ -131,6 +132,9 @@ class _AbridgedText:
     def _shorten(self, node: ast.Module | ast.ClassDef | ast.FunctionDef) -> None:
         """Keep the first paragraph of a docstring."""
         if not is_text(node.body[0]):
+            return
+        if isinstance(node, ast.FunctionDef) and not self.documented and len(node.body) > 1:
+            self._cut(node.body[0])
             return
         first, last = node.body[0].lineno - 1, node.body[0].end_lineno or 0
         empty = [k for k in range(first, last) if not (self.lines[k] or "").strip()]

@@ -13,6 +13,7 @@ from .uses import SourceText
 LEFT_OUT = {
     "analysis/impact": "events with impacts",
     "numeric/assembly_failure": "what keeps loops from closing",
+    "numeric/leaps": "motions over change points",
     "numeric/splines": "cubic tables",
     "runtime/culprit": "what a failure is due to",
     "runtime/origin": "where a result comes from",
@@ -65,7 +66,9 @@ def carry_slim(package: Mapping[str, str], signals: bool) -> dict[str, str]:
     for name in CALLS:
         selection.reach(f"simulation/{name}", name)
     selection.follow(PUBLIC)
-    texts = {f"{file}.py": abridge(selection, file) for file in sorted(selection.files) if f"{file}.py" not in own}
+    called = {file for file, _ in PUBLIC}
+    kept = [file for file in sorted(selection.files) if f"{file}.py" not in own]
+    texts = {f"{file}.py": abridge(selection, file, file in called) for file in kept}
     texts |= {f"{file}.py": _REFUSAL.format(left_out[file]) for file in sorted(selection.refused)}
     folders = sorted({name.partition("/")[0] for name in texts if "/" in name})
     return texts | {f"{name}/__init__.py": describe_folder(name) for name in folders}

@@ -6,7 +6,7 @@ It may stay where it asks for nothing that the others do not give, at all times 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,14 +17,15 @@ from ..errors import AssemblyError, ModelError
 from ..graph.substitute import symbols_of
 from ..limits.constraints import CONTRADICTION
 from ..numeric import Assembly, rank
+from ..numeric.constraint_system import ConstraintSystem
+from ..numeric.continuation import Continuation
+from ..numeric.held_path import HeldPath
 
 if TYPE_CHECKING:
     from .constraint_functions import ConstraintFunctions
 
 Array = NDArray[np.float64]
-FIRST = 1e-3  #: part of the span in the first step of a walk
-STEPS = 16  #: at most
-MOVE = 0.3  #: largest scaled motion in one step, so that the branch is kept
+FIRST, STEPS = 1e-3, 16  #: part of the span in the first step of a motion over it; its steps at most
 
 
 def driver_rows(functions: ConstraintFunctions) -> dict[int, str]:
@@ -63,26 +64,16 @@ def follow_drivers(functions: ConstraintFunctions, q: Array) -> list[Array]:
     jacobian = [e for row in functions.kinematics.constraints.jacobian for e in row]
     if not drivers or "t" in symbols_of(jacobian):
         return []
-    return [position for _, position in _walk(functions, q)][1::4]
+    return [position for _, position in _follow(functions.system, q, functions)][1::4]
 
 
-def _walk(functions: ConstraintFunctions, q: Array) -> Iterator[tuple[float, Array]]:
-    """Closed positions at times after 0, a small motion apart; the functions are at that time meanwhile."""
-    t, step = 0.0, FIRST * functions.kinematics.mechanism.simulation.end
-    try:
-        for _ in range(STEPS):
-            functions.set_time(t + step)
-            try:
-                found = functions.close({}, _guess(functions, q), restarts=0).q
-            except AssemblyError:
-                found = None
-            if found is None or np.abs(functions.scales.distance(found, q)).max() > MOVE:
-                step *= 0.3
-                continue
-            t, q, step = t + step, found, 2.0 * step
-            yield t, q
-    finally:
-        functions.set_time(0.0)
+def _follow(system: ConstraintSystem, q: Array, functions: ConstraintFunctions) -> list[tuple[float, Array]]:
+    """Closed positions at times after 0, a small motion apart."""
+    end = functions.kinematics.mechanism.simulation.end
+    continuation = Continuation(HeldPath(system, q, {}, end), q, fewest=STEPS)
+    continuation.step = FIRST
+    continuation.to(1.0, steps=STEPS)
+    return [(point.s * end, point.q) for point in continuation.points[1:]]
 
 
 def _guess(functions: ConstraintFunctions, q: Array) -> dict[str, float]:
@@ -95,9 +86,11 @@ def _others(functions: ConstraintFunctions, drivers: Sequence[int]) -> list[int]
     return [i for i in range(functions.m) if i not in drivers]
 
 
-def _needed(functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array) -> tuple[list[int], list[int]]:
+def _needed(
+    functions: ConstraintFunctions, drivers: Mapping[int, str], q: Array, t: float = 0.0
+) -> tuple[list[int], list[int]]:
     """Rows that count at a position, drivers in order as long as they add something; and the drivers left over."""
-    J = functions.scaled_jacobian(q)
+    J = functions.scaled_jacobian(q, t)
     kept = _others(functions, list(drivers))
     spare = []
     for row in drivers:
@@ -118,7 +111,7 @@ def _explain(
     """Why the mechanism cannot be assembled with its drivers."""
     free = functions.with_rows(_others(functions, list(drivers)))
     try:
-        q = free.close(given, guess).q
+        q = functions.close(given, guess, system=free).q
     except AssemblyError as loops:
         return loops  # not for the drivers' sake
     with np.errstate(all="ignore"):
@@ -134,7 +127,7 @@ def _explain(
     kept, spare = _needed(functions, drivers, q)
     if spare:
         try:
-            q = functions.with_rows(kept).close(given, guess).q
+            q = functions.close(given, guess, system=functions.with_rows(kept)).q
         except AssemblyError:
             pass
         else:
@@ -163,12 +156,10 @@ def _refuse_contradictions(functions: ConstraintFunctions, drivers: Mapping[int,
     kept, spare = _needed(functions, drivers, q)
     if not spare:
         return
-    needed = functions.with_rows(kept)
-    for t, here in _walk(needed, q):
-        functions.set_time(t)
-        if len(_needed(functions, drivers, here)[0]) > len(kept):
+    for t, here in _follow(functions.with_rows(kept), q, functions):
+        if len(_needed(functions, drivers, here, t)[0]) > len(kept):
             break  # the first position was singular; elsewhere all of them count
-        C = functions.scales.residual(functions.position(here)[0])
+        C = functions.scales.residual(functions.position(here, t)[0])
         if np.abs(C[spare]).max() > CONTRADICTION:
             raise _contradiction(functions, drivers, spare, here, t)
 
@@ -177,9 +168,7 @@ def _contradiction(
     functions: ConstraintFunctions, drivers: Mapping[int, str], spare: Sequence[int], q: Array, t: float
 ) -> ModelError:
     mechanism = functions.kinematics.mechanism
-    functions.set_time(t)
-    C = functions.position(q)[0]
-    functions.set_time(0.0)
+    C = functions.position(q, t)[0]
     deaf = [row for row in spare if not _felt(functions, drivers, row, q)]
     others = [name for row, name in drivers.items() if row not in spare]
     freedoms = len(others)
@@ -215,7 +204,8 @@ def _felt(functions: ConstraintFunctions, drivers: Mapping[int, str], row: int, 
     for moved in (0.0, 0.1, 0.3, 0.3):
         step = moved * random.uniform(-1.0, 1.0, functions.scales.q.size)
         try:
-            here = free.close({}, _guess(functions, functions.scales.move(q, step)), restarts=0).q if moved else q
+            start = _guess(functions, functions.scales.move(q, step))
+            here = functions.close({}, start, restarts=0, system=free).q if moved else q
         except AssemblyError:
             continue
         J = functions.scaled_jacobian(here)

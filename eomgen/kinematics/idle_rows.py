@@ -34,7 +34,7 @@ def require_finite(functions: ConstraintFunctions, q: Array) -> None:
     if finite.all():
         return
     k = functions.kinematics
-    bad = [k.constraints.labels[functions.rows[i]] for i in np.flatnonzero(~finite)]
+    bad = [k.constraints.labels[i] for i in np.flatnonzero(~finite)]
     discs = {c.name for c in k.mechanism.constraints if isinstance(c, RollingDisc)}
     place = ", ".join(f"{name} = {x:.6g}" for name, x in zip(k.names, q, strict=True))
     what = f"{', '.join(bad)}: not finite at the initial configuration {place}"

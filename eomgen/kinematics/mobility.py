@@ -152,25 +152,26 @@ def _find_mobility_assumed(functions: ConstraintFunctions, wanted: Sequence[str]
     if not functions.m:
         return _partition(functions, [zero], wanted)
     for k in range(5):  # some sizes close a loop and some do not
-        names = list(functions.values)
         trial = {n: x * (1.0 + 0.37 * k * ((7 * j) % 5)) for j, (n, x) in enumerate(functions.values.items())}
-        attempt = ConstraintFunctions(functions.kinematics, {n: trial[n] for n in names if n != "t"})
+        attempt = ConstraintFunctions(functions.kinematics, trial)
         try:
-            bent = functions.place.move(functions.neutral, 0.3 + 0.1 * np.arange(float(len(functions.place.q))))
+            bent = functions.system.scales.move(
+                functions.neutral, 0.3 + 0.1 * np.arange(float(len(functions.system.scales.q)))
+            )
             q = attempt.close({}, dict(zip(functions.kinematics.names, bent, strict=True))).q
         except AssemblyError:
             continue
         return _partition(attempt, [q, *_probe(attempt, q)], wanted)
-    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, len(functions.place.q)))
-    return _partition(functions, [functions.place.move(zero, step) for step in generic.astype(float)], wanted)
+    generic = np.random.default_rng(0).uniform(-1.0, 1.0, (PROBES, len(functions.system.scales.q)))
+    return _partition(functions, [functions.system.scales.move(zero, step) for step in generic.astype(float)], wanted)
 
 
 def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
     """More assembled configurations, reached along the null space from q."""
-    found = []
+    found, scales = [], functions.system.scales
     random = np.random.default_rng(1)
     if not functions.h:
-        return [functions.place.move(q, random.uniform(0.2, 0.9, len(functions.place.q))) for _ in range(PROBES)]
+        return [scales.move(q, random.uniform(0.2, 0.9, len(scales.q))) for _ in range(PROBES)]
     for k in range(PROBES):
         J = functions.place_jacobian(q)
         basis = algebra.svd(J)[2][rank(J).rank :]
@@ -178,7 +179,7 @@ def _probe(functions: ConstraintFunctions, q: Array) -> list[Array]:
         length = float(np.linalg.norm(step))
         if length == 0.0:
             break
-        start = functions.place.move(q, (0.1 + 0.1 * k) / length * step)
+        start = scales.move(q, (0.1 + 0.1 * k) / length * step)
         try:
             closed = functions.close({}, dict(zip(functions.kinematics.names, start, strict=True))).q
         except AssemblyError:
@@ -229,7 +230,8 @@ def _partition(functions: ConstraintFunctions, configurations: Sequence[Array], 
         configurations=len(configurations),
         ranks=ranks,
         samples=tuple(tuple(float(x) for x in sample) for sample in configurations),
-        n_positions=len(functions.place.q) - max(rank(functions.place_jacobian(x)).rank for x in configurations),
+        n_positions=len(functions.system.scales.q)
+        - max(rank(functions.place_jacobian(x)).rank for x in configurations),
         instantaneous=n - ranks[0],
         candidates=tuple((names[k], value) for k, value in rate_candidates(jacobians[0], chosen).items()),
         driven=any(not e.is_zero for e in kinematics.constraints.time_derivative),

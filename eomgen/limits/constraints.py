@@ -11,7 +11,6 @@ from __future__ import annotations
 
 # -- closed ----------------------------------------------------------------------------------------------------------
 EXACT = 1e-15  #: scaled residual of a row that is closed to its rounding, 4 to 5 eps
-AT_ONCE = 10.0 * EXACT  #: at which assembly stops without asking whether more can be had
 SETTLED = 1000.0 * EXACT  #: at which to stop when it falls no longer: rounding of the largest mechanisms
 ACCEPTED = 100.0 * SETTLED  #: largest of a projected or assembled state: what users are told is closed
 CONTRADICTION = 100.0 * ACCEPTED  #: of rows that no position closes, or whose rates differ by this part

@@ -1,9 +1,9 @@
-"""Limits: walks along constraints without forces, singular positions, workspaces."""
+"""Limits: motions along constraints without forces, singular positions, workspaces."""
 
 from __future__ import annotations
 
 #: Scaled way (rad, lengths) that a position is led along in small steps: 300 turns, 20,000 steps.
-WALKED = 2000.0
+FOLLOWED = 2000.0
 #: Scaled step along the constraints at which the nearest position is found, a thousand roundings.
 NEAREST = 1e-12
 #: Relative difference of two directions that count as one.
@@ -41,3 +41,5 @@ ASTRAY = 1e-5
 FLAT_CELL = 1e-12
 #: Scaled way to either side over which the rate of a led coordinate is differenced where it turns back.
 EXTREME = 1e-4
+#: Part of a path in time over which constraints are differenced at a position that stands still: the root of rounding.
+DRIFTED = 1e-6

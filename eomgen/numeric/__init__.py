@@ -11,10 +11,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
-    from .continuation import follow
+    from .assembly_velocity import Rates, VelocityEquations, assemble_velocity
+    from .constraint_system import Assembly, ConstraintSystem, CutJoints
     from .dependent import kinematics, solve_dependent
     from .embedded import Terms, accelerate, embed, embedded_mass, jacobian, rhs, unpack_terms
+    from .held_path import follow
     from .partitions import Partition, partition
     from .projection import correct_position, correct_velocity, project, tangent_projector
     from .ranks import Rank, choose_independent, conditioning, independent_rows, rank, redundant_rows
@@ -22,23 +23,24 @@ if TYPE_CHECKING:
 
 #: Where each name is defined; loaded on first use, because a module that only evaluates needs none of them.
 _HOMES = {
-    "Assembly": "assembly",
+    "Assembly": "constraint_system",
+    "ConstraintSystem": "constraint_system",
+    "CutJoints": "constraint_system",
     "Partition": "partitions",
     "Rank": "ranks",
-    "Rates": "assembly",
+    "Rates": "assembly_velocity",
     "Scales": "scales",
     "Terms": "embedded",
-    "VelocityEquations": "assembly",
+    "VelocityEquations": "assembly_velocity",
     "accelerate": "embedded",
-    "assemble": "assembly",
-    "assemble_velocity": "assembly",
+    "assemble_velocity": "assembly_velocity",
     "choose_independent": "ranks",
     "conditioning": "ranks",
     "correct_position": "projection",
     "correct_velocity": "projection",
     "embed": "embedded",
     "embedded_mass": "embedded",
-    "follow": "continuation",
+    "follow": "held_path",
     "independent_rows": "ranks",
     "jacobian": "embedded",
     "kinematics": "dependent",
@@ -54,6 +56,8 @@ _HOMES = {
 
 __all__ = [
     "Assembly",
+    "ConstraintSystem",
+    "CutJoints",
     "Partition",
     "Rank",
     "Rates",
@@ -61,7 +65,6 @@ __all__ = [
     "Terms",
     "VelocityEquations",
     "accelerate",
-    "assemble",
     "assemble_velocity",
     "choose_independent",
     "conditioning",

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..limits.constraints import ACCEPTED, AT_ONCE, EXACT, SETTLED, TIKHONOV
+from ..limits.constraints import ACCEPTED, EXACT, SETTLED, TIKHONOV
+from ..limits.motions import NULL
 from . import algebra
 from .projection import largest, within
 from .scales import Array, Position, Scales
@@ -58,10 +59,11 @@ class ClosureSystem(NamedTuple):
         return e, J * self.free
 
 
-def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = DAMPING) -> tuple[Array, float]:
+def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float | None = DAMPING) -> tuple[Array, float]:
     """Minimise the scaled residual from q.
 
-    Damping at first: none where q is near a closed position, so that directions that hardly count do not creep.
+    Damping at first: 0 where q is near a closed position, so that directions that hardly count do not creep; None for
+    steps of least squares, which keep all digits beside singular positions and may lead far away from them.
 
     Returns
     -------
@@ -74,7 +76,7 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = 
     long = system.scales.long
     for _ in range(steps):
         size = largest(e)
-        if size <= AT_ONCE or not np.isfinite(size):
+        if size <= EXACT or not np.isfinite(size):
             break
         steepness = np.sqrt((J * J).sum(axis=1))
         weights = 1.0 / np.where(steepness > STEEP, steepness, 1.0)
@@ -82,12 +84,10 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = 
         far = remoteness(e, steepness)
         unit = np.where(long, 4.0 * far, 1.0) if long is not None and far > FAR else np.ones_like(system.scales.q)
         K, f = J * weights[:, None] * unit, e * weights
-        G = K @ K.T
-        top = float(G.diagonal().max())
+        top = float((K * K).sum(axis=1).max(initial=0.0))
         if top == 0.0 or largest(K.T @ f) <= EXACT * top:
             break  # nothing that may move makes a difference
-        G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
-        dz = -K.T @ algebra.solve(G, f)
+        dz = _step(K, f, damping, top)
         longest = largest(dz)
         if longest > LONGEST:
             dz *= LONGEST / longest
@@ -98,7 +98,7 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = 
         if not gained > 0.0:  # NaN included
             if size <= SETTLED:
                 break
-            damping = max(10.0 * damping, LEAST)
+            damping = max(10.0 * (damping or 0.0), LEAST)
             if damping > MOST:
                 break
             continue
@@ -107,11 +107,20 @@ def close(system: ClosureSystem, q: Array, steps: int = STEPS, damping: float = 
         if settled:
             break
         # quadratic convergence at the end needs the damping to vanish with the residual
-        damping = min(0.1 * damping, size)
-        if damping < TIKHONOV:
-            damping = 0.0
+        if damping:
+            damping = min(0.1 * damping, size)
+            damping = 0.0 if damping < TIKHONOV else damping
     rounded = system.scales.rounding(q, J)
     return q, min(largest(e), ACCEPTED) if within(e, ACCEPTED, rounded) else largest(e)
+
+
+def _step(K: Array, f: Array, damping: float | None, top: float) -> Array:
+    """The damped step of least norm; ``top`` is the largest square of a row's length."""
+    if damping is None:
+        return -algebra.lstsq(K, f, rcond=NULL)
+    G = K @ K.T
+    G.flat[:: len(G) + 1] += (damping + TIKHONOV) * top
+    return np.asarray(-K.T @ algebra.solve(G, f))
 
 
 def remoteness(e: Array, steepness: Array) -> float:

@@ -1,137 +1,124 @@
-"""Stage numeric: a closed position, other values of held coordinates -> the position reached by moving there steadily.
+"""Stage numeric: a curve of positions and a point on it -> points further along, without ever leaving the branch.
 
-The way to stay on the branch the mechanism is on: small steps along the straight line of the held values.
+Predictor and corrector with step control (Allgower and Georg, Introduction to Numerical Continuation Methods, ch. 2
+and 6).  A step counts only if position and direction come out near to what the points before foretold: near a singular
+position another branch is near too, but runs in another direction.  A singular position itself is leapt over, to the
+point behind it that continues the motion smoothly, if there is one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import AssemblyError
-from .closure import DAMPING, ClosureSystem, WantedValues, close, closed
+from ..errors import UnavailableError
+from ..limits.motions import BLOCKED, UNJUDGED
+from .curves import OFF, TURNED, Point, predict
 from .projection import largest
-from .scales import Array, Indices, Position, Scales
+from .scales import Array
 
-STEP = 0.1  #: largest scaled change of a held value in one step
-JUMP = 0.6  #: largest scaled change of any coordinate in one step
-SMALLEST = 2.0**-10  #: of STEP, before giving up
-TIMED = 0.3  #: STEP of a walk in time, which is predicted
-TRIES = 4000  #: its steps and halvings
-LONGEST = 200.0  #: scaled distance too long to walk
-TRIALS = 5000  #: steps at most, those taken back included
+if TYPE_CHECKING:
+    from .curves import PositionCurve
+
+FIRST = 0.1  #: scaled motion in the first step
+LONG = 0.35  #: scaled motion aimed at in one step
+JUMP = 0.5  #: largest scaled motion in one step
+FEWEST = 50  #: steps of a continuation over time
+STEPS = 200_000  #: of one continuation
 
 
-def follow(
-    position: Position,
-    start: Array,
-    scales: Scales,
-    held: Indices,
-    values: Array,
-    equations: WantedValues | None = None,
-) -> Array:
-    """Move held coordinates, and functions y(q), from where they are to new values; the others follow.
+class Continuation:
+    """Follows one curve.
 
     Parameters
     ----------
-    position : callable
-        q (n,) -> C (m,), C_q (m, n).
-    start : (n,) array
-        A closed position.
-    held : (k,) array of int
-        Coordinates that are led; all four Euler parameters of a rotation or none.
-    values : (k,) array
-        Their values at the end, reached exactly.
-    equations : WantedValues, optional
-        Functions of q that are led to values as well.
-
-    Returns
-    -------
-    (n,) array
-
-    Raises
-    ------
-    AssemblyError
-        The way is blocked (a dead centre of a led coordinate), longer than 200 rad or length scales, or too winding
-        for the number of steps allowed, as the many turns of a fine thread are.
+    curve : PositionCurve
+    start : (n_q,) array
+        Position at s = 0.
+    extent : float, optional
+        Length in s of the whole range that the curve is a piece of: the pieces of a range to and fro need no shorter
+        steps than one way over all of it.
+    fewest : int
+        Steps at least, however still it stands, so that short driver pulses are not skipped.
     """
-    q, target = np.array(start), np.array(start)
-    target[held] = values
-    moving = scales.velocities(held)
-    free = np.ones_like(scales.q)
-    free[moving] = 0.0
-    way = (1.0 - free) * scales.distance(target, start)
-    gap = equations.difference(equations.evaluate(q)[0]) if equations else np.empty(0)
-    length = max(largest(way), largest(gap / equations.scales) if equations else 0.0)
-    if not length <= LONGEST:
-        raise AssemblyError(f"the way from the reference position is too long ({length:.3g} rad or length scales)")
-    done, step = 0.0, min(1.0, STEP / length) if length else 1.0
-    usual, trials = step, 0
-    while done < 1.0:
-        trials += 1
-        if trials > TRIALS:
-            raise AssemblyError(f"the way is too winding: {TRIALS} steps lead through {100 * done:.0f} % of it")
-        reached = min(1.0, done + step)
-        trial = np.array(q)
-        trial[held] = values if reached == 1.0 else scales.move(start, reached * way)[held]
-        part = equations._replace(values=equations.values + (1.0 - reached) * gap) if equations else None
-        system = ClosureSystem(position, scales, free, part)
-        for damping in (0.0, DAMPING):
-            moved, residual = close(system, trial, steps=15, damping=damping)
-            if closed(residual):
-                break
-        if closed(residual) and largest(scales.distance(moved, q)) <= JUMP:
-            q, done = moved, reached
-            step = min(2.0 * step, usual)
-        else:
-            step *= 0.5
-            if step < SMALLEST * usual:
-                raise AssemblyError(
-                    f"the way is blocked after {100 * done:.0f} % of it: there the loops stay open by "
-                    f"{residual:.2g} (scaled), or the mechanism jumps, as at a dead centre of what is led; "
-                    "lead another coordinate, or give a position on the other side"
-                )
-    return q
 
+    def __init__(self, curve: PositionCurve, start: Array, extent: float = 0.0, fewest: int = FEWEST) -> None:
+        self.curve, self.scales, self.extent, self.fewest = curve, curve.scales, extent, fewest
+        self.points = [Point(0.0, start, curve.tangent(0.0, start))]
+        self.leaps: list[tuple[Point, Point]] = []
+        self.blocked = False
+        rate = largest(self.points[0].tangent.rate / self.scales.q)
+        self.step = FIRST / rate if rate > 0.0 else 1.0
 
-def follow_time(position: Callable[[float], Position], start: Array, scales: Scales, end: float) -> Array:
-    """From a closed position at t = 0 to another time, in steps short enough to stay on the branch.
+    def to(self, end: float, known: float = 0.0, steps: int = STEPS) -> bool:
+        """Go on until s = end, or beyond if a leap ends there; returns False where the way is blocked before.
 
-    Parameters
-    ----------
-    position : callable
-        t -> (q (n,) -> C (m,), C_q (m, n)).
-    start : (n,) array
-        A closed position at t = 0.
-    scales : Scales
-    end : float
-        Time; what moves only because of it is moved.
+        Up to s = ``known`` the way was followed before and is smooth, so that only the motion limits the steps.
+        """
+        for _ in range(steps):
+            here = self.points[-1]
+            left = end - here.s
+            if left <= 0.0:
+                return True
+            longest = max(end / self.fewest, self.extent / self.fewest, known - here.s)
+            rate = largest(here.tangent.rate / self.scales.q)
+            self.step = min(self.step, longest, LONG / rate if rate > 0.0 else longest)
+            h = left if self.step >= left else min(self.step, 0.5 * left)
+            found = self.forward(here, h, end if h == left else here.s + h)
+            if found is None:
+                self.step = 0.5 * h
+                if self.step > BLOCKED * max(1.0, abs(here.s)):
+                    continue
+                found = self._leap(here)
+                if found is None:
+                    self.blocked = True
+                    return False
+                self.leaps.append((here, found))
+                self.step = found.s - here.s
+            self.points.append(found)
+        return self.points[-1].s >= end
 
-    Returns
-    -------
-    (n,) array
+    def reach(self, end: float, steps: int = STEPS) -> Point | None:
+        """The point at s = end, found between its ends where a leap goes on; None where the way is blocked before."""
+        if not self.to(end, steps=steps):
+            return None
+        last = self.points[-1]
+        if last.s == end:
+            return last
+        before = self.leaps[-1][0]
+        part = (end - before.s) / (last.s - before.s)
+        return self.curve.solve(end, self.scales.move(before.q, part * self.scales.distance(last.q, before.q)))
 
-    Raises
-    ------
-    AssemblyError
-        The way is blocked, or too long.
-    """
-    q, t, step = np.array(start), 0.0, end / 64.0
-    slope = np.zeros_like(scales.q)  # scaled motion per time in the last step
-    free = np.ones_like(scales.q)
-    for _ in range(TRIES):
-        if t == end:
-            return q
-        reached = end if abs(end - t) <= abs(step) else t + step
-        ahead = scales.move(q, slope * (reached - t))
-        trial, residual = close(ClosureSystem(position(reached), scales, free), ahead, steps=15)
-        change = scales.distance(trial, q)
-        if closed(residual) and largest(change) <= TIMED:
-            q, t, slope = trial, reached, change / (reached - t)
-            step *= 2.0 if largest(change) < 0.4 * TIMED else 1.0
-        else:
-            step *= 0.5
-            if abs(step) < SMALLEST**2 * abs(end):
-                break
-    raise AssemblyError(f"the way from t = 0 to t = {end:.6g} s is blocked at t = {t:.6g} s")
+    def forward(self, here: Point, h: float, s: float) -> Point | None:
+        """One step, None if it fails or is not a smooth continuation."""
+        bend = self._bend(here)
+        ahead = predict(self.scales, here, bend, h)
+        if not largest(self.scales.distance(ahead, here.q)) <= JUMP:
+            return None
+        found = self.curve.solve(s, ahead)
+        if found is None:
+            return None
+        off = largest(self.scales.distance(found.q, ahead))
+        move = largest(self.scales.distance(found.q, here.q))
+        turned = h * largest((found.tangent.rate - here.tangent.rate - h * bend) / self.scales.q)
+        worst = largest(np.array([off / max(OFF * move, UNJUDGED), turned / max(TURNED * move, UNJUDGED)]))
+        if not (worst <= 1.0 and move <= JUMP):
+            return None
+        if h >= 0.999 * self.step:
+            self.step = h * (2.0 if worst < 0.1 else 1.4 if worst < 0.4 else 1.0)
+        return found
+
+    def _leap(self, here: Point) -> Point | None:
+        """The point behind a singular position; a slim package stops there."""
+        try:
+            from .leaps import leap
+        except UnavailableError:
+            return None
+        return leap(self.curve, self.points, here)
+
+    def _bend(self, here: Point) -> Array:
+        """Second derivative along s, from the point before."""
+        before = self.points[max(len(self.points) - 2, 0)]
+        change, gap = here.tangent.rate - before.tangent.rate, here.s - before.s
+        return change / gap if gap > 0.0 else np.zeros_like(change)

@@ -67,6 +67,12 @@ class Assembled:
             The loops do not close with these values, or the values contradict each other.
         UsageError
             An unknown name.
+
+        Warns
+        -----
+        UserWarning
+            The values are not reached from the declared position without leaving its branch; the loops are then closed
+            from the nearest guess.
         """
         initial = self._initial(t, p, u)
         given = initial.sort(_numbers(values, named))
@@ -130,7 +136,7 @@ class Assembled:
         """
         initial = self._initial(t, p, u)
         given = initial.sort(_numbers(values, named)).positions
-        first = initial.assembled(given)
+        first = initial.assembled(given, rough=True)
         return initial.branches(given or initial.sort(self.layout.initial).positions, first)
 
     @both_names

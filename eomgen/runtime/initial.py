@@ -1,15 +1,15 @@
 """Stage runtime: values by name -> an assembled position or state.
 
 Values given explicitly are held exactly.  Declared initial values are held too, as long as the given ones leave them
-room: one after the other in the order of the model, each if it is independent of those before.  The way from the
-model's reference position is walked in small steps, so that the mechanism stays on its branch; where that way is
-blocked, the loops are closed from the nearest guess.
+room: one after the other in the order of the model, each if it is independent of those before.  The values are followed
+from the model's reference position, so that the mechanism stays on its branch; where that way is blocked, the loops are
+closed from the nearest guess, and a warning says so.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,14 +17,15 @@ import numpy as np
 from ..errors import AssemblyError
 from ..limits.constraints import INDEPENDENT, MEASURED, SETTLED, SHORT, STILL, UNMOVED
 from ..numeric import algebra
-from ..numeric.assembly import Assembly, Rates, VelocityEquations, assemble, assemble_velocity
-from ..numeric.closure import ClosureSystem, WantedValues, close, closed
-from ..numeric.continuation import follow, follow_time
+from ..numeric.assembly_velocity import Rates, VelocityEquations, assemble_velocity
+from ..numeric.closure import close, closed
+from ..numeric.constraint_system import RESTARTS
+from ..numeric.held_path import follow
 from ..numeric.projection import largest
 from ..numeric.ranks import rank
 from ..numeric.scales import Array
-from ..numeric.space import settle
 from ..numeric.starts import starts
+from .constraint_kernels import constraint_system
 from .failure import place
 from .kernels import Kernels
 from .late_rank import require_rank
@@ -52,13 +53,10 @@ class Initial:
         self.kernels = kernels
         self.layout = layout = kernels.layout
         self.t = t
-        self._slopes = kernels.state("coordinate_slopes", nan=True) if layout.n_coordinate_slopes else None
-        self._C = kernels.state("constraints", nan=True)
+        self.system = constraint_system(kernels, t)
         self._C_q = kernels.state("constraint_jacobian", nan=True)
-        self.scales, self.place = layout.scales, layout.place_scales
         self._loop = kernels.motion("loop_coordinates") if layout.n_loop_coordinates else None
-        self._loop_q = kernels.state("loop_coordinate_jacobian", nan=True) if layout.n_loop_coordinates else None
-        self._alignment = kernels.state("alignment", nan=True) if layout.n_alignments else None
+        self.scales, self.place = layout.scales, layout.place_scales
         self.coordinates = layout.q + layout.loops
 
     def sort(self, values: Mapping[str, float]) -> Given:
@@ -76,79 +74,21 @@ class Initial:
             if name not in self.coordinates and name not in rates:
                 raise unknown("coordinate or rate", name, self.coordinates + rates)
         positions = {n: x for n, x in values.items() if n in self.coordinates}
-        positions = settle(self.coordinates, layout.coordinate_kinds + layout.loop_kinds, positions)
-        return Given(positions, {n: x for n, x in values.items() if n in rates})
+        return Given(self.system.settle(positions), {n: x for n, x in values.items() if n in rates})
 
     # functions of q
-
-    def position(self, q: Array) -> tuple[Array, Array]:
-        """C (n_h,) of the holonomic rows, C_q (n_c, n) of all; dC/dq (n_h, n_q) where q' is given."""
-        return self._C(q, t=self.t), (self._slopes or self._C_q)(q, t=self.t)
 
     def rate(self, q: Array) -> Array:
         """C_t (n_c,)."""
         x = np.concatenate([q, np.zeros(self.layout.n_v)])
         return self.kernels.state("velocity_constraints")(x, t=self.t)
 
-    def loops(self, q: Array) -> tuple[Array, Array]:
-        """Coordinates y (n_loop_coordinates,) of the cut joints and y_q (n_loop_coordinates, n)."""
-        assert self._loop is not None
-        assert self._loop_q is not None
-        zero = np.zeros(self.layout.n_v)
-        return self._loop(q, zero, zero, t=self.t)[0], self._loop_q(q, t=self.t)
-
-    def aligned(self, q: Array) -> bool:
-        """Whether no joint closes with its axes flipped."""
-        return self._alignment is None or bool((self._alignment(q, t=self.t) > 0.0).all())
-
-    def gradients(self, q: Array, name: str) -> list[Array]:
-        """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
-        return self._row(q, name)
-
-    def with_values(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A position with coordinates of the tree replaced; loops are not closed."""
-        return self._with(q, values)
-
-    def _equations(self, values: Mapping[str, float]) -> WantedValues | None:
-        layout = self.layout
-        names = [name for name in values if name in layout.loops]
-        if not names:
-            return None
-        chosen = np.array([layout.loops.index(name) for name in names])
-
-        def evaluate(q: Array) -> tuple[Array, Array]:
-            y, y_q = self.loops(q)
-            return y[chosen], y_q[chosen]
-
-        wanted = np.array([values[name] for name in names])
-        return WantedValues(evaluate, wanted, layout.loop_scales[chosen], layout.loop_angles[chosen].tolist(), names)
-
     # positions
 
-    def close(self, guess: Array, held: Mapping[str, float], restarts: int = 24) -> Assembly:
-        """Close the loops from a guess with some values exact."""
-        layout = self.layout
-        start = self._with(guess, held)
-        indices = [layout.q.index(name) for name in held if name in layout.q]
-        return assemble(
-            self.position,
-            start,
-            self.place,
-            held=indices,
-            equations=self._equations(held),
-            alignment=None if self._alignment is None else partial(self._alignment, t=self.t),
-            names=layout.q,
-            labels=layout.constraint_labels,
-            restarts=restarts,
-        )
-
-    def walk(self, start: Array, held: Mapping[str, float]) -> Array:
+    def follow(self, start: Array, held: Mapping[str, float]) -> Array:
         """From a closed position steadily to held values; raises AssemblyError when blocked."""
-        names = [name for name in held if name in self.layout.q]
-        indices = np.array([self.layout.q.index(name) for name in names], dtype=np.intp)
-        values = np.array([held[name] for name in names])
-        q = follow(self.position, start, self.place, indices, values, self._equations(held))
-        if not self.aligned(q):
+        q = follow(self.system, start, held)
+        if not self.system.aligned(q):
             raise AssemblyError("a joint's axes flipped on the way")
         return q
 
@@ -159,83 +99,96 @@ class Initial:
             return later
         declared = self.sort(self.layout.initial).positions
         try:
-            return self.close(self.layout.q_reference, declared, restarts=2).q
+            return self.system.close(self.layout.q_reference, declared, restarts=2).q
         except AssemblyError:
-            return self.close(self.layout.q_reference, {}).q
+            return self.system.close(self.layout.q_reference, {}).q
 
     def later(self) -> Array | None:
         """Where drivers bring the reference position of t = 0 by this time; None without them, or if they cannot."""
-        if not self.t or largest(self.scales.residual(self.position(self.layout.q_reference)[0])) <= SETTLED:
+        if not self.t or largest(self.scales.residual(self.system.position(self.layout.q_reference)[0])) <= SETTLED:
             return None
         first = Initial(self.kernels).reference()
         try:
-            return follow_time(lambda t: Initial(self.kernels, t).position, first, self.place, self.t)
-        except AssemblyError:
+            return follow(self.system.at(0.0), first, {}, self.t)
+        except AssemblyError as error:
+            self._tell_branch(f"the position at t = {self.t:.6g} s", error)
             return None
 
+    def _tell_branch(self, what: str, error: AssemblyError | None) -> None:
+        """Warn that a position was found by closing the loops anew."""
+        warnings.warn(
+            f"{what} is not reached from the reference position without leaving its branch: {error}.  The loops are "
+            "closed from the nearest guess; branches() gives all positions found, assemble() the one near a guess",
+            stacklevel=2,
+        )
+
     @np.errstate(all="ignore")
-    def assembled(self, given: Mapping[str, float]) -> Array:
-        """Position with the given values exact, and the declared ones where they leave room."""
+    def assembled(self, given: Mapping[str, float], rough: bool = False) -> Array:
+        """Position with the given values exact, and the declared ones where they leave room.
+
+        Warns where that leaves the branch of the reference position, unless the values are a ``rough`` guess.
+        """
         layout = self.layout
         declared = self.sort(layout.initial).positions
         if not layout.n_h and not any(name in layout.loops for name in (*declared, *given)):
-            return self._with(self._with(layout.q_reference, declared), given)
+            return self.system.with_values(self.system.with_values(layout.q_reference, declared), given)
         if not given:
             later = self.later()
             if later is None:
-                return self.close(layout.q_reference, declared).q
-            return self.walk(later, self.compatible(later, {}, declared))
+                return self.system.close(layout.q_reference, declared).q
+            return self.follow(later, self.compatible(later, {}, declared))
         rest = {name: value for name, value in declared.items() if name not in given}
         try:
             start = self.reference()
         except AssemblyError:
-            return self.close(layout.q_reference, given).q  # these parameters close somewhere else, if anywhere
+            return self.system.close(layout.q_reference, given).q  # these parameters close somewhere else, if anywhere
         soft = self.compatible(start, given, rest)
+        blocked = None
         for held in ({**given, **soft}, given):
             try:
-                return self.walk(start, held)
-            except AssemblyError:
-                continue
-        if soft:
-            try:
-                return self.close(start, {**given, **soft}, restarts=4).q
-            except AssemblyError:
-                pass
-        return self.close(start, given).q
+                return self.follow(start, held)
+            except AssemblyError as error:
+                blocked = error
+        try:
+            found = self.system.close(start, {**given, **soft}, restarts=4 if soft else RESTARTS).q
+        except AssemblyError:
+            if not soft:
+                raise
+            found = self.system.close(start, given).q
+        # where they stand still at the reference, it is on no branch of theirs
+        if not rough and len(self.compatible(start, (), given)) == len(given):
+            self._tell_branch(place(tuple(given), np.array(list(given.values()))).removeprefix(", "), blocked)
+        return found
 
     def from_guess(self, guess: Mapping[str, float]) -> Array:
         """Position near a guess: its values are kept as far as they can be, independent coordinates first."""
         layout = self.layout
         if not layout.n_h:
-            return self.assembled(guess)
+            return self.assembled(guess, rough=True)
         favoured = [layout.velocity_labels[i] for i in layout.independent]
         ordered = {name: guess[name] for name in favoured if name in guess} | dict(guess)
         if set(guess) <= set(favoured):
             try:
-                return self.assembled(guess)
+                return self.assembled(guess, rough=True)
             except AssemblyError:
                 pass
         declared = {**self.sort(layout.guess).positions, **self.sort(layout.initial).positions}
-        start = self._with(self._with(layout.q_reference, declared), guess)
+        start = self.system.with_values(self.system.with_values(layout.q_reference, declared), guess)
         soft = self.compatible(start, {}, {**ordered, **{k: v for k, v in declared.items() if k not in guess}})
         for held in (soft, {k: v for k, v in soft.items() if k in guess}):
             try:
-                return self.close(start, held, restarts=0).q
+                return self.system.close(start, held, restarts=0).q
             except AssemblyError:
                 continue
-        return self.close(start, {}).q
+        return self.system.close(start, {}).q
 
     def branches(self, given: Mapping[str, float], first: Array, tries: int = 60) -> list[Array]:
         """Every position found that holds the given values; `first` comes first."""
-        layout = self.layout
-        free = np.ones(len(self.place.q))
-        free[self.place.velocities([layout.q.index(name) for name in given if name in layout.q])] = 0.0
-        system = ClosureSystem(self.position, self.place, free, self._equations(given))
-        found = [first]
-        for start in starts(first, free, self.place, tries):
+        system, found = self.system.closure(given), [first]
+        for start in starts(first, system.free, self.place, tries):
             with np.errstate(all="ignore"):
                 q, residual = close(system, start)
-            if closed(residual) and self.aligned(q) and all(self._apart(q, other) for other in found):
+            if closed(residual) and self.system.aligned(q) and all(self._apart(q, other) for other in found):
                 found.append(q)
         return found
 
@@ -283,7 +236,7 @@ class Initial:
         for name, value in given.items():
             scale = layout.loop_scales[layout.loop_rates.index(name)] if name in layout.loop_rates else 1.0
             scale = self.scales.q[layout.v.index(name)] if name in layout.v else scale
-            row = self._row(q, name)[0]
+            row = self.gradients(q, name)[0]
             still = np.linalg.norm(basis @ row) < STILL * max(1.0, float(np.linalg.norm(row)))
             if still and abs(row @ driven) < UNMOVED and abs(value / scale) > SHORT:
                 moves = np.linalg.norm(basis, axis=0)
@@ -313,7 +266,7 @@ class Initial:
             zero = np.zeros(layout.n_v)
             y_t = self._loop(q, zero, zero, t=self.t)[1]
             values = np.array([held[name] for name in loops])
-            y_q = self.loops(q)[1]
+            y_q = self.system.cut.evaluate(q, self.t)[1]
             equations = VelocityEquations(y_q[chosen], y_t[chosen], values, layout.loop_scales[chosen], loops)
         return assemble_velocity(
             self._C_q(q, t=self.t),
@@ -337,8 +290,8 @@ class Initial:
         """
         layout = self.layout
         scales = self.place if positions else self.scales
-        C_q = self.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
-        rows = [*scales.jacobian(C_q), *(row for name in given for row in self._row(q, name))]
+        C_q = self.system.position(q)[1][: self.layout.n_h] if positions else self._C_q(q, t=self.t)
+        rows = [*scales.jacobian(C_q), *(row for name in given for row in self.gradients(q, name))]
         basis: Array = np.empty((0, len(scales.q)))
         if rows:
             stacked = np.array(rows)
@@ -347,7 +300,7 @@ class Initial:
         kept = {}
         for name, value in rest.items():
             added = basis
-            for row in self._row(q, name):
+            for row in self.gradients(q, name):
                 length = np.linalg.norm(row)
                 left = row - added.T @ (added @ row)
                 left -= added.T @ (added @ left)
@@ -364,22 +317,11 @@ class Initial:
         torn = {name for four in whole if not all(name in kept for name in four) for name in four}
         return {name: value for name, value in kept.items() if name not in torn}
 
-    def _row(self, q: Array, name: str) -> list[Array]:
+    def gradients(self, q: Array, name: str) -> list[Array]:
         """Scaled gradients of a coordinate or rate: three for e0, which stands for its rotation, none for e1 .. e3."""
         layout = self.layout
         if name in layout.v:
             return [np.eye(layout.n_v)[layout.v.index(name)]]
-        if name in layout.q:
-            index, unit = layout.q.index(name), np.eye(len(self.place.q))
-            if any(i < index < i + 4 for i, _ in layout.quaternion_slots):
-                return []
-            return [unit[k] for k in self.place.velocities([index])]
-        index = (layout.loops if name in layout.loops else layout.loop_rates).index(name)
-        return [np.asarray(self.loops(q)[1][index] * self.scales.q / layout.loop_scales[index])]
-
-    def _with(self, q: Array, values: Mapping[str, float]) -> Array:
-        result = np.array(q)
-        for name, value in values.items():
-            if name in self.layout.q:
-                result[self.layout.q.index(name)] = value
-        return result
+        if name in layout.loop_rates:
+            name = layout.loops[layout.loop_rates.index(name)]
+        return self.system.gradients(q, name)

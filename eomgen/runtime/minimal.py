@@ -178,7 +178,7 @@ class Minimal:
         if way.size and not way.max() <= STEP:
             if not np.isfinite(way).all():
                 raise UsageError(f"x is not finite: {x}")
-            near = self._path.walk(near, q_i, t)
+            near = self._path.follow(near, q_i, t)
         full = self._path.motion(q_i, v_i, np.zeros(k), near, t)[: self._layout.n_x]
         memory.q = full[:n].copy()
         return full

@@ -1,7 +1,7 @@
 """Stage runtime: independent values -> the motion of the whole tree, on the branch of a known closed position.
 
-From that position the independent coordinates are led in small steps along a straight line, each step being one Newton
-iteration of the kernel ``kinematics`` from the last point.
+From that position the independent coordinates are led along a straight line, each point being found by one Newton
+iteration of the kernel ``kinematics``.
 """
 
 from __future__ import annotations
@@ -12,15 +12,65 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import EvaluationError, ProjectionError, UsageError
-from ..limits.motions import WALKED
+from ..limits.motions import FOLLOWED
+from ..numeric.continuation import Continuation
+from ..numeric.curves import ASTRAY, Point, Tangent, interpolate
 from ..numeric.scales import Array
 from .failure import place
 from .kernels import Kernels
 from .room import read_numbers
 
-STEP = 0.1  #: largest scaled change of an independent coordinate in one step
-JUMP = 0.6  #: largest scaled change of any coordinate in one step; more may be another branch
-HALVINGS = 8  #: of a step, before giving up
+STEP = 0.1  #: largest scaled change of an independent coordinate that one Newton iteration is asked for
+JUMP = 0.6  #: largest scaled change of any coordinate in one iteration; more may be another branch
+
+
+class IndependentPath:
+    """Closed positions while the independent coordinates go along a straight line; s is the scaled distance.
+
+    Parameters
+    ----------
+    motion : DependentMotion
+    start : (n_q,) array
+        A closed position.
+    target : (n_dof,) array
+        Independent coordinates at the end.
+    t : float
+    """
+
+    def __init__(self, motion: DependentMotion, start: Array, target: Array, t: float) -> None:
+        self.motion, self.target, self.t = motion, target, t
+        self.scales, self.origin = motion.layout.scales, start[motion.layout.independent_q]
+        way = target - self.origin
+        self.length = float(np.abs(way / motion.scales_i).max(initial=0.0))
+        self.rate = way / (self.length or 1.0)
+        self.failed = np.empty(0)  # what the kernel gave where it found nothing
+        n_q, n = len(start), len(self.scales.q)
+        self.drifts = bool(self._kinematics(0.0, np.zeros_like(way), start)[n_q : n_q + n].any())
+
+    def at(self, s: float) -> Array:
+        """Independent coordinates."""
+        return self.target if s == self.length else self.origin + s * self.rate
+
+    def solve(self, s: float, guess: Array) -> Point | None:
+        """The point next to a guess, by one Newton iteration of the kernel."""
+        n_q = len(guess)
+        found = self._kinematics(s, self.rate, guess)
+        if not np.isfinite(found).all():
+            self.failed = found
+            return None
+        q, v = found[:n_q], found[n_q : n_q + len(self.scales.q)]
+        if self.drifts:  # the time stands still here
+            v = v - self._kinematics(s, np.zeros_like(self.rate), q)[n_q : n_q + len(v)]
+        return Point(s, q, Tangent(v))
+
+    def tangent(self, s: float, q: Array) -> Tangent:
+        """The direction at a position."""
+        found = self.solve(s, q)
+        return Tangent(np.zeros_like(self.scales.q)) if found is None else found.tangent
+
+    def _kinematics(self, s: float, rate: Array, guess: Array) -> Array:
+        x = np.concatenate([self.at(s), rate, np.zeros_like(rate), guess])
+        return np.asarray(self.motion.kernel(x, t=self.t))
 
 
 class DependentMotion:
@@ -32,7 +82,6 @@ class DependentMotion:
         if layout.rank:
             self.kernel = kernels.state("kinematics", nan=True)
         self.scales_i = layout.scales.q[layout.independent]
-        self._still = np.zeros(2 * layout.n_dof)
 
     def newton(self, q_i: Array, v_i: Array, a_i: Array, guess: Array, t: float) -> Array:
         """[q, v, a] (3 n,) by one Newton iteration from a guess, wherever it leads."""
@@ -53,65 +102,55 @@ class DependentMotion:
         result = self.kernel(np.concatenate([q_i, v_i, a_i, near]), t=t)
         if np.abs(self.layout.scales.distance(result[: self.layout.n_q], near)).max() <= JUMP:  # False for NaN
             return result
-        return self.newton(q_i, v_i, a_i, self.advance(near, q_i, t), t)
+        return self.newton(q_i, v_i, a_i, self.follow(near, q_i, t), t)
 
-    def advance(self, q: Array, target: Array, t: float, halvings: int = HALVINGS) -> Array:
-        """From a closed q to independent values not farther than one step, in parts where that is too far."""
-        reached = self.kernel(np.concatenate([target, self._still, q]), t=t)[: self.layout.n_q]
-        if np.abs(self.layout.scales.distance(reached, q)).max() <= JUMP:  # False for NaN
-            return reached
-        if not halvings:
-            raise self._blocked(target, reached)
-        middle = 0.5 * (q[self.layout.independent_q] + target)
-        half = self.advance(q, middle, t, halvings - 1)
-        return self.advance(half, target, t, halvings - 1)
-
-    def walk(self, start: Array, target: Array, t: float) -> Array:
+    def follow(self, start: Array, target: Array, t: float) -> Array:
         """From a closed q along the straight line to independent values."""
         if not self.layout.rank:
             return start
-        origin = start[self.layout.independent_q]
-        way = target - origin
-        length = float(np.abs(way / self.scales_i).max(initial=0.0))
-        self._require_near(target, length)
-        steps = int(np.ceil(length / STEP))
-        q = start
-        try:
-            for k in range(1, steps + 1):
-                q = self.advance(q, target if k == steps else origin + k / steps * way, t)
-        except EvaluationError as error:
-            raise self._too_far(target, error) from None
-        return q
+        path = IndependentPath(self, start, target, t)
+        self._require_near(target, path.length)
+        continuation = Continuation(path, start, fewest=1)
+        found = continuation.reach(path.length)
+        if found is None:
+            raise self._too_far(target, self._blocked(path.at(continuation.points[-1].s), path.failed))
+        return found.q
 
-    def walk_all(self, start: Array, targets: Array) -> list[Array]:
+    def follow_all(self, start: Array, targets: Array) -> list[Array]:
         """The same for columns of targets (n_dof, k), at t = 0.
 
-        With one degree of freedom all columns lie on one line.  It is walked once, over points at fixed distances from
-        the start, so that the result of a column does not depend on the others.
+        With one degree of freedom all columns lie on one line.  It is followed once, over points at whole distances
+        from the start, so that the result of a column does not depend on the others.
         """
         if self.layout.n_dof != 1 or not self.layout.rank:
-            return [self.walk(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
-        known: dict[int, list[Array]] = {1: [start], -1: [start]}
-        origin, step = start[self.layout.independent_q[0]], STEP * self.scales_i[0]
-        result = []
-        for target in targets.T:
-            sign = 1 if target[0] >= origin else -1
-            points = known[sign]
-            self._require_near(target, abs(float(target[0]) - origin) / self.scales_i[0])
-            count = int(abs(target[0] - origin) / step)
-            try:
-                while len(points) <= count:
-                    points.append(self.advance(points[-1], np.array([origin + sign * len(points) * step]), 0.0))
-                result.append(self.advance(points[count], target, 0.0))
-            except EvaluationError as error:
-                raise self._too_far(target, error) from None
-        return result
+            return [self.follow(start, targets[:, j], 0.0) for j in range(targets.shape[1])]
+        origin, unit, n_q = start[self.layout.independent_q], self.scales_i[0], self.layout.n_q
+        lengths = (targets[0] - origin[0]) / unit
+        self._require_near(targets[:, np.abs(lengths).argmax()], float(np.abs(lengths).max()))
+        result = np.full((n_q, len(lengths)), np.nan)
+        for sense in (1.0, -1.0):
+            chosen = np.flatnonzero((lengths >= 0.0) == (sense > 0.0))
+            if not chosen.size:
+                continue
+            path = IndependentPath(self, start, origin + sense * unit, 0.0)
+            path.length = np.inf  # it has no end of its own
+            way = Continuation(path, start, fewest=1)
+            farthest = float(np.abs(lengths[chosen]).max(initial=0.0))
+            while not way.blocked and way.points[-1].s <= farthest:
+                way.to(np.floor(way.points[-1].s) + 1.0)
+            guesses = interpolate(way.points, way.scales, np.abs(lengths[chosen]))
+            x = np.concatenate([targets[:, chosen], np.zeros((2, len(chosen))), guesses])
+            found = self.kernel(x, t=0.0)[:n_q]
+            for j, q, guess in zip(chosen, found.T, guesses.T, strict=True):
+                near = np.abs(path.scales.distance(q, guess)).max() <= ASTRAY  # False for NaN
+                result[:, j] = q if near else self.follow(start, targets[:, j], 0.0)
+        return list(result.T)
 
     def _require_near(self, target: Array, length: float) -> None:
-        if not length <= WALKED:
+        if not length <= FOLLOWED:
             raise UsageError(
                 f"the way to {self._place(target)} is {length:.3g} rad or length scales long, and positions are led "
-                f"along {WALKED:g} at most, in small steps that stay on the branch; give a nearer position (whole "
+                f"along {FOLLOWED:g} at most, in small steps that stay on the branch; give a nearer position (whole "
                 "turns less, where the mechanism repeats itself), or guess=, a position to start from"
             )
 
@@ -148,7 +187,7 @@ def motions(
     given : three arrays (n_dof,) or (n_dof, k), or None
         q_i, v_i, a_i; None is zero.
     guess : (n,) array, optional
-        Start of Newton's iteration instead of a walk.
+        Start of Newton's iteration instead of following from there.
     t : () or (k,) array
 
     Returns
@@ -177,9 +216,9 @@ def motions(
             raise UsageError(f"guess must have shape ({layout.n_q},), not {guess.shape}")
         near = [guess] * q.shape[1]
     elif (times == 0.0).all():
-        near = path.walk_all(reference(0.0), q)
+        near = path.follow_all(reference(0.0), q)
     else:  # driven constraints have another reference at each time
-        near = [path.walk(reference(float(time)), q[:, j], float(time)) for j, time in enumerate(times)]
+        near = [path.follow(reference(float(time)), q[:, j], float(time)) for j, time in enumerate(times)]
     solve = path.motion if guess is None else path.newton
     result = np.empty((n_q + 2 * n, q.shape[1]))
     for j in range(q.shape[1]):

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..analysis.driven_coordinates import DrivenCoordinates
+from ..analysis.driven_coordinates import DrivenCoordinates, DrivenPath
 from ..analysis.followed_path import FollowedPath
 from ..analysis.kinematic import complete, follow_to_start, start_from
 from ..analysis.kinematic_motion import KinematicAnalysis, keep
 from ..analysis.open_joint import describe_gap
-from ..analysis.path_following import StraightPath
-from ..analysis.roots import find_root
 from ..errors import SimulationError, UsageError
+from ..numeric.roots import find_root
 from ..numeric.scales import Array
 from ..runtime.given_start import Span, Start
 from ..runtime.signals import Forcing
@@ -129,7 +128,7 @@ def simulate_driven(
     driven = DrivenCoordinates(module, complete(module, q, t0, ()))
     q = follow_to_start(driven, q, (t0, nothing), (start, nothing))
     sense = 1.0 if end >= start else -1.0
-    followed = FollowedPath(driven, StraightPath(start, nothing, sense, nothing), q, abs(end - start))
+    followed = FollowedPath(DrivenPath(driven, start, nothing, sense, nothing), q, abs(end - start))
     if followed.stop is not None:
         beyond = 0.9 * followed.reached + 0.1 * followed.end
         gap = describe_gap(driven, *followed.path.at(beyond), followed.stop.q)

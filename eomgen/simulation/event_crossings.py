@@ -7,24 +7,18 @@ and leave again within it, and zeros after a reset, once the value has been seen
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from math import isnan, nan
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ZenoError
-from ..limits.rounding import EPS
 from ..limits.runs import ASIDE, CROWDED, HALVED, INSTANT, LATE, MOMENTARY, RESTING, SAMPLED, TOUCHED, TOUCHING, TURNING
+from ..numeric.roots import Found, Search, search_least, search_root
 from ..numeric.scales import Array
 from .event_values import EventValues
 from .events import GO_ON, RESET, UNWATCHED, WAIT, Events, RunEvent, crowd_of
-
-GOLDEN = 0.3819660112501051
-
-Found = TypeVar("Found")
-#: Yields times within a step, is sent the value of one event there, and returns what it looked for.
-Search = Generator[float, float, Found]
 
 
 class Step(NamedTuple):
@@ -259,18 +253,8 @@ class Crossings:
             t = step.t_old + k * (step.t - step.t_old) / SAMPLED
             if (value := s * (yield t)) < best:
                 best, at = value, t
-        left, right = at - h, at + h
-        for _ in range(60):  # golden section
-            if best <= 0.0 or abs(right - left) <= TURNING * abs(step.t - step.t_old):
-                break
-            low = abs(at - left) > abs(right - at)
-            t = at + GOLDEN * ((left if low else right) - at)
-            value = s * (yield t)
-            if value < best:
-                left, right = (left, at) if low else (at, right)
-                best, at = value, t
-            else:
-                left, right = (t, right) if low else (left, t)
+        width = TURNING * abs(step.t - step.t_old)
+        best, at = yield from search_least(at - h, at, at + h, best, width, sense=s)
         rounding = TOUCHED * max(self.size[i], abs(b))
         if best < -rounding:
             return [Bracket(i, step.t_old, at, a, s * best), Bracket(i, at, step.t, s * best, b)]
@@ -280,41 +264,15 @@ class Crossings:
         return []
 
     def _zero(self, bracket: Bracket) -> Search[float]:
-        """The zero in a bracket: R. P. Brent, Algorithms for Minimization without Derivatives, 1973, chapter 4.
+        """The zero in a bracket.
 
         Where the value jumps, the far side of the jump: a run that goes on from the near one would meet it again.
         """
         i, a, b, fa, fb = bracket
-        c, fc, d = a, fa, b - a
-        e = d
-        for _ in range(100):
-            if fb * fc > 0.0:
-                c, fc, d = a, fa, b - a
-                e = d
-            if abs(fc) < abs(fb):
-                a, b, c = b, c, b
-                fa, fb, fc = fb, fc, fb
-            tolerance, m = 2.0 * EPS * (1.0 + abs(b)), 0.5 * (c - b)
-            if fb == 0.0 or abs(m) <= tolerance:
-                break
-            if abs(e) < tolerance or abs(fa) <= abs(fb):
-                d = e = m
-            else:
-                s, q0, r = fb / fa, fa / fc, fb / fc
-                p = 2.0 * m * s if a == c else s * (2.0 * m * q0 * (q0 - r) - (b - a) * (r - 1.0))
-                q = 1.0 - s if a == c else (q0 - 1.0) * (r - 1.0) * (s - 1.0)
-                q, p = (-q if p > 0.0 else q), abs(p)
-                if 2.0 * p < 3.0 * m * q - abs(tolerance * q) and p < abs(0.5 * e * q):
-                    e, d = d, p / q
-                else:
-                    d = e = m
-            a, fa = b, fb
-            b += d if abs(d) > tolerance else tolerance if m > 0.0 else -tolerance
-            fb = yield b
-            if isnan(fb):
-                return (yield from self._zero_beside(bracket, b))
-        jumps = fb * bracket.fa > 0.0 > fb * fc and abs(fb) > TOUCHING * float(self.size[i])
-        return float(c if jumps else b)
+        b, fb, c, fc = yield from search_root(a, b, fa, fb)
+        if isnan(fb):
+            return (yield from self._zero_beside(bracket, b))
+        return c if fb * fa > 0.0 > fb * fc and abs(fb) > TOUCHING * float(self.size[i]) else b
 
     def _zero_beside(self, bracket: Bracket, gap: float) -> Search[float]:
         """The zero in a bracket within which, at a time, the value is no number: on either side; NaN if on none."""

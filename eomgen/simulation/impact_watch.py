@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.impact_gaps import Gaps
-from ..analysis.roots import find_root
 from ..limits.impacts import FOUND, STARTED
 from ..limits.runs import INSTANT
+from ..numeric.roots import carry_out, find_root, search_least
 from ..numeric.scales import Array
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 RESTING = 0.1  #: the same for one that does not open
 SAMPLES = 8  #: places in each step of the solver at which gaps are looked at afterwards
 CHUNK = 4096  #: steps at a time
-GOLDEN = 0.3819660112501051
 
 
 class Watch:
@@ -114,24 +113,11 @@ def _first_zero(watch: Watch, piece: Trajectory, i: int, times: Array, values: A
     for k in np.flatnonzero(dips) + 1:
         if k >= stop:
             break
-        low, at = _lowest(value, times[k - 1], times[k], times[k + 1], float(values[k]))
+        left, middle, right = times[k - 1 : k + 2].tolist()
+        search = search_least(left, middle, right, float(values[k]), FOUND * (right - left), below=True)
+        low, at = carry_out(search, value)
         if low < 0.0:
             return find_root(value, float(times[k - 1]), at, float(values[k - 1]), low)
     if stop in (0, len(values)) or times[stop] == piece.t[-1]:  # at the end the solver has found it
         return None
     return find_root(value, float(times[stop - 1]), float(times[stop]), float(values[stop - 1]), float(values[stop]))
-
-
-def _lowest(value: Callable[[float], float], left: float, at: float, right: float, best: float) -> tuple[float, float]:
-    """The least value about, or any below 0, and where: golden section."""
-    whole = right - left
-    while best >= 0.0 and right - left > FOUND * whole:
-        low = at - left > right - at
-        t = at + GOLDEN * ((left if low else right) - at)
-        f = value(t)
-        if f < best:
-            left, right = (left, at) if low else (at, right)
-            best, at = f, t
-        else:
-            left, right = (t, right) if low else (left, t)
-    return best, at

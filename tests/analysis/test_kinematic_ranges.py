@@ -321,7 +321,7 @@ def test_change_points_where_the_determinant_only_touches_zero() -> None:
 
 @pytest.mark.parametrize("target", ["cython", "numpy"])
 def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.path_following import Continuation
+    from eomgen.numeric.continuation import Continuation
 
     count, real = [0], Continuation.forward
 
@@ -345,7 +345,7 @@ def test_ways_walked_before_are_not_walked_in_small_steps_again(target: str, mon
 
 
 def test_times_to_and_fro_are_walked_in_no_smaller_steps_than_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    from eomgen.analysis.path_following import Continuation
+    from eomgen.numeric.continuation import Continuation
 
     count, real = [0], Continuation.forward
 
@@ -371,14 +371,14 @@ def test_what_of_a_way_was_walked() -> None:
     known_range, known = KnownRange(np.zeros(5), y), []
     for k in range(4):
         known.append(known_range.known(k, k + 1))
-        known_range.walked(k, k + 1, True)
+        known_range.note(k, k + 1, True)
     np.testing.assert_allclose(known, [0.0, 1.0, 1 / 3, 4 / 6])
-    known_range.walked(3, 4, False)  # a change point: from here on every way is walked as if it were the first
+    known_range.note(3, 4, False)  # a change point: from here on every way is walked as if it were the first
     assert known_range.known(1, 2) == 0.0
     assert KnownRange(np.arange(5.0), y).known(0, 0) == 0.0
     time = KnownRange(np.array([0.0, 2.0, 1.0]), y[:, :1].repeat(3, axis=1))
-    time.walked(0, 1, True)
+    time.note(0, 1, True)
     assert time.known(1, 2) == 1.0
     both = KnownRange(np.zeros(5), np.concatenate([y, y]))
-    both.walked(0, 1, True)
+    both.note(0, 1, True)
     assert both.known(1, 2) == 0.0

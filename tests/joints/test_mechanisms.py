@@ -106,7 +106,7 @@ def test_a_fine_thread_that_is_cut_is_turned_in_few_steps(monkeypatch: pytest.Mo
     module = m.compile(target="numpy")
     q = module.x0()[: module.n_q]
     start = thread_turns(q, module.poses(q)[0], pitch)
-    monkeypatch.setattr("eomgen.numeric.continuation.TRIALS", 200)
+    monkeypatch.setattr("eomgen.numeric.held_path.TRIALS", 200)
     q = module.x0(j=start + 3.0)[: module.n_q]
     assert np.abs(module.constraints(q, rows="all")).max() < 1e-12
     assert thread_turns(q, module.poses(q)[0], pitch) == pytest.approx(start + 3.0, abs=1e-9)

@@ -8,9 +8,10 @@ import pytest
 
 from eomgen.errors import AssemblyError, PartitionError, ProjectionError
 from eomgen.numeric import (
+    ConstraintSystem,
+    CutJoints,
     Scales,
     VelocityEquations,
-    assemble,
     assemble_velocity,
     choose_independent,
     conditioning,
@@ -26,8 +27,15 @@ NAMES, LABELS = ["theta", "beta", "s"], ["C.x", "C.y", "C.x again"]
 REFERENCE = Path(__file__).parents[1] / "reference" / "slider_crank_kinematics.json"
 
 
-def put_together(c, guess, **options):
-    return assemble(c.position, np.array(guess, dtype=float), c.scales, names=NAMES, labels=LABELS, **options)
+def system_of(c, cut=None, alignment=None):
+    none = CutJoints((), (), np.empty(0), lambda q, t: (np.empty(0), np.empty((0, 3))))
+    kinds = ("angle", "angle", "length")
+    return ConstraintSystem(lambda q, t: c.position(q), c.scales, tuple(NAMES), kinds, LABELS, cut or none, alignment)
+
+
+def put_together(c, guess, held=(), alignment=None):
+    guess = np.array(guess, dtype=float)
+    return system_of(c, alignment=alignment).close(guess, {NAMES[i]: guess[i] for i in held})
 
 
 def test_a_rough_guess_closes_and_held_values_stay(crank):
@@ -82,39 +90,37 @@ def test_consistent_values_may_be_more_than_needed(crank):
 
 def test_functions_of_the_coordinates_reach_their_values(crank):
     c = crank()
-    equations = WantedValues(
-        lambda q: (-q[1:2], np.array([[0.0, -1.0, 0.0]])), np.array([0.2 + 2 * np.pi]), np.ones(1), [True], ["psi"]
-    )
-    found = put_together(c, c.closed(0.1), equations=equations)
+    cut = CutJoints(("psi",), ("angle",), np.ones(1), lambda q, t: (-q[1:2], np.array([[0.0, -1.0, 0.0]])))
+    found = system_of(c, cut).close(c.closed(0.1), {"psi": 0.2 + 2 * np.pi})
     assert found.q[1] == pytest.approx(-0.2, abs=1e-12)
     with pytest.raises(AssemblyError, match="psi = "):
-        put_together(c, c.closed(0.1), equations=equations._replace(values=np.array([1.5])))
+        system_of(c, cut).close(c.closed(0.1), {"psi": 1.5})
 
 
 def test_flipped_positions_are_refused(crank):
     c = crank()
     upright = put_together(c, [0.5, 3.0, 0.0], held=[0])
     assert np.cos(upright.q[1]) < 0
-    found = put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q: np.cos(q[1:2]))
+    found = put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q, t: np.cos(q[1:2]))
     assert np.cos(found.q[1]) > 0
     with pytest.raises(AssemblyError, match="axes of a joint flipped"):
-        put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q: np.array([-1.0]))
+        put_together(c, [0.5, 3.0, 0.0], held=[0], alignment=lambda q, t: np.array([-1.0]))
 
 
 def test_following_a_held_value_stays_on_the_branch(crank):
     c = crank()
     start = c.closed(0.1)
-    q = follow(c.position, start, c.scales, np.array([0]), np.array([9.0]))
+    q = follow(system_of(c), start, {"theta": 9.0})
     np.testing.assert_allclose(q, c.closed(9.0), atol=1e-12)
     with pytest.raises(AssemblyError, match="blocked"):
-        follow(c.position, start, c.scales, np.array([2]), np.array([0.6]))
+        follow(system_of(c), start, {"s": 0.6})
 
 
 def test_a_way_of_too_many_steps_is_given_up(crank, monkeypatch):
     c = crank()
-    monkeypatch.setattr("eomgen.numeric.continuation.TRIALS", 20)
-    with pytest.raises(AssemblyError, match=r"too winding: 20 steps lead through 22 % of it"):
-        follow(c.position, c.closed(0.1), c.scales, np.array([0]), np.array([9.0]))
+    monkeypatch.setattr("eomgen.numeric.held_path.TRIALS", 20)
+    with pytest.raises(AssemblyError, match=r"too winding: 20 steps lead through 73 % of it"):
+        follow(system_of(c), c.closed(0.1), {"theta": 9.0})
 
 
 def test_velocities_given_are_exact_and_contradictions_are_told(crank):

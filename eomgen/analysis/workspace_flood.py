@@ -1,9 +1,9 @@
-"""Analysis: a grid of led values -> the positions at its points, walked to from neighbour to neighbour.
+"""Analysis: a grid of led values -> the positions at its points, followed from neighbour to neighbour.
 
-The walk begins at the grid point next to the initial position and floods the grid, so every position hangs together
+It begins at the grid point next to the initial position and floods the grid, so every position hangs together
 with it by a continuous motion: the assembly mode stays.  A step from one point to the next counts only if position and
-direction come out as foretold; else it is halved; near singular positions it is walked in the small steps of
-:mod:`.path_following`, over change points too.
+direction come out as foretold; else it is halved; near singular positions the small steps are those of
+:mod:`..numeric.continuation`, over change points too.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ import numpy as np
 
 from ..errors import AssemblyError, PartitionError
 from ..limits.motions import SLACK
+from ..numeric.continuation import Continuation
 from ..numeric.projection import largest
 from ..numeric.scales import Array
 from ..runtime.given_start import Start
-from .driven_coordinates import DrivenCoordinates
+from .driven_coordinates import DrivenCoordinates, DrivenPath
 from .followed_path import FollowedPath
 from .kinematic import complete, start_from
-from .path_following import Continuation, StraightPath
 from .singular import LOW, Singular
 from .workspace_grid import Grid, Index
 
 if TYPE_CHECKING:
     from ..runtime.bound_model import BoundModel
 
-FINEST = 1 / 40  #: of the way between neighbours: smaller steps are left to a walk that looks for singular positions
+MOST = 40  #: steps between neighbours: more are left to what looks for singular positions
 TRIES = 64  #: grid points tried as the first one
 REACHED, LIMITED, OUT = "reached", "limits", "out of reach"
 
@@ -116,37 +116,28 @@ class Stage:
             y1[column] = 1.0
         return float(column < 0), y1
 
-    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[StraightPath, float]:
+    def path(self, start: tuple[float, Array], end: tuple[float, Array]) -> tuple[DrivenPath, float]:
         """The straight path between two places, and its length."""
         (t, y), (t1, y1) = start, end
         length = largest(np.concatenate([(y1 - y) / self.driven.led_scales, [t1 - t]]))
-        return StraightPath(t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
+        return DrivenPath(self.driven, t, y, (t1 - t) / (length or 1.0), (y1 - y) / (length or 1.0)), length
 
     def step(self, q: Array, start: Index, end: Index) -> tuple[Array | None, list[Singular]]:
         """The position at a neighbour, None if the way is blocked, and what is singular on the way."""
         path, length = self.path(self.at(start), self.at(end))
-        if not self.module.layout.n_c and all(self.driven.in_tree):  # an open chain goes where it is led
+        if not self.module.layout.n_c and len(self.rows) == len(self.driven.led):  # an open chain goes where it is led
             moved = q.copy()
             moved[self.rows] = path.at(length)[1]
             return moved, []
-        walk = Continuation(self.driven, path, q)
-        h = length
-        while walk.points[-1].tangent.quality > LOW and h > FINEST * length:
-            here = walk.points[-1]
-            whole = length - here.s <= 1.5 * h
-            walk.step = length - here.s if whole else h
-            found = walk.forward(here, walk.step, length if whole else here.s + h)
-            if found is None or found.tangent.sign != here.tangent.sign:
-                h *= 0.5
-                continue
-            walk.points.append(found)
-            if whole:
-                return found.q, []
-        here = walk.points[-1]  # near a singular position, or one is in between
-        rest = length - here.s
-        followed = FollowedPath(self.driven, StraightPath(*path.at(here.s), path.t1, path.y1), here.q, rest)
+        continuation = Continuation(path, q, fewest=1)
+        continuation.step = length
+        points = continuation.points
+        reached = continuation.to(length, steps=MOST) and not continuation.leaps
+        if reached and all(p.tangent.quality > LOW and p.tangent.sign == points[0].tangent.sign for p in points):
+            return points[-1].q, []
+        followed = FollowedPath(path, q, length)  # a singular position is near, or in between
         stop = [] if followed.stop is None else [followed.stop]
-        return (None if stop else followed.position(rest)), followed.singular + stop
+        return (None if stop else followed.position(length)), followed.singular + stop
 
     def allowed(self, q: Array, t: float) -> bool:
         """Whether all limits are kept."""
@@ -189,7 +180,7 @@ def flood(stage: Stage) -> Flood:
     status[first] = REACHED
     parents[first] = first
     inside, outside = deque([first]), deque[Index]()
-    while inside or outside:  # what limits block is walked last, to tell it from what is out of reach
+    while inside or outside:  # what limits block is followed last, to tell it from what is out of reach
         within = bool(inside)
         here = inside.popleft() if within else outside.popleft()
         for _, there in grid.neighbours(here):
@@ -219,7 +210,7 @@ def _first(stage: Stage) -> tuple[Index, Array]:
         path, length = stage.path((stage.t, stage.y), stage.at(index))
         q: Array | None = stage.q
         if length > 0.0:
-            followed = FollowedPath(stage.driven, path, stage.q, length)
+            followed = FollowedPath(path, stage.q, length)
             q = followed.position(length) if followed.stop is None else None
             blocked = followed.stop or blocked
         if q is not None and stage.allowed(q, stage.at(index)[0]):

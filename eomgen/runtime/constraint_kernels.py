@@ -1,0 +1,33 @@
+"""Stage runtime: the kernels of a module -> its constraints and cut joints as one record of functions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numeric.constraint_system import ConstraintSystem, CutJoints
+from ..numeric.scales import Array
+from .kernels import Kernels
+
+
+def constraint_system(kernels: Kernels, t: float = 0.0) -> ConstraintSystem:
+    """The constraints of positions with the parameters of the kernels; dC/dq for C_q where q' is given."""
+    layout = kernels.layout
+    C = kernels.state("constraints", nan=True)
+    slopes = "coordinate_slopes" if layout.n_coordinate_slopes else "constraint_jacobian"
+    C_q = kernels.state(slopes, nan=True)
+    y, y_q = kernels.motion("loop_coordinates"), kernels.state("loop_coordinate_jacobian", nan=True)
+    alignment, zero = kernels.state("alignment", nan=True), np.zeros(layout.n_v)
+
+    def cut(q: Array, t: float) -> tuple[Array, Array]:
+        return np.asarray(y(q, zero, zero, t=t), dtype=float)[0], y_q(q, t=t)
+
+    return ConstraintSystem(
+        lambda q, t: (C(q, t=t), C_q(q, t=t)),
+        layout.place_scales,
+        layout.q,
+        layout.coordinate_kinds,
+        layout.constraint_labels,
+        CutJoints(layout.loops, layout.loop_kinds, layout.loop_scales, cut),
+        (lambda q, t: alignment(q, t=t)) if layout.n_alignments else None,
+        t,
+    )
