@@ -15,6 +15,7 @@ from ..files.writing import save_figure
 from .shared_options import split_names
 
 if TYPE_CHECKING:
+    from ..api.module import Module
     from ..describe.mechanism import Mechanism
     from ..runtime import Trajectory
 
@@ -70,6 +71,22 @@ def check_picture(file: Path | None, picture: Picture) -> None:
         require_plotting(file)
     elif picture != Picture():
         raise UsageError("--columns, --against and --plot-as say what --plot FILE draws; give it too")
+
+
+def check_columns(module: Module, picture: Picture) -> None:
+    """Fail before a run if it will have no column of a name.
+
+    Raises
+    ------
+    UsageError
+    """
+    from ..runtime.columns import column_names
+    from ..runtime.near_names import unknown
+
+    known = ("t", *column_names(module.layout))
+    for name in (*picture.columns, *((picture.against,) if picture.against else ())):
+        if name not in known:
+            raise unknown("column", name, known)
 
 
 def picture_options(verb: Callable[..., Any]) -> Callable[..., Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import UsageError
 from .failures import reports_failures
-from .plot import Picture, check_picture, find_paths, picture_options, plot_run
+from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, print_table, say, stage, without_noise
 from .shared_options import (
     blaming_option,
@@ -102,6 +102,7 @@ def kinematics(
     with stage("compile"):
         module = equations.compile(target=target)
     initial, parameters, inputs = sort_settings(module, chosen)
+    check_columns(module, picture)
     named = range_values(module, asked) if asked or not (limits or grid) else {}
     bound = module.bind(parameters or None, inputs or None)
     start = perf_counter()

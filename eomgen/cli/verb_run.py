@@ -12,7 +12,7 @@ import click
 from ..errors import UsageError
 from .failures import after_integration, reports_failures
 from .number_option import NumberRange
-from .plot import Picture, check_picture, find_paths, picture_options, plot_run
+from .plot import Picture, check_columns, check_picture, find_paths, picture_options, plot_run
 from .screen import finite, print_heading, print_json, print_rows, say, stage, without_noise
 from .shared_options import (
     baumgarte_option,
@@ -137,6 +137,7 @@ def run(
         module = equations.compile(target=target)
         parts |= {part: seconds for part, seconds in equations.seconds.items() if part not in before}
     initial, parameters, inputs = sort_settings(module, chosen)
+    check_columns(module, picture)
     from .energy import balance_energy, counts_work, uncounted_functions
 
     start = perf_counter()

@@ -46,7 +46,7 @@ class Columns:
         self.module, self.t, self.x, self.u, self._steps = module, t, x, u, steps
         self._known: dict[str, Array] = {}
         # the first group wins: an output may repeat the coordinate of its own name, and the model may use T for its own
-        self.names = _names(module.layout)
+        self.names = column_names(module.layout)
 
     @cached_property
     def _groups(self) -> list[tuple[tuple[str, ...], Callable[[], Array]]]:
@@ -127,7 +127,7 @@ class Columns:
 
 
 @lru_cache(maxsize=64)
-def _names(layout: Layout) -> tuple[str, ...]:
+def column_names(layout: Layout) -> tuple[str, ...]:
     """All columns, each once."""
     cut = layout.loops + layout.loop_rates + layout.loop_accelerations
     energies = ("T", "V", "energy") if layout.energy_known else ()
@@ -137,7 +137,7 @@ def _names(layout: Layout) -> tuple[str, ...]:
 @lru_cache(maxsize=64)
 def units_of_layout(layout: Layout) -> dict[str, str]:
     """Units of all columns, by name."""
-    return {name: layout.unit(name) for name in ("t", *_names(layout)) if layout.unit(name)}
+    return {name: layout.unit(name) for name in ("t", *column_names(layout)) if layout.unit(name)}
 
 
 def describe(module: BoundModel) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from .scene import Item, Scene
 from .shown_motion import ShownMotion
 
 STILL = ROUNDED  #: poses that differ by less are one
+NAMES = "#222222"  #: colour of names
 
 
 def _number(color: str) -> int:
@@ -77,7 +78,7 @@ def _objects(viewer: Any, scene: Scene, times: list[float]) -> list[Any]:
                 escape(label.text),
                 is_html=True,  # else underscores would be read as TeX
                 position=_over_time(times, places),
-                color=_number("#444444" if label.role == "joint" else color_of(label)),
+                color=_number(NAMES),  # the body's colour would be lost on the body
                 size=0.7,
                 label_box=False,
                 name=f"name {label.text}",

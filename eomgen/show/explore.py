@@ -49,7 +49,7 @@ class Explorer:
         room = ROOM * (scene.high - scene.low)  # for what the sliders do
         self._plot = scene_plot(scene._replace(low=scene.low - room, high=scene.high + room), height=HEIGHT)
         self._plot.menu_visibility = False
-        self._says = self._kit.HTML()
+        self._says, self._nudge = self._kit.HTML(), SAME
         places = {name: float(start[k]) for name, k in self._moved().items()}
         constants = {name: float(value) for name, value in zip(module.p_names, module.p, strict=True)}
         seen = [name for name in constants if self._matters(name, constants[name])][:PARAMETERS]
@@ -145,6 +145,8 @@ class Explorer:
         else:
             self.module, self.q, self.t = module, q, t
             move_objects(self._plot, scene)
+            self._nudge = -self._nudge  # k3d shows names once the camera has moved
+            self._plot.camera = [x * (1.0 + self._nudge) for x in self._plot.camera]
         self._says.value = f"<b style='color:#b22222'>{escape(self.message)}</b>"
 
     def _closed(self, module: Any, wanted: dict[str, float], t: float) -> Array:

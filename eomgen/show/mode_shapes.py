@@ -104,7 +104,7 @@ def swinging_gif(module: Any, x: Array, shapes: Sequence[tuple[Array, str]]) -> 
         spatial = {} if scene.view is not None else {"projection": "3d"}
         ax = figure.add_subplot(1, len(made), k + 1, **spatial)
         frames.add_scene(scene, ax, title)
-        ax.set(xlabel="", ylabel="")
+        ax.set(xlabel="", ylabel="", **({} if scene.view is not None else {"zlabel": ""}))
         ax.tick_params(labelbottom=False, labelleft=False)
     frames.settle()
     return gif_bytes(frames)

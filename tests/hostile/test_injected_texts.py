@@ -159,11 +159,13 @@ class Tags(html.parser.HTMLParser):
     def __init__(self, page: str) -> None:
         super().__init__()
         self.tags: set[str] = set()
+        self.sources: list[str | None] = []
         self.feed(page)
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags |= {tag, *(name for name, _ in attrs if name not in ("style", "colspan"))}
+        self.sources += [value for name, value in attrs if name == "src"]
 
     def handle_comment(self, data: str) -> None:
         self.tags.add("comment")
@@ -181,7 +183,11 @@ def test_what_is_shown_shows_the_text_and_obeys_none_of_it(key: str) -> None:
     model = model_of(described(NASTY[key]))
     for page in (model._repr_html_(), module._repr_html_(), equations._repr_html_(), equations.report._repr_html_()):
         assert texts.visible(page) == page
-        assert Tags(page).tags <= {"table", "tr", "td", "th", "b", "p", "pre"}
+        found = Tags(page)
+        own = {"table", "tr", "td", "th", "b", "p", "pre", "div", "details", "summary", "code", "i"}
+        assert found.tags <= own | {"img", "src", "alt", "width"}
+        assert len(found.sources) <= 1  # the picture, which is in the page
+        assert all(re.fullmatch(r"data:image/png;base64,[A-Za-z0-9+/=]+", str(one)) for one in found.sources)
     for shown in (str(model), repr(model), str(module), repr(module), str(equations), str(equations.report)):
         assert texts.visible(shown) == shown
     assert_held(module.metadata, NASTY[key])
