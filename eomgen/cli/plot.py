@@ -30,7 +30,7 @@ def require_plotting(file: Path, option: str = "--plot") -> None:
     try:
         from matplotlib.backend_bases import FigureCanvasBase
     except ImportError as error:
-        raise MissingDependencyError(f'{option} needs matplotlib: pip install "eomgen[plot]"') from error
+        raise MissingDependencyError(f"{option} needs matplotlib: pip install matplotlib") from error
     known = sorted(FigureCanvasBase.get_supported_filetypes())
     if file.suffix[1:].lower() not in known:
         raise UsageError(f"{option} {file}: the ending says what kind of picture; there are .{', .'.join(known)}")

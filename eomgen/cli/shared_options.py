@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -207,7 +208,7 @@ def _locked(words: tuple[str, ...]) -> dict[str, float]:
 
 
 def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | None = None) -> Model:
-    """The model of a file; what an import of a robot left out is told on stderr.
+    """The model of a file, ``-`` for standard input; what an import of a robot left out is told on stderr.
 
     Parameters
     ----------
@@ -222,21 +223,34 @@ def load_model(path: Path, allow_native: bool = False, robot: dict[str, Any] | N
     ModelError
         The file is no model.
     """
-    if not path.is_file():
-        raise UsageError(_missing(path))
-    from ..loading import load
-
     options = dict(robot or {})
     if "lock" in options:
         options["lock"] = _locked(options["lock"])
     if allow_native:
         options["allow_native"] = True
-    model = load(path, **options)
+    if str(path) == "-":
+        model = _read_stdin(options)
+    elif path.is_file():
+        from ..loading import load
+
+        model = load(path, **options)
+    else:
+        raise UsageError(_missing(path))
     from .screen import say
 
     for note in model.notes:
         say(f"note: {note}", err=True)
     return model
+
+
+def _read_stdin(options: dict[str, Any]) -> Model:
+    """The model of a model file's text on the standard input."""
+    from ..api.model import Model
+    from ..describe.yaml_file import describe_yaml
+
+    if options:
+        raise UsageError(f"- is a model file's text on the standard input, without {', '.join(options)}; name a file")
+    return Model.from_description(describe_yaml(sys.stdin.read(), "<stdin>"))
 
 
 def _missing(path: Path) -> str:

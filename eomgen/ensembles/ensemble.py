@@ -217,7 +217,10 @@ class Ensemble:
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays to an .npz file that NumPy alone reads; ``header`` in it is ``metadata`` as JSON."""
-        target = as_path("path", path).with_suffix(".npz")
+        target = as_path("path", path)
+        if target.suffix not in ("", ".npz"):
+            raise UsageError(f"an ensemble is saved as .npz, not as {target.suffix}: {target}")
+        target = target.with_suffix(".npz")
         arrays: dict[str, Any] = {
             name: np.asarray(value) for name, value in self.reduced.items() if not isinstance(value, list)
         }

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..constraints import Driver
+from ..frames import Frame, Marker
+from ..graph import vectors as vec
+from ..graph.core import Expr
+from ..graph.evaluate import compile_evaluator
+from ..graph.substitute import symbols_of
 from ..graph.traverse import reachable
+from ..limits.inertia import ACROSS
 from ..operations import CHOICE, OPERATIONS
 from .kinematics import Kinematics
 from .mobility import Mobility
 
 POOR = 1e-2  #: conditioning below which another choice of independent coordinates is worth a word
 SHOWN = 6
+TRIED = 3  #: states at which a body's angular velocity is looked at
 
 
 def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
@@ -52,7 +61,31 @@ def find_notes(kinematics: Kinematics, mobility: Mobility) -> list[str]:
         "not computed; take a smooth motion, or impacts for what is meant to hit"
         for name, corners in _drivers_with_corners(kinematics)
     ]
+    notes += [
+        f"{name} turns about axes of which no moment of inertia is given, so they count as 0: give xx, yy and zz, or "
+        "take a joint that turns it about the axis of its only moment"
+        for name in _turned_out_of_plane(kinematics)
+    ]
     return notes
+
+
+def _turned_out_of_plane(kinematics: Kinematics) -> list[str]:
+    """Bodies with one moment of inertia, as in a plane, whose joints turn them about other axes too."""
+    mechanism, graph = kinematics.mechanism, kinematics.graph
+    bodies = [(k, body) for k, body in enumerate(mechanism.bodies) if body.plane is not None]
+    across: list[Expr] = []
+    for k, body in bodies:
+        marker = Marker(k, Frame(vec.identity(graph), vec.zero(graph)), body.name)
+        spin = kinematics.motion.turning_of(marker, own_axes=True, rate=False)
+        across += vec.cross(spin, body.plane or spin)
+    symbols = sorted(symbols_of(across))
+    if not symbols:
+        return []
+    values = np.random.default_rng(1).uniform(0.5, 1.5, (TRIED, len(symbols)))
+    with np.errstate(all="ignore"):
+        evaluate = compile_evaluator(across, symbols)
+        sizes = np.abs([evaluate(row.tolist()) for row in values]).max(axis=0).reshape(-1, 3).max(axis=1)
+    return [body.name for (_, body), size in zip(bodies, sizes, strict=True) if size > ACROSS]
 
 
 def _drivers_with_corners(kinematics: Kinematics) -> list[tuple[str, list[str]]]:

@@ -94,7 +94,7 @@ def _part(name: str) -> Any:
     try:
         return import_module(f"matplotlib.{name}")
     except ImportError as error:
-        raise MissingDependencyError('the picture needs matplotlib: pip install "eomgen[plot]"') from error
+        raise MissingDependencyError("the picture needs matplotlib: pip install matplotlib") from error
 
 
 def _size(places: Places) -> tuple[float, float]:

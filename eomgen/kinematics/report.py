@@ -97,7 +97,7 @@ class MechanismReport:
         Raises
         ------
         MissingDependencyError
-            matplotlib is not installed: ``pip install "eomgen[plot]"``.
+            matplotlib is not installed: ``pip install matplotlib``.
         UsageError
             A file name whose ending is no kind of picture.
         """

@@ -31,3 +31,5 @@ DIGITS = 1e-6
 COMPUTED = ROUNDED
 #: Part of the largest principal moment below which the second says nothing of the triangle of three.
 MOMENT = 1e-9
+#: Angular velocity of a body across the axis of its only moment, at velocities of about 1 rad/s; rounding leaves 1e-15.
+ACROSS = 1e-9
