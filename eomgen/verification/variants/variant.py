@@ -14,6 +14,7 @@ import numpy as np
 from ...describe.build_cam_points import needs_point
 from ...describe.build_joints import coordinate_names
 from ...describe.description import DescribedEntry, Description
+from ...elements.dimensions import Dimension
 from ...joints import JOINTS
 from ...records import dataclass
 from .rewritten_texts import names_of
@@ -39,6 +40,10 @@ class UnitScales:
     length: float = 1.0
     mass: float = 1.0
     time: float = 1.0
+
+    def of(self, dimension: Dimension) -> float:
+        """Units of a variant in one SI unit of a dimension."""
+        return float(self.length**dimension.length * self.mass**dimension.mass * self.time**dimension.time)
 
     @property
     def force(self) -> float:

@@ -8,19 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ...constraints import CONSTRAINTS
 from ...describe.description import GROUND_NAME, DescribedEntry, Description
-from ...describe.fields import (
-    BODY,
-    EQUATIONS,
-    EVENT,
-    INPUT,
-    LAGRANGIAN,
-    OUTPUT_FIELDS,
-    Fields,
-    joint_fields,
-)
-from ...forces import FORCES
+from ...describe.fields import EQUATIONS, LAGRANGIAN, Fields, fields_of
 
 
 class Slot(NamedTuple):
@@ -100,17 +89,6 @@ def visit(description: Description, visitor: Visitor) -> Description:
 def copied(description: Description) -> Description:
     """A copy whose entries can be changed without changing the original's."""
     return visit(description, Visitor())
-
-
-def fields_of(section: str, values: Mapping[str, Any]) -> Fields:
-    """The table of fields of an entry."""
-    if section == "joints":
-        return joint_fields(values["type"])
-    if section == "forces":
-        return FORCES[values["type"]].fields("force", FORCES)
-    if section == "constraints":
-        return CONSTRAINTS[values["type"]].fields("constraint", CONSTRAINTS)
-    return {"bodies": BODY, "inputs": INPUT, "outputs": OUTPUT_FIELDS, "events": EVENT}.get(section, {})
 
 
 def _entry(section: str, entry: DescribedEntry, visitor: Visitor) -> DescribedEntry:
