@@ -28,7 +28,7 @@ _NAMES = {
     SPIN: "a rate", FORCE: "a force", ENERGY: "a torque or an energy", INERTIA: "a moment of inertia",
     STIFFNESS.along(True): "a stiffness", LENGTH.times(TIME, -2): "an acceleration",
 }  # fmt: skip
-_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "^", "lt": "<", "le": "<=", "eq": "=="}
+_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "pow": "**", "lt": "<", "le": "<=", "eq": "=="}
 #: Factors that formulas have, and that hardly ever stand for a measured value: 2, 1/2, 1/3, 4/3 pi, ...
 _RATIOS = frozenset(
     sign * a / b * turn for sign in (1, -1) for a in (1, 2, 3, 4, 6, 8, 12) for b in (1, 2, 3, 4, 6, 8, 12)

@@ -28,6 +28,7 @@ from .mechanism import Simulation
 #: kind -> how a message describes it
 KINDS = {
     "text": "a text",
+    "unit": "a unit, such as mm or N*m/rad",
     "name": "a name",
     "names": "a list of names",
     "body": "the name of a body",
@@ -76,7 +77,7 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 SOLVERS = ("DOP853", "RK45", "RK23", "Radau", "Taylor", "BDF", "LSODA", "RK4")
 
-_UNIT = Field("text", "unit, for display", default="")
+_UNIT = Field("unit", "unit of the value, such as mm or N*m/rad; converted to SI, and checked", default="")
 _DOC = Field("text", "one sentence, for display", default="")
 _NAME = Field("name", "name of the model and of the generated module", required=True)
 

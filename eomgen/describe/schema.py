@@ -88,6 +88,7 @@ def _definitions() -> Schema:
 #: kind of field -> its schema; kinds not listed are handled by :func:`_field`.
 _KINDS: dict[str, Schema] = {
     "text": {"type": "string"},
+    "unit": {"type": "string"},
     "name": _ref("name"),
     "body": _ref("name"),
     "joint": _ref("name"),

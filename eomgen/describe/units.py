@@ -209,5 +209,4 @@ def _looked_up(word: str, text: str) -> tuple[Dimension, float, bool]:
         if base not in _PINT:
             raise UnitError(f"{quoted(word)}{of} is a unit of {base.strip('[]')}, which no model knows", _FORM)
         dimension = dimension.times(_PINT[base], float(power))
-    size: Any = one.to_base_units().magnitude
-    return dimension, float(size), False
+    return dimension, float(one.to_base_units().magnitude), False  # type: ignore[arg-type]
